@@ -1,0 +1,74 @@
+# make lesson   set everything up and run the main lesson
+# make test     set everything up and run all checks and tests
+# make check    lint, format, layers and types only
+# make bench    the speed budget, as ratios
+# make help     all targets
+
+VENV   ?= .venv
+BIN    := $(VENV)/bin
+PIP    := $(BIN)/python -m pip install -q --disable-pip-version-check
+# The first of these that exists, is new enough and can make environments. 3.11 comes
+# first because it is the newest Python for which every engine has a wheel.
+PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13 python3.14; do \
+	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null \
+	&& { echo $$p; break; }; done)
+
+.PHONY: help lesson test test-fast test-newest check format bench picture clean
+
+help:
+	@sed -n 's/^# make /  make /p' Makefile
+
+lesson: $(VENV)/run.stamp
+	@$(BIN)/statemachine lesson forward
+	@$(BIN)/statemachine lesson gravity
+	@# 3: the witness cannot be had here; it has said so in one line.
+	@$(BIN)/statemachine fingertip || [ $$? -eq 3 ]
+	@$(BIN)/statemachine next
+
+test: check
+	@$(BIN)/python -m pytest -n auto
+
+# make test-fast  without the slow tests
+test-fast: $(VENV)/test.stamp
+	@$(BIN)/python -m pytest -n auto -m "not slow"
+
+# make test-newest  the same tests with the newest versions that pyproject.toml allows
+test-newest:
+	@$(MAKE) --no-print-directory VENV=.venv-newest CONSTRAINTS= .venv-newest/test.stamp
+	@.venv-newest/bin/python -m pytest -n auto
+
+check: $(VENV)/test.stamp
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/lint-imports
+	@$(BIN)/pyright --pythonpath $(BIN)/python
+
+# make format   put the sources into the project's format
+format: $(VENV)/test.stamp
+	@$(BIN)/ruff check --fix .
+	@$(BIN)/ruff format .
+
+bench: $(VENV)/run.stamp
+	@$(BIN)/python -m benchmarks
+
+# make picture  render models/so101/so101.png anew (needs EGL or OSMesa)
+picture: $(VENV)/test.stamp
+	@$(BIN)/python models/so101/render.py
+
+clean:
+	rm -rf .venv .venv-newest build dist .pytest_cache .ruff_cache .hypothesis
+
+CONSTRAINTS ?= -c constraints.txt
+
+$(VENV)/run.stamp: pyproject.toml constraints.txt
+	@test -n "$(PYTHON)" || { echo "no Python 3.11 or newer with venv and ensurepip here" \
+	"(Debian, Ubuntu: apt-get install python3-venv)"; exit 1; }
+	@echo "setting up $(VENV) with $(PYTHON), once: about a minute ..."
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(PIP) $(CONSTRAINTS) -e .
+	@touch $@
+
+$(VENV)/test.stamp: $(VENV)/run.stamp
+	@echo "adding what tests and checks need ..."
+	@$(PIP) $(CONSTRAINTS) -e '.[test,check,render]'
+	@touch $@

@@ -1,0 +1,73 @@
+"""A physics simulator is a state machine that you advance.
+
+    import statemachine as sm
+
+    model = sm.load("so101/scene_box", backend="mujoco")
+    data = sm.make_data(model)
+    sm.reset(model, data, keyframe=0)
+    sm.step(model, data, 400)
+
+Names are imported when they are first used, so that `import statemachine` and
+`statemachine --help` load no engine.
+"""
+
+from __future__ import annotations
+
+import os as _os
+from importlib import import_module as _import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+# The distribution python-statemachine installs an import package of this very name;
+# where both were installed into one folder, its files lie among ours.
+if _os.path.exists(_os.path.join(_os.path.dirname(__file__), "statemachine.py")):
+    raise ImportError(
+        "the package python-statemachine is installed over this one and uses the same import "
+        "name: pip uninstall python-statemachine, then reinstall statemachine-sim"
+    )
+
+if TYPE_CHECKING:
+    from .backends import load as load
+    from .interface import Data as Data
+    from .interface import Model as Model
+    from .records import State as State
+    from .verbs import forward as forward
+    from .verbs import get_state as get_state
+    from .verbs import make_data as make_data
+    from .verbs import reset as reset
+    from .verbs import set_state as set_state
+    from .verbs import step as step
+    from .kinematics import Kinematics as Kinematics
+
+_HOMES = {
+    "load": "backends",
+    "make_data": "verbs",
+    "forward": "verbs",
+    "step": "verbs",
+    "reset": "verbs",
+    "get_state": "verbs",
+    "set_state": "verbs",
+    "Model": "interface",
+    "Data": "interface",
+    "State": "records",
+    "Kinematics": "kinematics",
+}
+_MODULES = ("backends", "conformance", "errors", "experiments", "kinematics", "models", "rotations")
+
+__all__ = [*_HOMES, "__version__"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        value = getattr(_import_module(f".{_HOMES[name]}", __name__), name)
+    elif name in _MODULES:
+        value = _import_module(f".{name}", __name__)
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value  # so that the next use is an ordinary look-up
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__, *_MODULES})

@@ -1,0 +1,99 @@
+"""The backends by name, each loaded when it is first asked for."""
+
+from __future__ import annotations
+
+import importlib
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, Protocol, cast
+
+from ..engines import require
+from ..errors import BadInputError, unknown_name
+from ..interface import Model
+from ..models import resolve
+
+
+class Loader(Protocol):
+    """What a backend module offers: from a file to a Model."""
+
+    def __call__(self, path: os.PathLike[str], defaults: Literal["model", "engine"]) -> Model: ...
+
+
+@dataclass(frozen=True)
+class Backend:
+    """Where a backend lives: "package.module:function", and the engine it needs."""
+
+    loader: str
+    engine: str | None = None
+
+
+_BACKENDS: dict[str, Backend] = {
+    "mujoco": Backend("statemachine.backends.mujoco_backend:load", engine="mujoco"),
+}
+
+
+def backend_names() -> list[str]:
+    """Names that `load` takes for `backend`, whether or not their engine is installed."""
+    return list(_BACKENDS)
+
+
+def backend_engine(name: str) -> str | None:
+    """The engine (a key of `engines.ENGINES`) that a backend needs.
+
+    Raises:
+        UnknownNameError: There is no such backend.
+    """
+    return _find(name).engine
+
+
+def register(name: str, loader: str) -> None:
+    """Make a backend of another package known under a name.
+
+    Args:
+        name: What `load(…, backend=name)` takes.
+        loader: "package.module:function" of a `Loader`; imported at first use.
+    """
+    module, _, function = loader.partition(":")
+    if not (module and function):
+        raise BadInputError(f"loader must read 'package.module:function'; got {loader!r}")
+    _BACKENDS[name] = Backend(loader)
+
+
+def load(
+    model: str | os.PathLike[str],
+    backend: str = "mujoco",
+    *,
+    defaults: Literal["model", "engine"] = "model",
+    menagerie: str | os.PathLike[str] | None = None,
+) -> Model:
+    """Compile a model's file into a Model. The slow part, done once.
+
+    Args:
+        model: A name ("so101/scene_box") or a path; see `models.resolve`.
+        backend: The engine to run it on.
+        defaults: "model" keeps the contract of this library on every backend;
+            "engine" gives what the engine's own users get when they load the file.
+        menagerie: A menagerie folder to look the name up in.
+
+    Raises:
+        UnknownNameError: No such backend or model.
+        MissingEngineError: The backend's engine is not installed here.
+        ModelFileError: The file is not there.
+        ModelError: The engine cannot read the file.
+    """
+    entry = _find(backend)
+    if defaults not in ("model", "engine"):
+        raise unknown_name("defaults", defaults, ("model", "engine"))
+    path = resolve(model, menagerie)
+    if entry.engine:
+        require(entry.engine)
+    module, _, function = entry.loader.partition(":")
+    loader = cast("Callable[..., Model]", getattr(importlib.import_module(module), function))
+    return loader(path, defaults=defaults)
+
+
+def _find(name: str) -> Backend:
+    if name not in _BACKENDS:
+        raise unknown_name("backend", name, _BACKENDS)
+    return _BACKENDS[name]

@@ -1,0 +1,439 @@
+"""MuJoCo behind the contract. The caller owns the state: a Data *is* an MjData.
+
+Everything is native here: the inputs are the engine's memory, the derived arrays
+its own buffers, seen read-only.
+"""
+
+from __future__ import annotations
+
+import copy
+import functools
+import hashlib
+import os
+import re
+import threading
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Literal, cast
+
+import mujoco
+import numpy as np
+
+from ..checks import TINY
+from ..errors import BadInputError, DivergedError, EngineWarning, ModelError
+from ..interface import OPTIONS, Data, Model
+from ..records import INPUTS, Array, Behaviour, Capabilities, Contacts, Keyframe, State
+
+_DISABLE = mujoco.mjtDisableBit
+_SWITCHES = {  # option of `replace` -> the flag that turns it off
+    "actuation": _DISABLE.mjDSBL_ACTUATION,
+    "contacts": _DISABLE.mjDSBL_CONTACT,
+    "limits": _DISABLE.mjDSBL_LIMIT,
+}
+_INTEGRATORS = {
+    "euler": mujoco.mjtIntegrator.mjINT_EULER,
+    "rk4": mujoco.mjtIntegrator.mjINT_RK4,
+    "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
+    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+}
+_CONSTRAINT = mujoco.mjtConstraint
+_PARTS = {
+    "contact": (
+        _CONSTRAINT.mjCNSTR_CONTACT_FRICTIONLESS,
+        _CONSTRAINT.mjCNSTR_CONTACT_PYRAMIDAL,
+        _CONSTRAINT.mjCNSTR_CONTACT_ELLIPTIC,
+    ),
+    "friction": (_CONSTRAINT.mjCNSTR_FRICTION_DOF, _CONSTRAINT.mjCNSTR_FRICTION_TENDON),
+    "limit": (_CONSTRAINT.mjCNSTR_LIMIT_JOINT, _CONSTRAINT.mjCNSTR_LIMIT_TENDON),
+}
+# Every single component of the integration state, in the engine's own order.
+_COMPONENTS = {
+    name.removeprefix("mjSTATE_").lower(): bit
+    for name, bit in mujoco.mjtState.__members__.items()
+    if name != "mjNSTATE"
+    and int(bit).bit_count() == 1
+    and int(bit) & int(mujoco.mjtState.mjSTATE_INTEGRATION)
+}
+_NATIVE = Behaviour("native", "the engine's own")
+_CAPABILITIES = Capabilities(
+    options=OPTIONS,
+    integrators=tuple(_INTEGRATORS),
+    behaviours={
+        "stale after a write": _NATIVE,
+        "stale after a step": _NATIVE,
+        "zeros when fresh": _NATIVE,
+        "position servo": _NATIVE,
+        "armature": _NATIVE,
+        "joint damping": _NATIVE,
+        "dry friction": _NATIVE,
+        "joint limits": _NATIVE,
+        "free joint conventions": _NATIVE,
+        "forces by part": Behaviour("native", "rows of the constraint solver, by their type"),
+        "exact restore": Behaviour("native", "mjSTATE_INTEGRATION, warm start included"),
+        "no automatic reset": Behaviour("native", "mjDSBL_AUTORESET is set at load"),
+    },
+    shared_model=True,
+    exact_restore=True,
+)
+
+_DERIVED = (
+    "xpos",
+    "xquat",
+    "site_xpos",
+    "site_xmat",
+    "qacc",
+    "qfrc_bias",
+    "qfrc_actuator",
+    "qfrc_passive",
+    "qfrc_constraint",
+)
+
+# (thread, text) of every warning that MuJoCo gave and nobody has looked at yet. The
+# handler is the process's, so a Data trusts its own counters for what is its own.
+_ALARMS: list[tuple[int, str]] = []
+_BAD = re.compile(r"value in (\w+) at \w+ (\d+).*Time = ([-+.\deE]+\d)")
+
+
+def _on_warning(text: str) -> None:
+    _ALARMS.append((threading.get_ident(), text))
+
+
+def _listen() -> None:
+    # Another library may have put its own handler in since; without ours, a
+    # divergence would pass in silence and write a log file.
+    if mujoco.get_mju_user_warning() is not _on_warning:
+        mujoco.set_mju_user_warning(_on_warning)
+
+
+def _drain() -> list[str]:
+    """The warnings of this thread, taken off the list."""
+    mine = [entry for entry in _ALARMS if entry[0] == threading.get_ident()]
+    for entry in mine:
+        _ALARMS.remove(entry)
+    return [text for _, text in mine]
+
+
+def _pass_on(texts: list[str]) -> None:
+    for text in texts:
+        warnings.warn(f"MuJoCo: {text}", EngineWarning, stacklevel=4)
+
+
+def load(
+    path: str | os.PathLike[str], defaults: Literal["model", "engine"] = "model"
+) -> MujocoModel:
+    """Compile an MJCF, URDF or MJB file.
+
+    Args:
+        path: The file.
+        defaults: "engine" leaves the engine's automatic reset as the file has it
+            (a divergence is raised all the same); nothing else differs, since
+            nothing is emulated on MuJoCo.
+
+    Raises:
+        ModelError: MuJoCo cannot compile the file; with its reason.
+    """
+    _listen()
+    text = os.fspath(path)
+    try:
+        if text.lower().endswith(".mjb"):
+            raw = mujoco.MjModel.from_binary_path(text)
+        else:
+            raw = mujoco.MjModel.from_xml_path(text)
+    except (ValueError, mujoco.FatalError) as error:
+        _drain()
+        reason = " ".join(str(error).split())
+        raise ModelError(f"MuJoCo cannot read {text}: {reason}") from error
+    if defaults == "model":
+        raw.opt.disableflags |= int(_DISABLE.mjDSBL_AUTORESET)
+    _pass_on(_drain())
+    return MujocoModel(raw, Path(text), substeps=1)
+
+
+class MujocoModel(Model):
+    """A compiled mjModel, shared by all its Data."""
+
+    raw: mujoco.MjModel
+
+    def __init__(self, raw: mujoco.MjModel, path: Path, substeps: int) -> None:
+        m = raw
+        on_joint = m.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
+        servo = (
+            (m.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_FIXED))
+            & (m.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE))
+            & (m.actuator_biasprm[:, 1] == -m.actuator_gainprm[:, 0])
+            & (m.actuator_gainprm[:, 0] != 0)
+        )
+        super().__init__(
+            backend="mujoco",
+            engine_version=mujoco.__version__,
+            path=path,
+            raw=raw,
+            capabilities=_CAPABILITIES,
+            timestep=float(m.opt.timestep) * substeps,
+            substeps=substeps,
+            nq=m.nq,
+            nv=m.nv,
+            nu=m.nu,
+            nbody=m.nbody,
+            njnt=m.njnt,
+            nsite=m.nsite,
+            ngeom=m.ngeom,
+            body_names=tuple(m.body(i).name for i in range(m.nbody)),
+            joint_names=tuple(m.joint(i).name for i in range(m.njnt)),
+            site_names=tuple(m.site(i).name for i in range(m.nsite)),
+            geom_names=tuple(m.geom(i).name for i in range(m.ngeom)),
+            actuator_names=tuple(m.actuator(i).name for i in range(m.nu)),
+            jnt_type=m.jnt_type.astype(np.int64),
+            jnt_qposadr=m.jnt_qposadr.astype(np.int64),
+            jnt_dofadr=m.jnt_dofadr.astype(np.int64),
+            jnt_limited=m.jnt_limited.astype(bool),
+            jnt_range=m.jnt_range,
+            actuator_jntid=np.where(on_joint, m.actuator_trnid[:, 0], -1).astype(np.int64),
+            actuator_ctrlrange=_ranges(m.actuator_ctrlrange, m.actuator_ctrllimited),
+            actuator_forcerange=_ranges(m.actuator_forcerange, m.actuator_forcelimited),
+            actuator_kp=np.where(servo, m.actuator_gainprm[:, 0], np.nan),
+            actuator_kv=np.where(servo, -m.actuator_biasprm[:, 2], np.nan),
+            dof_armature=m.dof_armature,
+            dof_damping=m.dof_damping,
+            dof_frictionloss=m.dof_frictionloss,
+            geom_bodyid=m.geom_bodyid.astype(np.int64),
+            site_bodyid=m.site_bodyid.astype(np.int64),
+            site_pos=m.site_pos,
+            site_quat=m.site_quat,
+            keyframes=tuple(
+                Keyframe(
+                    m.key(i).name, float(m.key_time[i]), m.key_qpos[i], m.key_qvel[i], m.key_ctrl[i]
+                )
+                for i in range(m.nkey)
+            ),
+        )
+
+    def _make_data(self) -> MujocoData:
+        return MujocoData(self)
+
+    def _replace(self, options: dict[str, Any]) -> MujocoModel:
+        raw = copy.copy(self.raw)
+        for name, value in options.items():
+            if name in _SWITCHES:
+                flag = int(_SWITCHES[name])
+                raw.opt.disableflags = (raw.opt.disableflags & ~flag) | (0 if value else flag)
+            elif name == "gravity":
+                raw.opt.gravity[:] = value
+            elif name == "integrator":
+                raw.opt.integrator = int(_INTEGRATORS[value])
+            elif name in ("armature", "damping", "frictionloss"):
+                getattr(raw, f"dof_{name}")[:] = value
+        substeps = options.get("substeps", self.substeps)
+        raw.opt.timestep = options.get("timestep", self.timestep) / substeps
+        if "armature" in options:
+            mujoco.mj_setConst(raw, mujoco.MjData(raw))  # inverse weights follow from it
+        return MujocoModel(raw, self.path, substeps)
+
+
+def _ranges(ranges: Array, limited: Any) -> Array:
+    return np.where(limited[:, None].astype(bool), ranges, [-np.inf, np.inf])
+
+
+def _view(name: str) -> Any:
+    """A property that shows one array of the MjData, read-only."""
+
+    def read(self: MujocoData) -> Array:
+        if self._model is None:
+            self._refuse_if_troubled()
+        return self._views[name]
+
+    return property(read)
+
+
+class MujocoData(Data):
+    """An MjData. Inputs and derived arrays are views of its memory."""
+
+    __slots__ = ("_raw", "_views", "_layout")
+
+    _raw: mujoco.MjData | None
+    _views: dict[str, Array]
+    _layout: tuple[str, tuple[tuple[str, int], ...]]
+
+    def __init__(self, model: MujocoModel) -> None:
+        _listen()
+        raw = mujoco.MjData(model.raw)
+        put = functools.partial(object.__setattr__, self)
+        put("_home", model)
+        put("_raw", raw)
+        put("_alarms", _ALARMS)
+        put("_advance", _transition(model, raw))
+        put("_layout", _layout(model))
+        for name in INPUTS:
+            put(name, getattr(raw, name))
+        put("_views", {name: getattr(raw, name) for name in _DERIVED})
+        for view in self._views.values():
+            view.setflags(write=False)
+        self._recover()
+
+    xpos = _view("xpos")
+    xquat = _view("xquat")
+    site_xpos = _view("site_xpos")
+    site_xmat = _view("site_xmat")
+    qacc = _view("qacc")
+    qfrc_bias = _view("qfrc_bias")
+    qfrc_actuator = _view("qfrc_actuator")
+    qfrc_passive = _view("qfrc_passive")
+    qfrc_constraint = _view("qfrc_constraint")
+
+    @property
+    def raw(self) -> mujoco.MjData:
+        if self._raw is None:
+            self._refuse_if_troubled()
+        return cast("mujoco.MjData", self._raw)
+
+    @property
+    def time(self) -> float:
+        return self.raw.time
+
+    @property
+    def contacts(self) -> Contacts:
+        self._refuse_if_troubled()
+        found, count = self.raw.contact, self.raw.ncon
+        force = np.zeros((count, 6))
+        for i in range(count):
+            mujoco.mj_contactForce(self._home.raw, self.raw, i, force[i])
+        return Contacts(
+            geom=np.array(found.geom, dtype=np.int64).reshape(count, 2),
+            dist=np.array(found.dist),
+            pos=np.array(found.pos).reshape(count, 3),
+            frame=np.array(found.frame).reshape(count, 3, 3),
+            force=force[:, :3],
+        )
+
+    @property
+    def qfrc_contact(self) -> Array:
+        return self._constraint_part("contact")
+
+    @property
+    def qfrc_friction(self) -> Array:
+        return self._constraint_part("friction")
+
+    @property
+    def qfrc_limit(self) -> Array:
+        return self._constraint_part("limit")
+
+    def _constraint_part(self, part: str) -> Array:
+        self._refuse_if_troubled()
+        model, data = self._home.raw, self.raw
+        total = np.zeros(model.nv)
+        if data.nefc:
+            rows = np.isin(data.efc_type, [int(kind) for kind in _PARTS[part]])
+            mujoco.mj_mulJacTVec(model, data, total, np.where(rows, data.efc_force, 0.0))
+        total.setflags(write=False)
+        return total
+
+    def _recompute(self) -> None:
+        mujoco.mj_forward(self._home.raw, self.raw)
+
+    def _reset(self, key: int | None) -> None:
+        if key is None:
+            mujoco.mj_resetData(self._home.raw, self.raw)
+        else:
+            mujoco.mj_resetDataKeyframe(self._home.raw, self.raw, key)
+
+    def _get_state(self) -> State:
+        fingerprint, layout = self._layout
+        vector = np.empty(sum(size for _, size in layout))
+        mujoco.mj_getState(
+            self._home.raw, self.raw, vector, int(mujoco.mjtState.mjSTATE_INTEGRATION)
+        )
+        return State("mujoco", mujoco.__version__, fingerprint, layout, vector.tobytes())
+
+    def _set_state(self, state: State) -> None:
+        # A reset first: it clears the counters, without which a second divergence
+        # would go unreported, and whatever else the last run left behind.
+        mujoco.mj_resetData(self._home.raw, self.raw)
+        mujoco.mj_setState(
+            self._home.raw, self.raw, state.vector, int(mujoco.mjtState.mjSTATE_INTEGRATION)
+        )
+
+    def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
+        return self._layout
+
+    def _set_time(self, time: float) -> None:
+        self.raw.time = time
+
+    def _close(self) -> None:
+        object.__setattr__(self, "_raw", None)
+        object.__setattr__(self, "_advance", None)
+        self._views.clear()
+
+    def _attend(self) -> None:
+        texts = _drain()
+        raised = {name for name in _FATAL if self.raw.warning[int(_FATAL[name])].number}
+        if not raised:
+            _pass_on(texts)  # of another Data, or nothing that makes this one useless
+            return
+        bad = [match for match in map(_BAD.search, texts) if match and match[1] in raised]
+        quantity, index, time = sorted(raised)[0], -1, self.raw.time
+        if bad:
+            quantity, index, time = bad[0][1], int(bad[0][2]), float(bad[0][3])
+        quantity = quantity.lower()
+        entry = f"{quantity}[{index}]{self._home.coordinate_name(quantity, index)}"
+        if quantity == "ctrl":
+            value = float(self.ctrl[index])
+            self._give_up(f"it was stepped with a bad {entry}")
+            raise BadInputError(
+                f"{entry} was {value} at time {time:g} s, which is no command: MuJoCo stepped "
+                "as if ctrl were zero. This Data now takes only reset and set_state",
+                quantity=quantity,
+                index=index,
+                time=time,
+            )
+        self._give_up(f"{entry} was not finite at time {time:g} s")
+        raise DivergedError(
+            f"{entry} became NaN, infinite or huge at time {time:g} s. "
+            "This Data now takes only reset and set_state",
+            quantity=quantity,
+            index=index,
+            time=time,
+        )
+
+
+_FATAL = {
+    "QPOS": mujoco.mjtWarning.mjWARN_BADQPOS,
+    "QVEL": mujoco.mjtWarning.mjWARN_BADQVEL,
+    "QACC": mujoco.mjtWarning.mjWARN_BADQACC,
+    "CTRL": mujoco.mjtWarning.mjWARN_BADCTRL,
+}
+
+
+def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[[int], None]:
+    """The engine's step bound to its arguments; Python runs only where it must."""
+    bare = functools.partial(mujoco.mj_step, model.raw, raw)
+    substeps = model.substeps
+    advance = bare if substeps == 1 else lambda nstep: bare(nstep * substeps)
+    quats = [(raw.qpos[start : start + 4], joint, start) for joint, start in model.quaternions()]
+    if not quats:
+        return advance
+
+    def checked(nstep: int) -> None:
+        # MuJoCo takes a zero quaternion for the identity without a word.
+        for quat, joint, start in quats:
+            if quat.dot(quat) < TINY * TINY:
+                raise model.zero_quaternion(joint, start)
+        advance(nstep)
+
+    return checked
+
+
+def _layout(model: MujocoModel) -> tuple[str, tuple[tuple[str, int], ...]]:
+    sizes = {
+        name: int(mujoco.mj_stateSize(model.raw, int(bit))) for name, bit in _COMPONENTS.items()
+    }
+    layout = tuple((name, size) for name, size in sizes.items() if size)
+    identity = (
+        "mujoco",
+        layout,
+        model.joint_names,
+        model.jnt_type.tolist(),
+        model.jnt_qposadr.tolist(),
+        model.actuator_names,
+    )
+    return hashlib.sha256(repr(identity).encode()).hexdigest()[:16], layout

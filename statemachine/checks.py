@@ -1,0 +1,98 @@
+"""Checks of arguments, shared by the interface and the backends."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .errors import BadInputError, unknown_name
+from .records import Array
+
+# MuJoCo calls a coordinate beyond this "huge" and the simulation unstable (mjMAXVAL).
+HUGE = 1e10
+# Below this norm MuJoCo takes a quaternion for the identity without a word (mjMINVAL).
+TINY = 1e-15
+
+
+def as_count(value: Any, name: str) -> int:
+    """`value` as a whole number of at least 1, or BadInputError."""
+    number = whole_number(value)
+    if number is None or not 1 <= number < 2**31:
+        raise BadInputError(f"{name} must be a whole number of at least 1; got {value!r}")
+    return number
+
+
+def whole_number(value: Any) -> int | None:
+    """`value` as an int if it is a whole number by type (True is not), else None."""
+    if isinstance(value, (bool, np.bool_)):
+        return None
+    try:
+        return operator.index(value)
+    except TypeError:
+        return None
+
+
+def as_switch(value: Any, name: str) -> bool:
+    """`value` as a bool, or BadInputError."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise BadInputError(f"{name} must be True or False; got {value!r}")
+    return bool(value)
+
+
+def as_scalar(value: ArrayLike, name: str) -> float:
+    """`value` as one finite float, or BadInputError."""
+    return float(as_vector(value, (), name))
+
+
+def as_vector(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
+    """`value` as finite float64 of exactly this shape, in a new array, or BadInputError."""
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError) as error:  # a ragged list
+        raise BadInputError(f"{name} must be numbers of shape {shape}") from error
+    if array.dtype.kind not in "fiu":
+        raise BadInputError(f"{name} must be real numbers; got {array.dtype}")
+    if array.shape != shape:
+        wanted = f"{shape[0]} numbers, shape {shape}" if shape else "one number"
+        raise BadInputError(f"{name} wants {wanted}; got shape {array.shape}")
+    array = array.astype(np.float64)
+    check_entries(array, name)
+    return array
+
+
+def check_entries(array: Array, name: str, label: Callable[[str, int], str] | None = None) -> None:
+    """Raise BadInputError for the first entry that is not finite, or is huge.
+
+    Args:
+        array: Any shape.
+        name: What the array is called in the message.
+        label: Gives ' (elbow_flex)' for (name, index), to be put after the entry.
+    """
+    # One comparison answers for all: NaN fails it too.
+    if np.abs(array).max(initial=0.0) <= HUGE:
+        return
+    flat = array.ravel()
+    index = int(np.flatnonzero(~(np.abs(flat) <= HUGE))[0])
+    value = float(flat[index])
+    where = f"{name}[{index}]" if array.ndim else name
+    if label is not None:
+        where += label(name, index)
+    problem = f"is beyond {HUGE:g}" if math.isfinite(value) else "is not a finite number"
+    raise BadInputError(f"{where} = {value} {problem}", quantity=name, index=index)
+
+
+def index_of(kind: str, name: str, names: Sequence[str]) -> int:
+    """Place of a name among the names of its kind, or UnknownNameError."""
+    if name and name in names:
+        return names.index(name)
+    raise unknown_name(kind, name, (known for known in names if known))
+
+
+def kind_of(value: object) -> str:
+    """A value's type with its module, for messages."""
+    return f"{type(value).__module__}.{type(value).__qualname__}"

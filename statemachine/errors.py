@@ -1,0 +1,97 @@
+"""Every deliberate error of the library.
+
+Each says in one sentence what happened, what was expected and what to type,
+is also the builtin that fits, and carries its facts as attributes. All of them
+survive a pickle, so that they can cross a process boundary.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import Any
+
+
+class StateMachineError(Exception):
+    """Base of every error that this library raises on purpose."""
+
+    def __init__(self, message: str, **facts: Any) -> None:
+        super().__init__(message)
+        # BaseException pickles (class, args, __dict__): facts travel with it.
+        self.__dict__.update(facts)
+
+    def __str__(self) -> str:  # KeyError would print the repr of the message
+        return str(self.args[0])
+
+
+class UnknownNameError(StateMachineError, KeyError):
+    """No backend, model, joint, keyframe … has this name or number."""
+
+    kind: str
+    name: object
+    known: tuple[str, ...]
+
+
+class MissingEngineError(StateMachineError, ImportError):
+    """An engine is not installed here, or is installed and does not load."""
+
+    engine: str
+
+
+class ModelFileError(StateMachineError, FileNotFoundError):
+    """A model's file is not there, or is not a file."""
+
+
+class ModelError(StateMachineError, ValueError):
+    """A model's file is there, and an engine cannot make a Model of it."""
+
+
+class BadInputError(StateMachineError, ValueError):
+    """A value has the wrong shape, kind or size, or is not finite."""
+
+
+class ForeignDataError(StateMachineError, ValueError):
+    """A Data was handed to a Model that did not make it."""
+
+
+class ForeignStateError(StateMachineError, ValueError):
+    """A State has another layout than the Data it is to be put into."""
+
+
+class ClosedDataError(StateMachineError, RuntimeError):
+    """A Data was used after `close`."""
+
+
+class DivergedError(StateMachineError, ArithmeticError):
+    """A coordinate stopped being finite while the engine stepped."""
+
+    time: float
+    quantity: str
+    index: int
+
+
+class UnsupportedError(StateMachineError, NotImplementedError):
+    """A backend cannot do what was asked, and says so."""
+
+    backend: str
+    feature: str
+    reason: str
+
+
+class ReadOnlyError(StateMachineError, AttributeError):
+    """Something derived or constant was assigned to."""
+
+
+class EngineWarning(UserWarning):
+    """A warning that an engine gave, brought up into Python."""
+
+
+def unknown_name(kind: str, name: object, known: Iterable[str]) -> UnknownNameError:
+    """The error for a mistyped name: what is known, and the nearest spelling."""
+    names = tuple(known)
+    listed = ", ".join(names) if names else "none"
+    message = f"no {kind} named {name!r}; known: {listed}"
+    close = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
+    if close:
+        message += f". Did you mean {close[0]!r}?"
+    return UnknownNameError(message, kind=kind, name=name, known=names)

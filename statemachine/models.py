@@ -1,0 +1,81 @@
+"""From the name of a model to the file that holds it.
+
+A name is one of ours ("so101/scene_box"), a path to a file, or a file of a
+folder laid out like MuJoCo Menagerie, given as an argument or by $MENAGERIE.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from .errors import ModelFileError, unknown_name
+
+_PACKAGE = Path(__file__).resolve().parent
+SUFFIXES = (".xml", ".urdf", ".mjb")
+# The folder of a public menagerie that holds the counterpart of one of ours.
+_COUNTERPARTS = {"so101": "robotstudio_so101"}
+
+
+def models_dir() -> Path:
+    """The folder of our own models: inside the wheel, or at the checkout's root."""
+    inside = _PACKAGE / "_models"
+    return inside if inside.is_dir() else _PACKAGE.parent / "models"
+
+
+def model_names() -> list[str]:
+    """Names of the models that come with the library: the arm first, then scenes."""
+    root = models_dir()
+    names = [path.relative_to(root).with_suffix("").as_posix() for path in root.glob("*/*.xml")]
+    return sorted(names, key=lambda name: (len(name), name))
+
+
+def resolve(name: str | os.PathLike[str], menagerie: str | os.PathLike[str] | None = None) -> Path:
+    """The file of a model.
+
+    Args:
+        name: One of `model_names()`, or a path to an .xml, .urdf or .mjb file.
+        menagerie: A menagerie folder. Given, names are looked up there ("so101/scene"
+            as robotstudio_so101/scene.xml) and not among ours.
+
+    Returns:
+        An absolute path of a file that exists.
+
+    Raises:
+        ModelFileError: The path or the menagerie folder is not there.
+        UnknownNameError: No model has this name.
+    """
+    text = os.fspath(name)
+    if "\0" in text or not text.strip():
+        raise ModelFileError(f"{text!r} is neither the name of a model nor a path")
+    path = Path(text).expanduser()
+    if path.suffix.lower() in SUFFIXES:
+        if path.is_file():
+            return path.absolute()
+        what = "is a folder, not a file" if path.is_dir() else "does not exist"
+        raise ModelFileError(f"model file {text} {what}")
+    if menagerie is not None:
+        return _in_menagerie(text, Path(menagerie).expanduser())
+    ours = text if "/" in text else f"{text}/{text}"
+    if ours in model_names():
+        return models_dir() / f"{ours}.xml"
+    if path.is_file():
+        raise ModelFileError(f"model file {text} does not end in {', '.join(SUFFIXES)}")
+    if os.environ.get("MENAGERIE") and "/" in text:
+        return _in_menagerie(text, Path(os.environ["MENAGERIE"]).expanduser())
+    raise unknown_name("model", text, model_names())
+
+
+def _in_menagerie(name: str, root: Path) -> Path:
+    if not root.is_dir():
+        raise ModelFileError(f"menagerie folder {root} does not exist")
+    folder, _, file = name.rpartition("/")
+    folder, file = (folder, file) if folder else (name, name)
+    robot = _COUNTERPARTS.get(folder, folder)
+    # `root` may be the whole menagerie or the robot's own folder.
+    home = root if root.name == robot else root / robot
+    path = home / f"{file}.xml"
+    if not path.is_file():
+        found = sorted(f"{robot}/{found.stem}" for found in home.glob("*.xml"))
+        raise unknown_name(f"model in {root}", f"{robot}/{file}", found)
+    return path.absolute()

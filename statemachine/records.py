@@ -1,0 +1,144 @@
+"""The records of the contract: what a backend says of itself, and what it hands out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import unknown_name
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+INPUTS = ("qpos", "qvel", "ctrl")
+
+
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """A read-only copy of an array."""
+    copy = np.array(array)
+    copy.setflags(write=False)
+    return copy
+
+
+class JointType(IntEnum):
+    """MuJoCo's mjtJoint."""
+
+    FREE = 0
+    BALL = 1
+    SLIDE = 2
+    HINGE = 3
+
+
+@dataclass(frozen=True)
+class Behaviour:
+    """One promise of the contract and how a backend keeps it."""
+
+    support: Literal["native", "emulated", "unsupported"]
+    note: str
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """What a backend can do, and which of it is the engine's own doing.
+
+    Attributes:
+        options: Names that `Model.replace` takes.
+        integrators: Values of its `integrator`.
+        behaviours: Each promise of the contract (stale writes, zeros when fresh,
+            the servo, armature, forces by part, exact restore …).
+        shared_model: Whether several Data share one compiled model in memory.
+        exact_restore: Whether `set_state` continues bit-exactly from any State,
+            mid-contact too; otherwise two restores of one State agree bit by bit.
+    """
+
+    options: tuple[str, ...]
+    integrators: tuple[str, ...]
+    behaviours: Mapping[str, Behaviour]
+    shared_model: bool
+    exact_restore: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Keyframe:
+    """A state that a model's file names; arrays are read-only."""
+
+    name: str
+    time: float
+    qpos: Array
+    qvel: Array
+    ctrl: Array
+
+    def __post_init__(self) -> None:
+        for name in INPUTS:
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # A pickle forgets that an array was read-only; making it anew does not.
+        return Keyframe, (self.name, self.time, self.qpos, self.qvel, self.ctrl)
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """The n contacts of one moment, as arrays.
+
+    Attributes:
+        geom: (n, 2) geom ids.
+        dist: (n,) distance between the surfaces [m]; negative is penetration.
+        pos: (n, 3) midpoint in world axes [m].
+        frame: (n, 3, 3) rows are the contact axes in world coordinates; the first
+            is the normal, from geom 0 to geom 1.
+        force: (n, 3) force of geom 0 on geom 1 along those axes [N], normal first.
+    """
+
+    geom: Ints
+    dist: Array
+    pos: Array
+    frame: Array
+    force: Array
+
+    def __len__(self) -> int:
+        return len(self.dist)
+
+
+@dataclass(frozen=True)
+class State:
+    """All that decides the future of a Data, as far as its engine exposes it.
+
+    Immutable, comparable, hashable, and picklable between processes.
+    `state["qpos"]` is a read-only view of one part.
+
+    Attributes:
+        backend: Name of the backend that made it.
+        engine_version: Version of the engine that made it, for the record.
+        fingerprint: Digest of the layout; `set_state` takes only its own.
+        layout: (name, length) of each part, in order.
+        blob: The parts as float64 bytes.
+    """
+
+    backend: str
+    engine_version: str
+    fingerprint: str
+    layout: tuple[tuple[str, int], ...]
+    blob: bytes
+
+    @property
+    def vector(self) -> Array:
+        """All parts in one read-only array."""
+        return np.frombuffer(self.blob, dtype=np.float64)
+
+    def __getitem__(self, part: str) -> Array:
+        start = 0
+        for name, size in self.layout:
+            if name == part:
+                return self.vector[start : start + size]
+            start += size
+        raise unknown_name("part of the State", part, (name for name, _ in self.layout))
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return float(self["time"][0])

@@ -1,0 +1,54 @@
+"""Rotations as NumPy arrays: quaternions in both orders, matrices, angles.
+
+Everywhere in this library a quaternion is (w, x, y, z), as in MuJoCo. Backends
+whose engine stores (x, y, z, w) convert at their own edge, with these functions.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def wxyz_from_xyzw(quat: ArrayLike) -> Array:
+    """Reorder quaternions (..., 4) from (x, y, z, w) to (w, x, y, z)."""
+    return np.roll(np.asarray(quat, dtype=np.float64), 1, axis=-1)
+
+
+def xyzw_from_wxyz(quat: ArrayLike) -> Array:
+    """Reorder quaternions (..., 4) from (w, x, y, z) to (x, y, z, w)."""
+    return np.roll(np.asarray(quat, dtype=np.float64), -1, axis=-1)
+
+
+def matrix_from_quat(quat: ArrayLike) -> Array:
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4), wxyz."""
+    w, x, y, z = np.moveaxis(np.asarray(quat, dtype=np.float64), -1, 0)
+    rows = (
+        (w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z),
+    )
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def angle_between(a: ArrayLike, b: ArrayLike) -> Array:
+    """Angle [rad] of the rotation that takes matrices `a` (..., 3, 3) to `b`.
+
+    By atan2 of sine and cosine, so that tiny angles keep their digits; the
+    arccosine of the trace alone loses everything below 1e-8.
+    """
+    a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+    turn = np.swapaxes(a, -1, -2) @ b
+    skew = np.stack(
+        [
+            turn[..., 2, 1] - turn[..., 1, 2],
+            turn[..., 0, 2] - turn[..., 2, 0],
+            turn[..., 1, 0] - turn[..., 0, 1],
+        ],
+        axis=-1,
+    )
+    sine = np.linalg.norm(skew, axis=-1) / 2
+    cosine = (np.trace(turn, axis1=-2, axis2=-1) - 1) / 2
+    return np.arctan2(sine, cosine)
