@@ -1,0 +1,165 @@
+"""What the experiments share: provenance, forces by part, contacts by name."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .. import __version__
+from ..errors import BadInputError, UnsupportedError
+from ..interface import Data, Model
+from ..records import Array, Contacts, JointType
+
+Progress = Callable[[float], None]  # told the fraction that is done
+
+
+def silent(_fraction: float) -> None:
+    """The Progress that shows nothing."""
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What a result was computed with, so that it can be computed again.
+
+    `model_sha256` is the digest of the model's file and of those it includes.
+    """
+
+    backend: str
+    versions: dict[str, str]
+    model_file: str
+    model_sha256: str
+    timestep: float
+    seed: int | None = None
+
+
+def provenance(model: Model, seed: int | None = None, **others: str) -> Provenance:
+    """The record of a run on `model`; `others` are further versions by name."""
+    versions = {
+        "statemachine": __version__,
+        model.backend: model.engine_version,
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+        **others,
+    }
+    # The folder and name, not the machine's path: a result is read elsewhere.
+    name = "/".join(model.path.parts[-2:])
+    digest = hashlib.sha256(b"".join(_with_includes(model.path))).hexdigest()
+    return Provenance(model.backend, versions, name, digest, model.timestep, seed)
+
+
+def _with_includes(path: Path) -> Iterator[bytes]:
+    """A model's file, then those it includes, theirs and so on."""
+    content = path.read_bytes()
+    yield content
+    for name in re.findall(rb"""<include\s[^>]*file\s*=\s*["']([^"']+)["']""", content):
+        included = path.parent / name.decode()
+        if included.is_file() and included != path:
+            yield from _with_includes(included)
+
+
+@dataclass(frozen=True)
+class Forces:
+    """The generalized forces on one joint at one moment [N·m or N].
+
+    `bias` is on the other side of the equation of motion, so that gravity acts as
+    -bias; a part that the engine does not yield is None. `total` is what is left over
+    to accelerate the joint: zero at rest.
+    """
+
+    bias: float | None
+    actuator: float | None
+    passive: float | None
+    friction: float | None
+    contact: float | None
+    limit: float | None
+
+    @property
+    def total(self) -> float | None:
+        """Sum of all parts, -bias among them; None if one is missing."""
+        parts = (self.actuator, self.passive, self.friction, self.contact, self.limit)
+        if self.bias is None or any(part is None for part in parts):
+            return None
+        return sum(part for part in parts if part is not None) - self.bias
+
+
+def forces_on(data: Data, dof: int) -> Forces:
+    """Forces on a degree of freedom, of the moment that `data`'s derived arrays show."""
+
+    def part(name: str) -> float | None:
+        try:
+            return float(getattr(data, f"qfrc_{name}")[dof])
+        except UnsupportedError:
+            return None
+
+    return Forces(
+        bias=part("bias"),
+        actuator=part("actuator"),
+        passive=part("passive"),
+        friction=part("friction"),
+        contact=part("contact"),
+        limit=part("limit"),
+    )
+
+
+def body_pairs(model: Model, contacts: Contacts) -> Counter[str]:
+    """How many contacts each pair of bodies has, as {"gripper – box": 6}."""
+    pairs: Counter[str] = Counter()
+    for one, two in np.atleast_2d(contacts.geom)[: len(contacts)]:
+        bodies = sorted((int(model.geom_bodyid[one]), int(model.geom_bodyid[two])))
+        pairs[" – ".join(model.body_names[body] for body in bodies)] += 1
+    return pairs
+
+
+def geom_label(model: Model, geom: int) -> str:
+    """Name of a geom; of a nameless one, its body's."""
+    body = model.body_names[int(model.geom_bodyid[geom])]
+    return model.geom_names[geom] or f"a shape of {body}"
+
+
+def touching(model: Model, contacts: Contacts) -> tuple[str, ...]:
+    """Which shapes touch, as "fixed_stud_1 on floor", each pair once."""
+    seen = dict.fromkeys(
+        f"{geom_label(model, int(two))} on {geom_label(model, int(one))}"
+        for one, two in contacts.geom
+    )
+    return tuple(seen)
+
+
+def scalar_joint(model: Model, name: str) -> tuple[int, int]:
+    """Addresses in qpos and qvel of a joint that must be a hinge or a slide."""
+    joint = model.joint_id(name)
+    if model.jnt_type[joint] not in (JointType.HINGE, JointType.SLIDE):
+        raise BadInputError(f"joint {name!r} is neither a hinge nor a slide")
+    return int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+
+
+def steps_in(model: Model, seconds: float) -> int:
+    """Number of timesteps in a time, at least one."""
+    if not np.isfinite(seconds) or seconds <= 0:
+        raise BadInputError(f"seconds must be above 0; got {seconds}")
+    return max(1, round(seconds / model.timestep))
+
+
+def milestones(seconds: float) -> list[float]:
+    """Times worth a row of a table: 0, 1, 2, 3, 4, 10, 20, 30, 50, 100 …, and the end."""
+    marks: list[float] = [0.0, 1.0, 2.0, 3.0, 4.0]
+    decade = 10.0
+    while decade <= seconds:
+        marks += [decade, 2 * decade, 3 * decade, 5 * decade]
+        decade *= 10
+    return [mark for mark in marks if mark < seconds * (1 - 1e-9)] + [seconds]
+
+
+def command(model: Model, values: Iterable[float], name: str = "ctrl") -> Array:
+    """A full ctrl (nu,) from values; the error says how many there should be."""
+    array = np.array(list(values), dtype=np.float64)
+    if array.shape != (model.nu,):
+        raise BadInputError(f"{name} wants {model.nu} numbers; got {array.size}")
+    return array

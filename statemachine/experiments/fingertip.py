@@ -1,0 +1,234 @@
+"""The certificate: an engine's fingertip against Pinocchio's, over many poses.
+
+Frame definitions come first. Two files may give one name to two frames, and then
+every pose differs by the same offset; that is no disagreement about kinematics, and
+it is refused instead of being measured.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..checks import as_count
+from ..errors import BadInputError
+from ..interface import Model
+from ..kinematics import Kinematics, Pose
+from ..records import Array, JointType
+from ..rotations import angle_between, matrix_from_quat
+from ..verbs import forward, make_data
+from ._common import Progress, Provenance, provenance, silent
+
+TOLERANCE = 1e-12  # metres, and entries of the rotation matrix
+_SAME_FRAME = 1e-9  # metres and radians; files write frames with fewer digits than poses
+
+
+@dataclass(frozen=True)
+class Offset:
+    """From the engine's frame to the witness's: a distance [m] and an angle [rad]."""
+
+    distance: float
+    angle: float
+
+    @property
+    def same(self) -> bool:
+        """Whether the two are one frame."""
+        return self.distance <= _SAME_FRAME and self.angle <= _SAME_FRAME
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What came out.
+
+    Attributes:
+        site: The frame on the engine; witness_frame: its name for the witness.
+        body: The body that carries it, on the engine.
+        poses: How many were compared.
+        frames: Offset between the two frame definitions.
+        position_worst, position_median: Difference in position [m]; None if refused.
+        rotation_worst, rotation_median: Largest entry of the difference of the
+            rotation matrices; None if refused.
+        zero_pose: Fingertip (3,) at qpos 0 on the engine [m].
+        tolerance: What both worst differences must not exceed.
+    """
+
+    site: str
+    witness_frame: str
+    body: str
+    witness_file: str
+    poses: int
+    frames: Offset
+    position_worst: float | None
+    position_median: float | None
+    rotation_worst: float | None
+    rotation_median: float | None
+    zero_pose: tuple[float, float, float]
+    tolerance: float
+    provenance: Provenance
+
+    @property
+    def agrees(self) -> bool:
+        """Whether frames are the same and every pose is within the tolerance."""
+        return (
+            self.position_worst is not None
+            and self.rotation_worst is not None
+            and self.position_worst <= self.tolerance
+            and self.rotation_worst <= self.tolerance
+        )
+
+
+def run(
+    model: Model,
+    poses: int = 200,
+    seed: int = 0,
+    site: str = "gripperframe",
+    witness: str | os.PathLike[str] | None = None,
+    witness_frame: str | None = None,
+    progress: Progress = silent,
+) -> Certificate:
+    """Compare a site's pose on an engine with Pinocchio's, at random poses within the limits.
+
+    Args:
+        model: On the engine to be certified.
+        poses: How many: the default pose, then random ones.
+        seed: Of the random poses.
+        site: The frame on the engine.
+        witness: The file that Pinocchio reads; by default the engine's own.
+        witness_frame: The frame's name there; by default `site`.
+        progress: Told the fraction that is done.
+
+    Raises:
+        MissingEngineError: Pinocchio is not installed here.
+        ModelError: Pinocchio cannot read the file.
+        UnknownNameError: No such frame.
+        BadInputError: `poses` or `seed` is no whole number in range, or the model
+            has joints that the witness's file has not.
+    """
+    count = as_count(poses, "poses")
+    if seed < 0:
+        raise BadInputError(f"seed must not be negative; got {seed}")
+    tip = model.site_id(site)
+    known = Kinematics(model.path if witness is None else witness)
+    # Joints that only the engine's scene has (a free box) stay where they are.
+    shared = [name for name in model.joint_names if name in known.joint_names]
+    if sorted(shared) != sorted(known.joint_names):
+        lacking = sorted(set(known.joint_names) - set(shared))
+        raise BadInputError(f"{model.path.name} lacks joints of the witness: {', '.join(lacking)}")
+    kinematics = Kinematics(known.path, joint_names=shared)
+    name, kind = _find_frame(kinematics, witness_frame or site)
+    configurations = _random_qpos(model, shared, count, seed)
+    ours = _engine_poses(model, configurations, tip, progress)
+    theirs = kinematics.poses(configurations[:, _slots(model, shared)], name, kind)
+    offset = _declared_offset(model, tip, kinematics, name, kind) or _steady_offset(ours, theirs)
+    moved = rotated = None
+    if offset.same:
+        moved = np.linalg.norm(ours.pos - theirs.pos, axis=1)
+        rotated = np.abs(ours.mat - theirs.mat).max(axis=(1, 2))
+    zero = ours.pos[0]
+    return Certificate(
+        site=site,
+        witness_frame=name,
+        body=model.body_names[int(model.site_bodyid[tip])],
+        witness_file="/".join(kinematics.path.parts[-2:]),
+        poses=len(configurations),
+        frames=offset,
+        position_worst=None if moved is None else float(moved.max()),
+        position_median=None if moved is None else float(np.median(moved)),
+        rotation_worst=None if rotated is None else float(rotated.max()),
+        rotation_median=None if rotated is None else float(np.median(rotated)),
+        zero_pose=(float(zero[0]), float(zero[1]), float(zero[2])),
+        tolerance=TOLERANCE,
+        provenance=provenance(model, seed, pinocchio=kinematics.version),
+    )
+
+
+def _find_frame(kinematics: Kinematics, name: str) -> tuple[str, str]:
+    """A site of an MJCF, or a link of a URDF."""
+    try:
+        kinematics.definition(name, "site")
+    except LookupError:
+        kinematics.definition(name, "body")
+        return name, "body"
+    return name, "site"
+
+
+def _random_qpos(model: Model, joints: list[str], count: int, seed: int) -> Array:
+    """(count, nq): the default pose, then uniform within limits (±π without)."""
+    random = np.random.default_rng(seed)
+    with make_data(model) as data:
+        start = data.qpos.copy()
+    drawn = np.tile(start, (count, 1))
+    count -= 1
+    for name in joints:
+        joint = model.joint_id(name)
+        place, kind = int(model.jnt_qposadr[joint]), JointType(int(model.jnt_type[joint]))
+        if kind in (JointType.HINGE, JointType.SLIDE):
+            low, high = model.jnt_range[joint] if model.jnt_limited[joint] else (-np.pi, np.pi)
+            drawn[1:, place] = random.uniform(low, high, count)
+            continue
+        if kind == JointType.FREE:
+            drawn[1:, place : place + 3] = random.uniform(-1, 1, (count, 3))
+            place += 3
+        quat = random.normal(size=(count, 4))
+        drawn[1:, place : place + 4] = quat / np.linalg.norm(quat, axis=1, keepdims=True)
+    return drawn
+
+
+def _slots(model: Model, joints: list[str]) -> list[int]:
+    """Slots of qpos that belong to the named joints, in their order."""
+    sizes = {JointType.FREE: 7, JointType.BALL: 4}
+    slots: list[int] = []
+    for name in joints:
+        joint = model.joint_id(name)
+        start = int(model.jnt_qposadr[joint])
+        slots += range(start, start + sizes.get(JointType(int(model.jnt_type[joint])), 1))
+    return slots
+
+
+def _engine_poses(model: Model, configurations: Array, tip: int, progress: Progress) -> Pose:
+    pos = np.empty((len(configurations), 3))
+    mat = np.empty((len(configurations), 3, 3))
+    with make_data(model) as data:
+        for k, qpos in enumerate(configurations):
+            data.qpos = qpos
+            forward(model, data)
+            pos[k] = data.site_xpos[tip]
+            mat[k] = data.site_xmat[tip].reshape(3, 3)
+            if k % 100 == 0:
+                progress(k / len(configurations))
+    return Pose(pos, mat)
+
+
+def _declared_offset(
+    model: Model, tip: int, kinematics: Kinematics, name: str, kind: str
+) -> Offset | None:
+    """Offset between the two files' definitions, if both fix the frame to one body."""
+    if kind != "site":
+        return None
+    theirs = kinematics.definition(name, "site")
+    if theirs.body != model.body_names[int(model.site_bodyid[tip])]:
+        return None
+    distance = float(np.linalg.norm(theirs.pos - model.site_pos[tip]))
+    angle = float(angle_between(matrix_from_quat(model.site_quat[tip]), theirs.mat))
+    return Offset(distance, angle)
+
+
+def _steady_offset(ours: Pose, theirs: Pose) -> Offset:
+    """The offset that all poses share; none if it changes with the pose.
+
+    Where the files call their bodies differently, definitions cannot be compared
+    word by word. But a frame that is merely another one stays put in the engine's
+    frame whatever the joints do, and a kinematic difference does not.
+    """
+    inverse = np.swapaxes(ours.mat, 1, 2)
+    shift = np.einsum("nij,nj->ni", inverse, theirs.pos - ours.pos)
+    turn = inverse @ theirs.mat
+    spread = max(float(np.ptp(shift, axis=0).max()), float(np.ptp(turn, axis=0).max()))
+    if spread > _SAME_FRAME:
+        return Offset(0.0, 0.0)
+    return Offset(float(np.linalg.norm(shift[0])), float(angle_between(np.eye(3), turn[0])))
+
+
+__all__ = ["TOLERANCE", "Certificate", "Offset", "run"]

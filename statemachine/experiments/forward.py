@@ -1,0 +1,79 @@
+"""Read the fingertip four times: fresh, after `forward`, after a write, after `forward`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..interface import Model
+from ..records import Array
+from ..verbs import forward, make_data
+from ._common import Provenance, provenance, scalar_joint
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """One reading: what had been done, the fingertip (3,) [m], and the time [s]."""
+
+    after: str
+    fingertip: Array
+    time: float
+
+
+@dataclass(frozen=True, eq=False)
+class Forward:
+    """The four readings.
+
+    Attributes:
+        equal: Pairs (i, j), i < j, of readings that are equal bit by bit.
+        moved: Distance [m] that the write and the second `forward` moved the fingertip.
+    """
+
+    joint: str
+    value: float
+    readings: tuple[Reading, ...]
+    equal: tuple[tuple[int, int], ...]
+    moved: float
+    provenance: Provenance
+
+
+def run(
+    model: Model,
+    joint: str = "shoulder_lift",
+    value: float = 0.8,
+    site: str = "gripperframe",
+) -> Forward:
+    """Write one joint into a fresh Data and watch when the fingertip notices.
+
+    Args:
+        model: Any model with the joint and the site.
+        joint: The joint to write; a hinge or slide.
+        value: What to write [rad or m].
+        site: The fingertip.
+
+    Raises:
+        UnknownNameError: No such joint or site.
+    """
+    (place, _), tip = scalar_joint(model, joint), model.site_id(site)
+    readings: list[Reading] = []
+    with make_data(model) as data:
+
+        def read(after: str) -> None:
+            readings.append(Reading(after, np.array(data.site_xpos[tip]), data.time))
+
+        read("make_data")
+        forward(model, data)
+        read("forward")
+        data.qpos[place] = value
+        read(f"qpos[{place}] = {value:g}")
+        forward(model, data)
+        read("forward again")
+    equal = tuple(
+        (i, j)
+        for i in range(len(readings))
+        for j in range(i + 1, len(readings))
+        if np.array_equal(readings[i].fingertip, readings[j].fingertip)
+    )
+    moved = float(np.linalg.norm(readings[3].fingertip - readings[2].fingertip))
+    return Forward(joint, value, tuple(readings), equal, moved, provenance(model))

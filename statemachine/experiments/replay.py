@@ -1,0 +1,136 @@
+"""Run twice from one keyframe under one command: the same bits, or how far apart?"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..checks import as_count
+from ..errors import BadInputError, unknown_name
+from ..interface import Model
+from ..records import Array, Ints, JointType
+from ..verbs import make_data, reset, step
+from ._common import Progress, Provenance, body_pairs, command, provenance, silent
+
+Break = Literal["extra-step", "late-ctrl"]
+BREAKS: tuple[Break, ...] = ("extra-step", "late-ctrl")
+# Added to the keyframe's own ctrl: pan and lift, so that the arm visibly moves.
+MOVE = (0.4, -0.2)
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """Two runs, step by step.
+
+    Attributes:
+        ctrl: (nu,) the command of both runs.
+        identical: Whether the last qpos are equal, `np.array_equal`.
+        close: Whether `np.allclose` calls them equal.
+        difference: (n+1,) largest |qpos difference| after each step.
+        apart: (n+1,) distance [m] between the free body's positions in the two
+            runs; None without a free body.
+        qpos: (nq,) at the end of the first run.
+        travel: Largest joint movement of the first run [rad].
+        contacts: (n,) contacts that each step of the first run found.
+        pairs: For each pair of bodies, in how many steps it touched.
+        keyframe: Name of the keyframe; its time was set to zero.
+    """
+
+    ctrl: Array
+    broken_by: str | None
+    identical: bool
+    close: bool
+    difference: Array
+    apart: Array | None
+    qpos: Array
+    travel: float
+    contacts: Ints
+    pairs: dict[str, int]
+    keyframe: str
+    provenance: Provenance
+
+
+def run(
+    model: Model,
+    nstep: int = 600,
+    ctrl: Sequence[float] | None = None,
+    break_with: Break | None = None,
+    progress: Progress = silent,
+) -> Replay:
+    """Reset to keyframe 0, zero the time, step under a fixed ctrl; twice.
+
+    Args:
+        model: A model with a keyframe.
+        nstep: Steps of each run.
+        ctrl: The command (nu,); by default the keyframe's own with `MOVE` added.
+        break_with: Make the second run differ: "extra-step" takes one step more
+            before the count begins, "late-ctrl" writes the command one step late.
+        progress: Told the fraction that is done.
+
+    Raises:
+        BadInputError: No keyframe, `nstep` is no whole number, or `ctrl` has the wrong length.
+        UnknownNameError: `break_with` is none of `BREAKS`.
+    """
+    if break_with is not None and break_with not in BREAKS:
+        raise unknown_name("way to break a replay", break_with, BREAKS)
+    if not model.keyframes:
+        raise BadInputError(f"{model.path.name} has no keyframe to start from: try so101/scene_box")
+    nstep = as_count(nstep, "nstep")
+    goal = model.keyframes[0].ctrl.copy()
+    if ctrl is None:
+        goal[: len(MOVE)] += MOVE[: model.nu]
+    else:
+        goal = command(model, ctrl)
+    first, contacts, pairs = _once(model, goal, nstep, None, lambda part: progress(part / 2))
+    second, _, _ = _once(model, goal, nstep, break_with, lambda part: progress((1 + part) / 2))
+    free = [
+        int(place)
+        for kind, place in zip(model.jnt_type, model.jnt_qposadr, strict=True)
+        if kind == JointType.FREE
+    ]
+    gap = first - second
+    hinges = model.jnt_qposadr[model.jnt_type >= int(JointType.SLIDE)]
+    return Replay(
+        ctrl=goal,
+        broken_by=break_with,
+        identical=bool(np.array_equal(first[-1], second[-1])),
+        close=bool(np.allclose(first[-1], second[-1])),
+        difference=np.abs(gap).max(axis=1),
+        apart=np.linalg.norm(gap[:, free[0] : free[0] + 3], axis=1) if free else None,
+        qpos=first[-1],
+        travel=float(np.ptp(first[:, hinges], axis=0).max()),
+        contacts=contacts,
+        pairs=pairs,
+        keyframe=model.keyframes[0].name,
+        provenance=provenance(model),
+    )
+
+
+def _once(
+    model: Model, ctrl: Array, nstep: int, break_with: str | None, progress: Progress
+) -> tuple[Array, Ints, dict[str, int]]:
+    """qpos after each step (n+1, nq), contacts of each step (n,), steps by body pair."""
+    poses, counts, pairs = [], [], Counter[str]()
+    with make_data(model) as data:
+        reset(model, data, keyframe=0)
+        data.time = 0.0
+        if break_with != "late-ctrl":
+            data.ctrl = ctrl
+        if break_with == "extra-step":
+            step(model, data)
+        poses.append(data.qpos.copy())
+        for k in range(nstep):
+            step(model, data)
+            if k == 0:
+                data.ctrl = ctrl  # a second time, or one step late
+            contacts = data.contacts
+            counts.append(len(contacts))
+            pairs.update(body_pairs(model, contacts).keys())
+            poses.append(data.qpos.copy())
+            if k % 100 == 0:
+                progress(k / nstep)
+    return np.array(poses), np.array(counts, dtype=np.int64), dict(pairs)

@@ -1,0 +1,76 @@
+"""How many simulated seconds does this machine buy for a second of its own?"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from ..checks import as_count
+from ..interface import Data, Model
+from ..verbs import make_data, reset, step
+from ._common import Progress, Provenance, provenance, silent
+
+_CHUNKS = 20
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Wall-clock times of the same simulated time.
+
+    Attributes:
+        nstep: Steps of each run; simulated: their simulated time [s].
+        bulk: Wall time of `step(model, data, n)` in a few large chunks [s].
+        one_by_one: Wall time of as many single calls from a Python loop [s].
+    """
+
+    nstep: int
+    simulated: float
+    bulk: float
+    one_by_one: float
+    provenance: Provenance
+
+    @property
+    def bulk_factor(self) -> float:
+        """Simulated over wall time, in bulk."""
+        return self.simulated / self.bulk
+
+    @property
+    def one_by_one_factor(self) -> float:
+        """Simulated over wall time, step by step."""
+        return self.simulated / self.one_by_one
+
+
+def run(model: Model, nstep: int = 20_000, progress: Progress = silent) -> Speed:
+    """Time `nstep` steps, in bulk and one by one, each from the same start.
+
+    Args:
+        model: Started from keyframe 0 if it has one.
+        nstep: Number of steps.
+        progress: Told the fraction that is done.
+
+    Raises:
+        BadInputError: `nstep` is no whole number.
+    """
+    total = as_count(nstep, "nstep")
+    chunks = [total // _CHUNKS + (k < total % _CHUNKS) for k in range(_CHUNKS)]
+    chunks = [chunk for chunk in chunks if chunk]
+    walls = []
+    for turn, bulk in enumerate((True, False)):
+        with make_data(model) as data:
+            reset(model, data, keyframe=0 if model.keyframes else None)
+            wall = 0.0
+            for k, chunk in enumerate(chunks):
+                wall += _timed(model, data, chunk, bulk)
+                progress((turn + (k + 1) / len(chunks)) / 2)
+            walls.append(wall)
+    return Speed(total, total * model.timestep, walls[0], walls[1], provenance(model))
+
+
+def _timed(model: Model, data: Data, nstep: int, bulk: bool) -> float:
+    start = time.perf_counter()
+    if bulk:
+        step(model, data, nstep)
+    else:
+        for _ in range(nstep):
+            step(model, data)
+    return time.perf_counter() - start

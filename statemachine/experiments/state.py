@@ -1,0 +1,85 @@
+"""What a state is made of: which joint owns which slots of qpos and of qvel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..interface import Model
+from ..records import JointType
+from ..verbs import make_data, reset
+from ._common import Provenance, provenance
+
+_SIZES = {
+    JointType.FREE: (7, 6),
+    JointType.BALL: (4, 3),
+    JointType.SLIDE: (1, 1),
+    JointType.HINGE: (1, 1),
+}
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint's slots: qpos[qpos_start:qpos_stop] and qvel[qvel_start:qvel_stop]."""
+
+    name: str
+    type: str
+    qpos_start: int
+    qpos_stop: int
+    qvel_start: int
+    qvel_stop: int
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Sizes and addresses of a model's state.
+
+    Attributes:
+        keyframe_time: `data.time` after a reset to keyframe 0; None without one.
+        keyframe: Its name.
+        fresh_time: `data.time` of a fresh Data.
+    """
+
+    nq: int
+    nv: int
+    nu: int
+    nbody: int
+    joints: tuple[Joint, ...]
+    fresh_time: float
+    keyframe: str | None
+    keyframe_time: float | None
+    provenance: Provenance
+
+
+def run(model: Model) -> Layout:
+    """Read the layout off a Model, and the time off a Data at keyframe 0."""
+    joints = []
+    for name, kind, place, dof in zip(
+        model.joint_names, model.jnt_type, model.jnt_qposadr, model.jnt_dofadr, strict=True
+    ):
+        nq, nv = _SIZES[JointType(int(kind))]
+        joints.append(
+            Joint(
+                name=name,
+                type=JointType(int(kind)).name.lower(),
+                qpos_start=int(place),
+                qpos_stop=int(place) + nq,
+                qvel_start=int(dof),
+                qvel_stop=int(dof) + nv,
+            )
+        )
+    with make_data(model) as data:
+        fresh, name, time = data.time, None, None
+        if model.keyframes:
+            reset(model, data, keyframe=0)
+            name, time = model.keyframes[0].name, data.time
+    return Layout(
+        nq=model.nq,
+        nv=model.nv,
+        nu=model.nu,
+        nbody=model.nbody,
+        joints=tuple(joints),
+        fresh_time=fresh,
+        keyframe=name,
+        keyframe_time=time,
+        provenance=provenance(model),
+    )

@@ -1,0 +1,56 @@
+"""Words and figures that the lessons share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from .page import Page
+
+
+def origin(results: Mapping[str, Any]) -> str:
+    """What a page was computed with: model and engine versions."""
+    first = next(iter(results.values())).provenance
+    engines = ", ".join(
+        f"{name} {result.provenance.versions[name]}" for name, result in results.items()
+    )
+    return f"{first.model_file} on {engines}, {first.timestep * 1e3:g} ms a step"
+
+
+def page_of(title: str, results: Mapping[str, Any], blocks: Sequence[Any]) -> Page:
+    """A page with its origin."""
+    return Page(title, origin(results), list(blocks))
+
+
+def degrees(radians: float, digits: int = 2) -> str:
+    """An angle in degrees, without a negative zero."""
+    return f"{math.degrees(radians) + 0.0:.{digits}f}°".replace("-0.00°", "0.00°")
+
+
+def signed(value: float | None, digits: int = 4) -> str:
+    """A number with its sign; what rounds to zero has none; a dash if there is none."""
+    if value is None:
+        return "–"
+    text = f"{value:+.{digits}f}"
+    return text[1:] if float(text) == 0 else text
+
+
+def millimetres(metres: float, digits: int = 2) -> str:
+    """A length in millimetres."""
+    return f"{metres * 1e3:.{digits}f} mm"
+
+
+def vector(values: Sequence[float], digits: int = 4) -> str:
+    """Components in brackets; what rounds to zero has no sign."""
+    return "[" + " ".join(f"{round(float(v), digits) + 0.0:.{digits}f}" for v in values) + "]"
+
+
+def count(number: int, thing: str) -> str:
+    """"1 step", "2 steps"."""
+    return f"{number:,} {thing}" + ("" if number == 1 else "s")
+
+
+def where(results: Mapping[str, Any], backend: str) -> str:
+    """"mujoco: " where several engines are shown, else nothing."""
+    return f"{backend}: " if len(results) > 1 else ""

@@ -1,0 +1,127 @@
+"""Reset, and reset again to exactly the same place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..experiments import replay
+from ._words import count, degrees, millimetres, page_of, vector, where
+from .page import Code, Page, Table, Text, Verdict
+
+_STEPS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 300, 600, 1000, 2000, 5000, 10_000, 20_000)
+_BROKEN = {
+    "extra-step": "The second run takes one step more before the count begins.",
+    "late-ctrl": "The second run writes its command one step later.",
+}
+
+
+def run(model: Any, options: Mapping[str, Any], progress: Any) -> replay.Replay:
+    """Two runs."""
+    return replay.run(
+        model,
+        nstep=options["steps"],
+        ctrl=options["ctrl"],
+        break_with=options["break"],
+        progress=progress,
+    )
+
+
+def page(results: Mapping[str, replay.Replay]) -> Page:
+    """Equal or not, and what touched on the way."""
+    first = next(iter(results.values()))
+    nstep = len(first.contacts)
+    blocks: list[Any] = [
+        Text(
+            f"Two runs of {count(nstep, 'step')}, each in a new Data: reset to keyframe 0 "
+            f"({first.keyframe!r}), time set to zero, one fixed command. Equal means "
+            "np.array_equal on all of qpos: every bit, not nearly."
+        ),
+        Code((f"data.ctrl[:] = {[round(float(x), 6) for x in first.ctrl]}",)),
+    ]
+    if first.broken_by:
+        blocks.append(Text(_BROKEN[first.broken_by]))
+    blocks.append(_outcome(results))
+    blocks.append(_contacts(results))
+    if first.broken_by:
+        blocks.append(_growth(results, nstep))
+    for name, result in results.items():
+        blocks.append(Verdict(f"{where(results, name)}{_said(result)}", _expected(result)))
+    return page_of("The same start, the same commands", results, blocks)
+
+
+def _outcome(results: Mapping[str, replay.Replay]) -> Table:
+    return Table(
+        ("", *results),
+        [
+            ("np.array_equal", *(str(r.identical) for r in results.values())),
+            ("np.allclose", *(str(r.close) for r in results.values())),
+            ("difference at the end", *(f"{r.difference[-1]:.1e}" for r in results.values())),
+            ("largest on the way", *(f"{r.difference.max():.1e}" for r in results.values())),
+            ("the arm moves by", *(degrees(r.travel, 1) for r in results.values())),
+            ("qpos[:6] at the end", *(vector(r.qpos[:6], 3) for r in results.values())),
+        ],
+        title="Two runs compared",
+    )
+
+
+def _contacts(results: Mapping[str, replay.Replay]) -> Table:
+    rows = [
+        (
+            "contacts a step",
+            *(
+                f"{r.contacts.min()} to {r.contacts.max()}, {r.contacts.mean():.1f} on average"
+                for r in results.values()
+            ),
+        )
+    ]
+    pairs = dict.fromkeys(pair for r in results.values() for pair in r.pairs)
+    for pair in pairs:
+        rows.append(
+            (
+                pair,
+                *(f"{r.pairs.get(pair, 0)} of {len(r.contacts)} steps" for r in results.values()),
+            )
+        )
+    return Table(("", *results), rows, title="What touched, in the first run")
+
+
+def _growth(results: Mapping[str, replay.Replay], nstep: int) -> Table:
+    free = all(result.apart is not None for result in results.values())
+    headers = ["after step"]
+    for name in results:
+        prefix = where(results, name)
+        headers += [f"{prefix}|Δqpos|", f"{prefix}free body"] if free else [f"{prefix}|Δqpos|"]
+    rows = []
+    for k in [k for k in _STEPS if k < nstep] + [nstep]:
+        cells = [str(k)]
+        for result in results.values():
+            cells.append(f"{result.difference[k]:.1e}")
+            if result.apart is not None:
+                cells.append(millimetres(result.apart[k], 4))
+        rows.append(tuple(cells))
+    return Table(headers, rows, title="How far the two runs are apart")
+
+
+def _expected(result: replay.Replay) -> bool:
+    return result.identical is (result.broken_by is None)
+
+
+def _said(result: replay.Replay) -> str:
+    if result.identical:
+        return (
+            f"bit for bit the same after {count(len(result.contacts), 'step')}: largest "
+            f"difference {result.difference.max():.1e}"
+        )
+    peak = int(np.argmax(result.difference))
+    text = (
+        f"not the same: the difference peaks at {result.difference[peak]:.1e} after step {peak} "
+        f"and is {result.difference[-1]:.1e} at the end"
+    )
+    if result.difference[-1] < result.difference[peak] / 10:
+        text += ". It shrinks here, because the servos pull both runs to one pose"
+    if result.close:
+        text += "; np.allclose would call the two runs equal, np.array_equal does not"
+    return text

@@ -1,0 +1,152 @@
+"""What works on this machine, what does not, and what to do about it."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+import os
+import platform
+import subprocess
+import sys
+from dataclasses import dataclass
+
+from ..engines import ENGINES, engine_version, require
+from ..errors import MissingEngineError
+from ..lessons.page import Page, Table, Text, Verdict
+
+_RENDER = """
+import mujoco
+model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
+data = mujoco.MjData(model)
+mujoco.mj_forward(model, data)
+with mujoco.Renderer(model, 32, 32) as renderer:
+    renderer.update_scene(data)
+    assert renderer.render().any()
+"""
+_PATIENCE = 60  # seconds for a probe; a software renderer starts slowly
+_ROLES = {"mujoco": "the primary engine", "pybullet": "the second engine", "pinocchio": "witness"}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing looked at: its state, and the next step if it is not well."""
+
+    name: str
+    works: bool
+    found: str
+    next_step: str = ""
+    optional: bool = False
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """All findings."""
+
+    findings: tuple[Finding, ...]
+
+    @property
+    def healthy(self) -> bool:
+        """Whether everything that is not optional works."""
+        return all(finding.works or finding.optional for finding in self.findings)
+
+
+def examine() -> Diagnosis:
+    """Look at Python, the engines, rendering and the import name."""
+    findings = [_python(), *map(_engine, ENGINES), _rendering(), _clash()]
+    return Diagnosis(tuple(findings))
+
+
+def page(diagnosis: Diagnosis) -> Page:
+    """The diagnosis as a page."""
+    rows = [
+        (finding.name, ("works" if finding.works else "missing"), finding.found)
+        for finding in diagnosis.findings
+    ]
+    blocks = [Table(("", "", "found"), rows, title="What this machine has", words=frozenset({0, 1, 2}))]
+    steps = [f"{f.name}: {f.next_step}" for f in diagnosis.findings if f.next_step]
+    return Page(
+        "statemachine doctor",
+        f"Python {platform.python_version()}, {platform.system()} {platform.machine()}",
+        [
+            *blocks,
+            *(Text(step) for step in steps),
+            Verdict(
+                "everything that the lessons need is here"
+                if diagnosis.healthy
+                else "the lessons cannot run yet: see above",
+                diagnosis.healthy,
+            ),
+        ],
+    )
+
+
+def _python() -> Finding:
+    return Finding("python", True, f"{platform.python_version()}, {sys.executable}")
+
+
+def _engine(name: str) -> Finding:
+    optional = name != "mujoco"
+    engine = ENGINES[name]
+    code = f"from statemachine.engines import require; require({name!r})"
+    # In a subprocess: a broken engine may take its process down, or print at will.
+    try:
+        done = _run(code)
+    except subprocess.TimeoutExpired:
+        return Finding(name, False, f"import takes over {_PATIENCE} s", "try again", optional)
+    if done.returncode == 0:
+        found = f"{engine_version(name)}, {_ROLES[name]}"
+        return Finding(name, True, found, optional=optional)
+    reason = (done.stderr.strip().splitlines() or [f"import ended with code {done.returncode}"])[-1]
+    reason = reason.removeprefix("statemachine.errors.MissingEngineError: ")
+    step = "" if "pip install" in reason or "apt-get" in reason else f"wheels: {engine.wheels}"
+    return Finding(name, False, reason, step, optional)
+
+
+def _rendering() -> Finding:
+    try:
+        require("mujoco")
+    except MissingEngineError:
+        return Finding("rendering", False, "needs mujoco", optional=True)
+    asked = os.environ.get("MUJOCO_GL")
+    for backend in (asked,) if asked else (None, "egl", "osmesa"):
+        # An offscreen library that is missing kills the process that asks for it.
+        environment = dict(os.environ)
+        if backend:
+            environment["MUJOCO_GL"] = backend
+        try:
+            done = _run(_RENDER, environment)
+        except subprocess.TimeoutExpired:
+            continue
+        if done.returncode == 0:
+            found = f"offscreen, MUJOCO_GL={backend}" if backend else "offscreen"
+            return Finding("rendering", True, found, optional=True)
+    step = "on Debian and Ubuntu: apt-get install libegl1 libopengl0 libgl1-mesa-dri"
+    if platform.system() != "Linux":
+        step = "needs a graphics driver with OpenGL"
+    return Finding("rendering", False, "no offscreen OpenGL", step, optional=True)
+
+
+def _clash() -> Finding:
+    try:
+        version = importlib.metadata.version("python-statemachine")
+    except importlib.metadata.PackageNotFoundError:
+        return Finding("import name", True, "statemachine is ours alone")
+    return Finding(
+        "import name",
+        False,
+        f"python-statemachine {version} uses the same import name",
+        "pip uninstall python-statemachine, then pip install --force-reinstall statemachine-sim",
+    )
+
+
+def _run(
+    code: str, environment: dict[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        timeout=_PATIENCE,
+        env=environment,
+        check=False,
+    )
