@@ -23,7 +23,11 @@ lesson: $(VENV)/run.stamp
 	@$(BIN)/statemachine lesson gravity
 	@# 3: the witness cannot be had here; it has said so in one line.
 	@$(BIN)/statemachine fingertip || [ $$? -eq 3 ]
-	@$(BIN)/statemachine next
+	@echo "Where to go next:"
+	@echo "  source $(BIN)/activate     then statemachine is a command of your shell"
+	@echo "  statemachine               all lessons, in the order of the course"
+	@echo "  statemachine lesson state  the first of them"
+	@echo "  statemachine doctor        what this machine has, and what to do"
 
 test: check
 	@$(BIN)/python -m pytest -n auto

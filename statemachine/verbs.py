@@ -39,9 +39,10 @@ def step(model: Model, data: Data, nstep: int = 1) -> None:
 
     Raises:
         ForeignDataError: `data` was made by another Model.
-        BadInputError: `nstep` is no whole number, or an input is not finite. In
+        BadInputError: `nstep` is no whole number, or an input is not a number. In
             the second case the Data may have moved: it then refuses all but
-            `reset` and `set_state`.
+            `reset` and `set_state`. (A ctrl that is infinite lies beyond its range
+            like any other and may be clamped to it.)
         DivergedError: A coordinate stopped being finite, now or earlier.
         ClosedDataError: `data` is closed.
     """
@@ -51,9 +52,10 @@ def step(model: Model, data: Data, nstep: int = 1) -> None:
     except AttributeError:
         _admit(model, data)
     # The default skips the check by identity, which True and 1.0 do not pass.
-    if nstep is not _ONE and (type(nstep) is not int or nstep < 1):
+    if nstep is not _ONE and (type(nstep) is not int or not 1 <= nstep < 2**31):
         nstep = as_count(nstep, "nstep")
-    data._advance(nstep)
+    advance = data._advance  # as an attribute, which CPython reads faster than a method
+    advance(nstep)
     if data._alarms:
         data._attend()
 

@@ -408,7 +408,13 @@ def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[[int], None]
     """The engine's step bound to its arguments; Python runs only where it must."""
     bare = functools.partial(mujoco.mj_step, model.raw, raw)
     substeps = model.substeps
-    advance = bare if substeps == 1 else lambda nstep: bare(nstep * substeps)
+
+    def finer(nstep: int) -> None:
+        if nstep * substeps >= 2**31:  # the engine counts in a C int
+            raise BadInputError(f"nstep {nstep} × {substeps} substeps is too large for one call")
+        bare(nstep * substeps)
+
+    advance = bare if substeps == 1 else finer
     quats = [(raw.qpos[start : start + 4], joint, start) for joint, start in model.quaternions()]
     if not quats:
         return advance

@@ -1,0 +1,1 @@
+"""Benchmarks: ratios in one process, interleaved, with a null; never timed tests."""

@@ -1,0 +1,152 @@
+"""The bench on which a backend is checked: its models, and short ways to write a check."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..backends import load
+from ..errors import UnsupportedError
+from ..interface import Data, Model
+from ..records import Array
+from ..verbs import forward, get_state, make_data, reset, step
+
+# Everything derived that a Data offers as an array.
+DERIVED = (
+    "xpos",
+    "xquat",
+    "site_xpos",
+    "site_xmat",
+    "qacc",
+    "qfrc_bias",
+    "qfrc_actuator",
+    "qfrc_passive",
+    "qfrc_constraint",
+    "qfrc_contact",
+    "qfrc_friction",
+    "qfrc_limit",
+)
+TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
+
+
+class Lab:
+    """Models of one backend, compiled when first used, and Data closed at the end."""
+
+    def __init__(self, backend: str) -> None:
+        self.backend = backend
+        self._open = ExitStack()
+
+    def __enter__(self) -> Lab:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self._open.close()
+
+    @cached_property
+    def arm(self) -> Model:
+        """The arm alone, floating over nothing."""
+        return load("so101", backend=self.backend)
+
+    @cached_property
+    def scene(self) -> Model:
+        """The arm on a floor."""
+        return load("so101/scene", backend=self.backend)
+
+    @cached_property
+    def box(self) -> Model:
+        """The arm, a floor and a free box; keyframe 0 holds it, keyframe 1 has it lie."""
+        return load("so101/scene_box", backend=self.backend)
+
+    def data(self, model: Model, keyframe: int | None = None) -> Data:
+        """A new Data, closed when the lab is."""
+        data = self._open.enter_context(make_data(model))
+        if keyframe is not None:
+            reset(model, data, keyframe=keyframe)
+        return data
+
+    def held(self) -> Data:
+        """A Data in which the jaws hold the box and squeeze it: mid-contact."""
+        data = self.data(self.box, keyframe=0)
+        data.ctrl[0] += 0.2
+        step(self.box, data, 25)
+        forward(self.box, data)
+        require(len(data.contacts) > 0, "the held box touches nothing")
+        return data
+
+
+def require(condition: bool, message: str) -> None:
+    """Raise AssertionError with a message; unlike `assert`, also under `python -O`."""
+    if not condition:
+        raise AssertionError(message)
+
+
+def require_equal(got: Any, expected: Any, what: str) -> None:
+    """Bit-for-bit equality of arrays, shapes included."""
+    got, expected = np.asarray(got), np.asarray(expected)
+    require(got.shape == expected.shape, f"{what}: shape {got.shape}, expected {expected.shape}")
+    if got.dtype.kind == "f":
+        require(not np.isnan(got).any(), f"{what}: NaN")
+    if not np.array_equal(got, expected):
+        gap = np.abs(got.astype(np.float64) - expected.astype(np.float64)).max()
+        raise AssertionError(f"{what}: differs by {gap:.3e}, expected the same bits")
+
+
+def require_close(got: Any, expected: Any, within: float, what: str) -> None:
+    """Every entry within an absolute bound, shapes equal."""
+    got, expected = np.asarray(got, dtype=np.float64), np.asarray(expected, dtype=np.float64)
+    require(got.shape == expected.shape, f"{what}: shape {got.shape}, expected {expected.shape}")
+    gap = np.abs(got - expected).max(initial=0.0)
+    require(bool(gap <= within), f"{what}: off by {gap:.3e}, allowed {within:.1e}")
+
+
+def require_raises(kinds: type[Exception] | tuple[type[Exception], ...], call: Callable[[], Any]) -> Exception:
+    """The call raises one of these errors, whose message is not empty."""
+    try:
+        call()
+    except kinds as error:
+        require(bool(str(error)), f"{type(error).__name__} without a message")
+        return error
+    raise AssertionError(f"no error; expected {kinds}")
+
+
+def snapshot(data: Data) -> dict[str, Array]:
+    """Copies of everything derived that this backend yields, contacts included."""
+    found: dict[str, Array] = {}
+    for name in DERIVED:
+        try:
+            found[name] = np.array(getattr(data, name))
+        except UnsupportedError:
+            continue
+    contacts = data.contacts
+    found["contacts.dist"] = np.array(contacts.dist)
+    found["contacts.pos"] = np.array(contacts.pos)
+    return found
+
+
+def same(one: dict[str, Array], two: dict[str, Array], what: str) -> None:
+    """Two snapshots hold the same bits."""
+    require(one.keys() == two.keys(), f"{what}: {sorted(one)} against {sorted(two)}")
+    for name, array in one.items():
+        require_equal(two[name], array, f"{what}: {name}")
+
+
+def inputs_of(model: Model, data: Data) -> Array:
+    """time, qpos, qvel and ctrl in one array."""
+    state = get_state(model, data)
+    return np.concatenate([[state.time], state["qpos"], state["qvel"], state["ctrl"]])
+
+
+def run_ctrl(model: Model, data: Data, steps: int, seed: int) -> Array:
+    """Step under a ctrl drawn anew each step, within its range; qpos after each."""
+    random = np.random.default_rng(seed)
+    low, high = model.actuator_ctrlrange.T
+    poses = []
+    for _ in range(steps):
+        data.ctrl[:] = random.uniform(low, high)
+        step(model, data)
+        poses.append(data.qpos.copy())
+    return np.array(poses)

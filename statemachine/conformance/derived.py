@@ -1,0 +1,194 @@
+"""Derived values: zero when fresh, stale after a write, one state behind after a step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..kinematics import Kinematics
+from ..records import JointType
+from ..rotations import matrix_from_quat
+from ..verbs import forward, get_state, make_data, reset, set_state, step
+from ._lab import (
+    TARGET,
+    Lab,
+    inputs_of,
+    require,
+    require_close,
+    require_equal,
+    run_ctrl,
+    same,
+    snapshot,
+)
+
+
+def check_fresh_and_reset_are_zero(lab: Lab) -> None:
+    """On a fresh Data, and after a reset of either kind, everything derived is zero."""
+    model = lab.box
+    data = lab.data(model)
+    for situation in ("fresh", "reset", "keyframe"):
+        if situation != "fresh":
+            data.ctrl[0] = 0.3
+            step(model, data, 20)
+            forward(model, data)
+            reset(model, data, keyframe=0 if situation == "keyframe" else None)
+        for name, array in snapshot(data).items():
+            require(not array.any(), f"{name} is not zero on a {situation} Data")
+        require(len(data.contacts) == 0, f"a {situation} Data has contacts")
+
+
+def check_shapes(lab: Lab) -> None:
+    """Derived arrays have the documented shapes, before and after a forward."""
+    model, data = lab.box, lab.data(lab.box, keyframe=0)
+    for _ in range(2):
+        n = len(data.contacts)
+        shapes = {
+            "xpos": (model.nbody, 3),
+            "xquat": (model.nbody, 4),
+            "site_xpos": (model.nsite, 3),
+            "site_xmat": (model.nsite, 9),
+            "contacts.dist": (n,),
+            "contacts.pos": (n, 3),
+        }
+        for name, array in snapshot(data).items():
+            expected = shapes.get(name, (model.nv,))
+            require(array.shape == expected, f"{name}: shape {array.shape}, expected {expected}")
+        forward(model, data)
+    contacts = data.contacts
+    require(len(contacts) > 0, "keyframe 0 has no contacts")
+    n = len(contacts)
+    require(contacts.geom.shape == (n, 2), f"contacts.geom: shape {contacts.geom.shape}")
+    require(contacts.frame.shape == (n, 3, 3), f"contacts.frame: shape {contacts.frame.shape}")
+    require(contacts.force.shape == (n, 3), f"contacts.force: shape {contacts.force.shape}")
+
+
+def check_a_write_marks_nothing_dirty(lab: Lab) -> None:
+    """After a write to any input, everything derived still says what it said."""
+    model = lab.box
+    data = lab.held()
+    before = snapshot(data)
+    data.qpos[0] += 0.3
+    data.qpos[6:9] += 0.1
+    data.qvel[:] = 0.5
+    data.ctrl[:] = 0.0
+    same(before, snapshot(data), "after a write")
+    forward(model, data)
+    after = snapshot(data)
+    for name in ("xpos", "site_xpos", "xquat", "qfrc_actuator"):
+        if name in before:
+            require(not np.array_equal(before[name], after[name]), f"forward left {name} alone")
+
+
+def check_a_step_leaves_values_of_the_state_before(lab: Lab) -> None:
+    """After a step, poses and contacts are those of the state that it started from."""
+    model, data = lab.box, lab.held()
+    data.ctrl[0] += 0.5
+    for nstep in (1, 1, 7):
+        if nstep > 1:
+            step(model, data, nstep - 1)
+        before = get_state(model, data)
+        step(model, data)
+        left = snapshot(data)
+        with make_data(model) as other:
+            set_state(model, other, before)
+            forward(model, other)
+            expected = snapshot(other)
+        for name in ("xpos", "xquat", "site_xpos", "site_xmat", "contacts.dist", "contacts.pos"):
+            require_close(left[name], expected[name], 1e-12, f"{name} after a step")
+    forward(model, data)
+    gap = np.abs(data.site_xpos - left["site_xpos"]).max()
+    require(bool(gap > 1e-6), "the arm did not move, so the check says nothing")
+
+
+def check_forward_changes_no_input(lab: Lab) -> None:
+    """Forward takes no time, touches no input, and twice is the same as once."""
+    model, data = lab.box, lab.held()
+    before = inputs_of(model, data)
+    forward(model, data)
+    once = snapshot(data)
+    forward(model, data)
+    same(once, snapshot(data), "a second forward")
+    require_equal(inputs_of(model, data), before, "inputs after forward")
+
+
+def check_forward_perturbs_nothing(lab: Lab) -> None:
+    """A run with forwards in between is, bit for bit, the run without, mid-contact too."""
+    model = lab.box
+    ends = []
+    for peek in (False, True):
+        data = lab.data(model, keyframe=0)
+        data.ctrl[0] += 0.3
+        for _ in range(150):
+            step(model, data)
+            if peek:
+                forward(model, data)
+                _ = data.contacts, data.site_xpos, data.qacc
+        ends.append(inputs_of(model, data))
+    require_equal(ends[1], ends[0], "state after a run with forwards in between")
+
+
+def check_two_data_are_independent(lab: Lab) -> None:
+    """Data of one Model share nothing that a step or a write can reach."""
+    model = lab.box
+    busy, idle = lab.data(model, keyframe=0), lab.data(model, keyframe=0)
+    forward(model, idle)
+    before, derived = inputs_of(model, idle), snapshot(idle)
+    run_ctrl(model, busy, 40, seed=1)
+    require_equal(inputs_of(model, idle), before, "inputs of the other Data")
+    same(derived, snapshot(idle), "the other Data")
+
+
+def check_xquat_is_wxyz(lab: Lab) -> None:
+    """A free body's xquat is the quaternion of its qpos; its xpos the position."""
+    model, data = lab.box, lab.data(lab.box)
+    quat = np.array([0.5, -0.1, 0.7, 0.5])
+    quat /= np.linalg.norm(quat)
+    start, body = int(model.jnt_qposadr[model.joint_id("box")]), model.body_id("box")
+    data.qpos[start : start + 3] = (0.3, -0.2, 0.5)
+    data.qpos[start + 3 : start + 7] = quat
+    forward(model, data)
+    require_close(data.xpos[body], (0.3, -0.2, 0.5), 1e-12, "xpos of the box")
+    require_close(data.xquat[body], quat, 1e-12, "xquat of the box, wxyz")
+
+
+def check_site_and_body_agree(lab: Lab) -> None:
+    """A site is where its definition puts it in the frame of its body."""
+    model, data = lab.arm, lab.data(lab.arm)
+    data.qpos[:] = TARGET
+    forward(model, data)
+    for site in range(model.nsite):
+        body = int(model.site_bodyid[site])
+        turn = matrix_from_quat(data.xquat[body])
+        where = data.xpos[body] + turn @ model.site_pos[site]
+        require_close(data.site_xpos[site], where, 1e-12, "site_xpos")
+        mat = turn @ matrix_from_quat(model.site_quat[site])
+        require_close(data.site_xmat[site], mat.ravel(), 1e-12, "site_xmat")
+
+
+def check_the_witness_agrees(lab: Lab) -> None:
+    """Every body's pose is the one that Pinocchio computes from the file of the arm."""
+    model, data = lab.arm, lab.data(lab.arm)
+    witness = Kinematics("so101", joint_names=model.joint_names)
+    random = np.random.default_rng(7)
+    low, high = model.jnt_range.T
+    for qpos in random.uniform(low, high, (25, model.nq)):
+        data.qpos = qpos
+        forward(model, data)
+        for name in model.body_names[1:]:
+            body, pose = model.body_id(name), witness.pose(qpos, name, kind="body")
+            require_close(data.xpos[body], pose.pos, 1e-12, f"xpos of {name}")
+            mat = matrix_from_quat(data.xquat[body])
+            require_close(mat, pose.mat, 1e-12, f"xquat of {name}")
+
+
+def check_addresses_cover_qpos_and_qvel(lab: Lab) -> None:
+    """Joints own every slot of qpos and qvel once, in order."""
+    model = lab.box
+    sizes = {JointType.FREE: (7, 6), JointType.BALL: (4, 3)}
+    place = dof = 0
+    for joint, name in enumerate(model.joint_names):
+        require(model.joint_id(name) == joint, f"joint_id({name!r})")
+        require(int(model.jnt_qposadr[joint]) == place, f"jnt_qposadr of {name}")
+        require(int(model.jnt_dofadr[joint]) == dof, f"jnt_dofadr of {name}")
+        nq, nv = sizes.get(JointType(int(model.jnt_type[joint])), (1, 1))
+        place, dof = place + nq, dof + nv
+    require((place, dof) == (model.nq, model.nv), "joints do not fill qpos and qvel")

@@ -1,0 +1,279 @@
+"""Inputs: the same arrays for life, copied into, and never taken on trust."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import numpy as np
+
+from ..errors import (
+    BadInputError,
+    ClosedDataError,
+    DivergedError,
+    ForeignDataError,
+    ReadOnlyError,
+    StateMachineError,
+    UnknownNameError,
+    UnsupportedError,
+)
+from ..records import INPUTS
+from ..verbs import forward, get_state, make_data, reset, set_state, step
+from ._lab import DERIVED, Lab, inputs_of, require, require_equal, require_raises
+
+
+def check_inputs_are_the_same_arrays_for_life(lab: Lab) -> None:
+    """No verb replaces an input array; all are float64, writable, of the right length."""
+    model, data = lab.box, lab.data(lab.box)
+    arrays = {name: getattr(data, name) for name in INPUTS}
+    for name, size in zip(INPUTS, (model.nq, model.nv, model.nu), strict=True):
+        require(arrays[name].shape == (size,), f"{name} has shape {arrays[name].shape}")
+        require(arrays[name].dtype == np.float64, f"{name} is {arrays[name].dtype}")
+    state = get_state(model, data)
+    forward(model, data)
+    step(model, data, 3)
+    reset(model, data, keyframe=0)
+    set_state(model, data, state)
+    data.qpos = data.qpos.copy()
+    for name, array in arrays.items():
+        require(getattr(data, name) is array, f"{name} is another array than at first")
+        array[0] = 0.25
+        require(getattr(data, name)[0] == 0.25, f"a write into {name} did not arrive")
+
+
+def check_a_write_reaches_the_engine(lab: Lab) -> None:
+    """What is written in place is where the next step starts from."""
+    model, data = lab.arm, lab.data(lab.arm)
+    data.qpos[1] = 0.5
+    data.ctrl[1] = 0.5
+    step(model, data)
+    require(abs(data.qpos[1] - 0.5) < 0.05, f"qpos[1] went to {data.qpos[1]} from 0.5")
+
+
+def check_assignment_copies_in(lab: Lab) -> None:
+    """`data.ctrl = x` copies the numbers; x stays the caller's."""
+    data = lab.data(lab.arm)
+    mine = np.arange(6.0) / 10
+    data.ctrl = mine
+    mine[:] = 9.0
+    require_equal(data.ctrl, np.arange(6.0) / 10, "ctrl after assignment")
+
+
+def check_bad_assignment_changes_nothing(lab: Lab) -> None:
+    """Wrong shape, length, kind, NaN, infinity or a zero quaternion: refused, unchanged."""
+    model, data = lab.box, lab.data(lab.box, keyframe=0)
+    before = inputs_of(model, data)
+    bad: list[tuple[str, Any]] = [
+        ("ctrl", [0.0] * 5),
+        ("ctrl", [[0.0] * 6]),
+        ("ctrl", 0.0),
+        ("ctrl", ["a"] * 6),
+        ("ctrl", [None] * 6),
+        ("ctrl", [1j] * 6),
+        ("ctrl", [[1.0], [1.0, 2.0]]),
+        ("ctrl", [np.nan] + [0.0] * 5),
+        ("qpos", [np.inf] * model.nq),
+        ("qpos", np.zeros(model.nq)),
+        ("qvel", [1e300] * model.nv),
+        ("time", np.nan),
+        ("time", "soon"),
+    ]
+    for name, value in bad:
+        require_raises(BadInputError, lambda n=name, v=value: setattr(data, n, v))
+    require_equal(inputs_of(model, data), before, "inputs after refused assignments")
+
+
+def check_derived_is_read_only(lab: Lab) -> None:
+    """Derived arrays can neither be written into nor assigned to."""
+    model, data = lab.arm, lab.data(lab.arm)
+    forward(model, data)
+    for name in DERIVED:
+        try:
+            array = getattr(data, name)
+        except UnsupportedError:
+            continue
+        require(not array.flags.writeable, f"{name} can be written into")
+        require_raises(ReadOnlyError, lambda n=name: setattr(data, n, 0.0))
+    require_raises(ReadOnlyError, lambda: setattr(data, "speed", 1.0))
+    require_raises(ReadOnlyError, lambda: setattr(model, "nq", 7))
+
+
+def check_nstep_is_a_positive_whole_number(lab: Lab) -> None:
+    """0, -1, 1.5, True, None and text are refused, and no time passes."""
+    model, data = lab.arm, lab.data(lab.arm)
+    for nstep in (0, -1, 1.5, 1.0, True, None, "2", 2**40, np.float64(3)):
+        require_raises(BadInputError, lambda n=nstep: step(model, data, n))  # pyright: ignore
+    require(data.time == 0.0, "time passed in a refused step")
+    step(model, data, np.int64(2))  # pyright: ignore[reportArgumentType]
+    require(abs(data.time - 2 * model.timestep) < 1e-12, "a NumPy integer was not taken")
+
+
+def check_not_finite_in_place_is_caught(lab: Lab) -> None:
+    """NaN or infinity written in place: an error, then only reset and set_state."""
+    model, data = lab.box, lab.data(lab.box, keyframe=0)
+    good = get_state(model, data)
+    for name, value in (
+        ("ctrl", np.nan),
+        ("qpos", np.nan),
+        ("qpos", -np.inf),
+        ("qvel", np.nan),
+        ("qvel", 1e200),
+    ):
+        for verb in (lambda: step(model, data), lambda: step(model, data, 50)):
+            getattr(data, name)[2] = value
+            error = require_raises((BadInputError, DivergedError), verb)
+            require("2" in str(error), f"the message does not name the entry: {error}")
+            _refuses_or_is_unchanged(lab, data, name, value)
+            set_state(model, data, good)
+            require(get_state(model, data) == good, "set_state did not restore the State")
+        getattr(data, name)[2] = value
+        before = [getattr(data, array).copy() for array in INPUTS]
+        require_raises(BadInputError, lambda: forward(model, data))
+        for array, old in zip(INPUTS, before, strict=True):
+            require(np.array_equal(getattr(data, array), old, equal_nan=True), f"{array} changed")
+        require_raises(BadInputError, lambda: get_state(model, data))
+        reset(model, data, keyframe=0)
+    step(model, data, 10)
+    require(bool(np.isfinite(data.qpos).all()), "not finite after the recovery")
+
+
+def check_infinite_ctrl_is_refused_or_clamped(lab: Lab) -> None:
+    """An infinite ctrl in place: an error, or the end of its range; forward refuses it."""
+    model = lab.arm
+    at_end, data = lab.data(model), lab.data(model)
+    at_end.ctrl[1] = model.actuator_ctrlrange[1, 1]
+    data.ctrl[1] = np.inf
+    require_raises(BadInputError, lambda: forward(model, data))
+    require_raises(BadInputError, lambda: get_state(model, data))
+    step(model, at_end, 50)
+    try:
+        step(model, data, 50)
+    except BadInputError:
+        return
+    require_equal(data.qpos, at_end.qpos, "qpos under an infinite ctrl")
+
+
+def _refuses_or_is_unchanged(lab: Lab, data: Any, name: str, value: float) -> None:
+    try:
+        forward(lab.box, data)
+    except BadInputError:
+        require(np.array_equal(getattr(data, name)[2], value, equal_nan=True), f"{name} changed")
+    except DivergedError:
+        require_raises(DivergedError, lambda: step(lab.box, data))
+        require_raises(DivergedError, lambda: get_state(lab.box, data))
+        require_raises(DivergedError, lambda: data.xpos)
+        require_raises(DivergedError, lambda: setattr(data, "ctrl", np.zeros(6)))
+    else:
+        raise AssertionError("a Data with a bad entry went on as if nothing were wrong")
+
+
+def check_divergence_is_caught_every_time(lab: Lab) -> None:
+    """A second divergence, after a recovery by either way, is told like the first."""
+    model, data = lab.arm, lab.data(lab.arm)
+    good = get_state(model, data)
+    for recover in (
+        lambda: reset(model, data),
+        lambda: set_state(model, data, good),
+        lambda: set_state(model, data, good),
+        lambda: reset(model, data),
+    ):
+        data.qvel[1] = np.nan
+        require_raises((DivergedError, BadInputError), lambda: step(model, data, 20))
+        recover()
+        require_equal(data.qvel, np.zeros(6), "qvel after the recovery")
+
+
+def check_zero_quaternion_is_refused(lab: Lab) -> None:
+    """A quaternion of zeros names no rotation: step and forward refuse, unchanged."""
+    model, data = lab.box, lab.data(lab.box)
+    start = int(model.jnt_qposadr[model.joint_id("box")]) + 3
+    data.qpos[start : start + 4] = 0.0
+    before = data.qpos.copy()
+    for verb in (step, forward):
+        require_raises(BadInputError, lambda v=verb: v(model, data))
+    require_equal(data.qpos, before, "qpos after a refused zero quaternion")
+    require(data.time == 0.0, "time passed in a refused step")
+
+
+def check_foreign_data_is_refused(lab: Lab) -> None:
+    """A Data works with the Model that made it, and with no other."""
+    data, variant = lab.data(lab.arm), lab.arm.replace(gravity=[0, 0, 0])
+    state = get_state(lab.arm, data)
+    for model in (lab.scene, variant):
+        for call in (
+            lambda m=model: step(m, data),
+            lambda m=model: forward(m, data),
+            lambda m=model: reset(m, data),
+            lambda m=model: get_state(m, data),
+            lambda m=model: set_state(m, data, state),
+        ):
+            require_raises(ForeignDataError, call)
+    for wrong in (None, 3, "data", lab.arm):
+        require_raises(TypeError, lambda w=wrong: step(lab.arm, w))  # pyright: ignore
+    require_raises(TypeError, lambda: make_data(data))  # pyright: ignore
+    require_raises(TypeError, lambda: pickle.dumps(data))
+
+
+def check_closed_data_is_refused(lab: Lab) -> None:
+    """After close every verb and every derived value is an error; close is idempotent."""
+    model = lab.arm
+    with make_data(model) as data:
+        qpos = data.qpos
+        state = get_state(model, data)
+    data.close()
+    for call in (
+        lambda: step(model, data),
+        lambda: forward(model, data),
+        lambda: reset(model, data),
+        lambda: get_state(model, data),
+        lambda: set_state(model, data, state),
+        lambda: data.xpos,
+        lambda: data.contacts,
+        lambda: data.time,
+        lambda: data.raw,
+        lambda: setattr(data, "ctrl", np.zeros(6)),
+    ):
+        require_raises(ClosedDataError, call)
+    require_equal(qpos, np.zeros(6), "an array that outlived its Data")
+    require("closed" in repr(data), "repr does not say that it is closed")
+
+
+def check_unknown_names_are_refused(lab: Lab) -> None:
+    """A mistyped name lists the known ones, and suggests the nearest."""
+    model, data = lab.box, lab.data(lab.box)
+    error = require_raises(UnknownNameError, lambda: model.joint_id("elbow_flx"))
+    require("Did you mean 'elbow_flex'?" in str(error), f"no suggestion in: {error}")
+    for call in (
+        lambda: model.site_id("tip"),
+        lambda: model.body_id(""),
+        lambda: model.geom_id("nothing"),
+        lambda: model.actuator_id("motor"),
+        lambda: reset(model, data, keyframe=99),
+        lambda: reset(model, data, keyframe=-1),
+        lambda: reset(model, data, keyframe="helt"),
+        lambda: reset(model, data, keyframe=1.0),  # pyright: ignore[reportArgumentType]
+    ):
+        require_raises(UnknownNameError, call)
+    require(data.time == 0.0, "a refused reset changed the Data")
+
+
+def check_bad_options_are_refused(lab: Lab) -> None:
+    """`replace` checks every name and value, and never changes its own Model."""
+    model = lab.arm
+    for options in (
+        {"actuaton": False},
+        {"actuation": 1},
+        {"gravity": 9.81},
+        {"gravity": [0, 0, np.nan]},
+        {"timestep": 0},
+        {"timestep": -0.1},
+        {"timestep": "fast"},
+        {"substeps": 0},
+        {"substeps": 1.5},
+        {"damping": -1.0},
+        {"damping": [1.0, 2.0]},
+        {"armature": np.nan},
+        {"integrator": "magic"},
+    ):
+        require_raises(StateMachineError, lambda o=options: model.replace(**o))
+    require(model.timestep == 0.005, "a refused replace changed the Model")

@@ -1,0 +1,225 @@
+"""Physics against closed forms: gravity, servo, friction, contact, free flight, options."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import UnsupportedError
+from ..interface import Model
+from ..records import Array
+from ..rotations import angle_between, matrix_from_quat
+from ..verbs import forward, make_data, step
+from ._lab import Lab, require, require_close
+
+_G = 9.81
+
+
+def check_untouched_ctrl_is_a_command(lab: Lab) -> None:
+    """The servos hold the zero pose from the first step on, with a small droop."""
+    model, data = lab.scene, lab.data(lab.scene)
+    step(model, data, 200)
+    droop = np.degrees(data.qpos[model.jnt_qposadr[model.joint_id("shoulder_lift")]])
+    # At rest kp·droop carries the load; 0.5694 N·m is the arm's weight about the joint.
+    require_close(droop, np.degrees(0.5694 / 998.22), 0.002, "droop of shoulder_lift [deg]")
+    require(bool(np.abs(data.qvel).max() < 1e-4), "the arm is still moving after a second")
+
+
+def check_the_servo_law(lab: Lab) -> None:
+    """qfrc_actuator is clip(kp·(clip(ctrl) - q) - kv·q̇, forcerange), after forward."""
+    model, data = lab.arm, lab.data(lab.arm)
+    random = np.random.default_rng(13)
+    for scale in (1e-3, 1e-2, 1.0, 5.0):
+        data.qpos[:] = random.uniform(-0.3, 0.3, 6)
+        data.qvel[:] = random.uniform(-0.2, 0.2, 6)
+        data.ctrl[:] = data.qpos + scale * random.uniform(-1, 1, 6)
+        forward(model, data)
+        require_close(data.qfrc_actuator, servo(model, data.qpos, data.qvel, data.ctrl), 1e-9,
+                      "qfrc_actuator")
+
+
+def servo(model: Model, qpos: Array, qvel: Array, ctrl: Array) -> Array:
+    """The position servo's force (nu,) [N·m], of an arm whose joints are its actuators'."""
+    goal = np.clip(ctrl, *model.actuator_ctrlrange.T)
+    force = model.actuator_kp * (goal - qpos) - model.actuator_kv * qvel
+    return np.clip(force, *model.actuator_forcerange.T)
+
+
+def check_ctrl_is_clamped_inside(lab: Lab) -> None:
+    """A ctrl beyond its range acts as at the range; the array keeps what was written."""
+    model = lab.arm
+    ends = []
+    for excess in (0.0, 5.0):
+        data = lab.data(model)
+        data.ctrl[:] = model.actuator_ctrlrange[:, 1] + excess
+        step(model, data, 50)
+        ends.append(data.qpos.copy())
+        require_close(data.ctrl, model.actuator_ctrlrange[:, 1] + excess, 0.0, "ctrl")
+    require_close(ends[1], ends[0], 1e-12, "qpos under a ctrl beyond its range")
+
+
+def check_forces_balance_at_rest(lab: Lab) -> None:
+    """Held by its servos, the arm's forces sum to zero; parts add up to the constraint."""
+    model, data = lab.scene, lab.data(lab.scene)
+    step(model, data, 400)
+    forward(model, data)
+    total = data.qfrc_actuator + data.qfrc_passive + data.qfrc_constraint - data.qfrc_bias
+    require_close(total, np.zeros(model.nv), 1e-6, "sum of the forces at rest")
+    _parts_add_up(data)
+    limp = lab.scene.replace(actuation=False)
+    with make_data(limp) as fallen:
+        step(limp, fallen, 800)
+        forward(limp, fallen)
+        require(not fallen.qfrc_actuator.any(), "servos that are off exert a force")
+        require(abs(fallen.qfrc_contact[1]) > 0.3, "no contact carries the fallen arm")
+        _parts_add_up(fallen)
+
+
+def _parts_add_up(data: object) -> None:
+    parts = sum(getattr(data, f"qfrc_{part}") for part in ("contact", "friction", "limit"))
+    require_close(parts, getattr(data, "qfrc_constraint"), 1e-9, "parts of qfrc_constraint")  # noqa: B009
+
+
+def check_dry_friction_saturates(lab: Lab) -> None:
+    """A joint in fast motion feels its full dry friction, against the motion."""
+    model, data = lab.arm, lab.data(lab.arm)
+    for sign in (1.0, -1.0):
+        data.qvel[:] = sign * 3.0
+        forward(model, data)
+        require_close(data.qfrc_friction, -sign * model.dof_frictionloss, 1e-6, "qfrc_friction")
+        require_close(data.qfrc_passive, -model.dof_damping * data.qvel, 1e-9, "qfrc_passive")
+
+
+def check_limits_stop_a_joint(lab: Lab) -> None:
+    """Pushed by gravity, a joint stops at its limit; with limits off it goes on."""
+    limp = lab.arm.replace(actuation=False)
+    free = limp.replace(limits=False)
+    joint = limp.joint_id("shoulder_lift")
+    top = limp.jnt_range[joint, 1]
+    for model, stops in ((limp, True), (free, False)):
+        with make_data(model) as data:
+            step(model, data, 1600)
+            forward(model, data)
+            past = data.qpos[limp.jnt_qposadr[joint]] - top
+            require(bool(past < 0.02) is stops, f"{past:.3f} rad beyond the limit, limits {stops}")
+            if stops:
+                require(data.qfrc_limit[joint] < -0.05, "no limit force at the limit")
+
+
+def check_free_fall(lab: Lab) -> None:
+    """A free body falls g·t²/2, within the g·t·h of one timestep; sideways not at all."""
+    model, data = lab.box, lab.data(lab.box)
+    start = int(model.jnt_qposadr[model.joint_id("box")])
+    dof = int(model.jnt_dofadr[model.joint_id("box")])
+    data.qpos[start : start + 3] = (1.0, 1.0, 2.0)
+    step(model, data, 60)
+    t, h = data.time, model.timestep
+    fallen = 2.0 - data.qpos[start + 2]
+    require(abs(fallen - _G * t * t / 2) <= _G * t * h, f"fell {fallen:.4f} m in {t:.3f} s")
+    require_close(data.qvel[dof + 2], -_G * t, _G * h, "vertical velocity")
+    require_close(data.qpos[start : start + 2], (1.0, 1.0), 1e-9, "horizontal position")
+
+
+def check_free_body_velocity_conventions(lab: Lab) -> None:
+    """Linear velocity is in world axes; angular velocity in the body's own axes."""
+    model = lab.box.replace(gravity=[0, 0, 0])
+    start, dof = (int(a[model.joint_id("box")]) for a in (model.jnt_qposadr, model.jnt_dofadr))
+    quat = np.array([np.cos(0.6), np.sin(0.6), 0.0, 0.0])  # turned about x by 1.2 rad
+    rate, velocity = 0.8, np.array([0.3, -0.2, 0.1])
+    with make_data(model) as data:
+        data.qpos[start : start + 3] = (1.0, 1.0, 1.0)
+        data.qpos[start + 3 : start + 7] = quat
+        data.qvel[dof : dof + 3] = velocity
+        data.qvel[dof + 5] = rate  # about the body's z, a principal axis: constant
+        step(model, data, 100)
+        t = data.time
+        moved = data.qpos[start : start + 3] - 1.0
+        got = matrix_from_quat(data.qpos[start + 3 : start + 7])
+    require_close(moved, velocity * t, 1e-6, "displacement in world axes")
+    about_z = np.array([np.cos(rate * t / 2), 0.0, 0.0, np.sin(rate * t / 2)])
+    expected = matrix_from_quat(quat) @ matrix_from_quat(about_z)
+    require(float(angle_between(got, expected)) < 1e-4, "the spin is not about the body's z axis")
+
+
+def check_contact_carries_the_weight(lab: Lab) -> None:
+    """Under a resting box: four or more contacts, normals up, forces that sum to m·g."""
+    model, data = lab.box, lab.data(lab.box)
+    step(model, data, 300)
+    forward(model, data)
+    contacts, body = data.contacts, model.body_id("box")
+    pairs = model.geom_bodyid[contacts.geom]
+    on_floor = (pairs == body).any(axis=1)
+    require(int(on_floor.sum()) >= 3, f"the box rests on {on_floor.sum()} points")
+    total = np.zeros(3)
+    for k in np.flatnonzero(on_floor):
+        # The force is that of geom 0 on geom 1, along the rows of the frame.
+        sign = 1.0 if pairs[k, 1] == body else -1.0
+        total += sign * contacts.frame[k].T @ contacts.force[k]
+        require(sign * contacts.frame[k, 0, 2] > 0.99, "the normal does not point up")
+    dof = int(model.jnt_dofadr[model.joint_id("box")])
+    mass_g = data.qfrc_bias[dof + 2]
+    require_close(mass_g, 0.096 * _G, 1e-9, "weight of the box")
+    require_close(total, (0.0, 0.0, mass_g), 0.02 * mass_g, "force of the floor on the box")
+    require(bool((np.abs(contacts.dist) < 0.002).all()), "surfaces are not together")
+
+
+def check_the_box_is_held(lab: Lab) -> None:
+    """From keyframe 0, under a command that moves the arm, both jaws keep the box."""
+    model, data = lab.box, lab.data(lab.box, keyframe=0)
+    box, jaws = model.body_id("box"), {model.body_id(n) for n in ("gripper", "moving_jaw_so101_v1")}
+    data.ctrl[:2] += (0.4, -0.2)
+    start = data.qpos.copy()
+    for k in range(600):
+        step(model, data)
+        pairs = model.geom_bodyid[data.contacts.geom]
+        touching = set(pairs[(pairs == box).any(axis=1)].ravel().tolist()) - {box}
+        require(touching >= jaws, f"step {k}: the box touches {touching}, not both jaws")
+        require(0 not in touching, f"step {k}: the box touches the floor")
+    require(bool(np.abs(data.qpos[:2] - start[:2]).min() > 0.1), "the arm did not move")
+
+
+def check_options_do_what_they_say(lab: Lab) -> None:
+    """Each option that the capability record lists has its effect, and no other Model's."""
+    base, options = lab.scene, lab.scene.capabilities.options
+    limp = base.replace(actuation=False)
+
+    def lift_after(model: Model, steps: int) -> float:
+        with make_data(model) as data:
+            step(model, data, steps)
+            return float(data.qpos[1])
+
+    fall = lift_after(limp, 60)
+    require(fall > 0.05, f"with the servos off the arm fell only {fall:.4f} rad")
+    weightless = limp.replace(gravity=[0, 0, 0])
+    require(abs(lift_after(weightless, 60)) < 1e-6, "without gravity the arm moved")
+    slower = {"armature": 0.2, "damping": 5.0, "frictionloss": 0.3}
+    for name, value in slower.items():
+        if name in options:
+            less = lift_after(limp.replace(**{name: value}), 60)
+            require(less < 0.8 * fall, f"{name} {value} did not slow the fall: {less:.4f} rad")
+    if "contacts" in options:
+        through = lift_after(limp.replace(contacts=False), 400)
+        require(through > 0.6, f"without contacts the arm stopped at {through:.3f} rad")
+    if "substeps" in options:
+        fine = limp.replace(substeps=10)
+        require(fine.timestep == limp.timestep, "substeps changed the timestep")
+        finer, small = lift_after(fine, 60), lift_after(limp.replace(timestep=0.0005), 600)
+        require_close(finer, small, 1e-9, "ten substeps against a tenth of the timestep")
+        require(finer != fall, "substeps changed nothing")
+    for name in options:
+        if name == "integrator":
+            for integrator in base.capabilities.integrators:
+                require_close(lift_after(base.replace(integrator=integrator), 20), 0.0, 0.01, name)
+    require(base.timestep == 0.005 and lift_after(base, 60) < 0.001, "replace changed its Model")
+
+
+def check_unsupported_is_said(lab: Lab) -> None:
+    """What the capability record does not list raises UnsupportedError, with the facts."""
+    model = lab.arm
+    for name in set(("armature", "substeps", "limits")) - set(model.capabilities.options):
+        try:
+            model.replace(**{name: 1})
+        except UnsupportedError as error:
+            require(error.backend == model.backend and error.feature == name, str(error))
+        else:
+            raise AssertionError(f"{name} is not listed, and was taken")
+    require(bool(model.capabilities.behaviours), "the capability record is empty")

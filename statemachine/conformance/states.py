@@ -1,0 +1,174 @@
+"""Time, replay and State: the same start, the same commands, the same bits."""
+
+from __future__ import annotations
+
+import dataclasses
+import pickle
+
+import numpy as np
+
+from ..errors import BadInputError, ForeignStateError
+from ..verbs import forward, get_state, make_data, reset, set_state, step
+from ._lab import (
+    Lab,
+    inputs_of,
+    require,
+    require_close,
+    require_equal,
+    require_raises,
+    run_ctrl,
+)
+
+
+def check_time_passes_only_in_step(lab: Lab) -> None:
+    """`time` grows by timestep × nstep in a step, by nothing elsewhere; it can be set."""
+    model, data = lab.arm, lab.data(lab.arm)
+    require(data.time == 0.0, "a fresh Data is not at time 0")
+    step(model, data)
+    step(model, data, 9)
+    require_close(data.time, 10 * model.timestep, 1e-12, "time after ten steps")
+    data.time = 2.0
+    forward(model, data)
+    step(model, data)
+    require_close(data.time, 2.0 + model.timestep, 1e-12, "time after it was set")
+    reset(model, data)
+    require(data.time == 0.0, "time after reset")
+
+
+def check_steps_add_up(lab: Lab) -> None:
+    """step(n) is n times step(1), bit for bit, mid-contact too."""
+    model = lab.box
+    ends = []
+    for pieces in ((60,), (1,) * 60, (7, 1, 22, 30)):
+        data = lab.data(model, keyframe=0)
+        data.ctrl[0] += 0.3
+        for nstep in pieces:
+            step(model, data, nstep)
+        ends.append(inputs_of(model, data))
+    for end in ends[1:]:
+        require_equal(end, ends[0], "state after 60 steps, divided otherwise")
+
+
+def check_replay_is_bit_identical(lab: Lab) -> None:
+    """Same keyframe, same commands: same bits, in a used Data and in a new one."""
+    model = lab.box
+    used = lab.data(model)
+    run_ctrl(model, used, 30, seed=3)
+    runs = []
+    for data in (used, used, lab.data(model)):
+        reset(model, data, keyframe=0)
+        runs.append(run_ctrl(model, data, 120, seed=4))
+    for run in runs[1:]:
+        require_equal(run, runs[0], "qpos along a replay")
+
+
+def check_a_different_command_is_noticed(lab: Lab) -> None:
+    """The replay check is not blind: one late command gives other bits."""
+    model = lab.box
+    ends = []
+    for late in (False, True):
+        data = lab.data(model, keyframe=0)
+        goal = data.ctrl.copy()
+        goal[0] += 0.3
+        for k in range(50):
+            if k == int(late):
+                data.ctrl = goal
+            step(model, data)
+        ends.append(data.qpos.copy())
+    require(not np.array_equal(*ends), "a late command left no trace")
+
+
+def check_keyframes_are_taken_whole(lab: Lab) -> None:
+    """reset(keyframe) sets time, qpos, qvel and ctrl to the file's, by number or name."""
+    model, data = lab.box, lab.data(lab.box)
+    require(len(model.keyframes) == 2, "scene_box has two keyframes")
+    for number, frame in enumerate(model.keyframes):
+        for key in (number, frame.name):
+            run_ctrl(model, data, 5, seed=5)
+            reset(model, data, keyframe=key)
+            require(data.time == frame.time != 0.0, f"time of keyframe {key!r}")
+            require_close(data.qpos, frame.qpos, 1e-12, f"qpos of keyframe {key!r}")
+            require_close(data.qvel, frame.qvel, 1e-12, f"qvel of keyframe {key!r}")
+            require_equal(data.ctrl, frame.ctrl, f"ctrl of keyframe {key!r}")
+    reset(model, data)
+    fresh = lab.data(model)
+    require_equal(inputs_of(model, data), inputs_of(model, fresh), "a reset Data")
+
+
+def check_a_state_restores_the_inputs(lab: Lab) -> None:
+    """set_state(get_state) gives back time, qpos, qvel and ctrl, in any Data."""
+    model, data = lab.box, lab.held()
+    state = get_state(model, data)
+    expected = inputs_of(model, data)
+    other = lab.data(model)
+    for target in (data, other):
+        run_ctrl(model, target, 10, seed=6)
+        set_state(model, target, state)
+        require_equal(inputs_of(model, target), expected, "inputs after set_state")
+    require(state == get_state(model, other), "the State of the restored Data differs")
+    require(hash(state) == hash(get_state(model, other)), "equal States, unequal hashes")
+
+
+def check_restored_futures_agree(lab: Lab) -> None:
+    """Two restores of one State, one from a pickle, have the same bits ever after."""
+    model, data = lab.box, lab.held()
+    state = get_state(model, data)
+    futures = []
+    if model.capabilities.exact_restore:
+        futures.append(run_ctrl(model, data, 100, seed=8))
+    for copy in (state, pickle.loads(pickle.dumps(state)), state):
+        target = lab.data(model)
+        run_ctrl(model, target, 7, seed=9)
+        set_state(model, target, copy)
+        futures.append(run_ctrl(model, target, 100, seed=8))
+    for future in futures[1:]:
+        require_equal(future, futures[0], "qpos along a restored future")
+
+
+def check_a_state_is_a_copy(lab: Lab) -> None:
+    """A State does not change with its Data, and cannot be written into."""
+    model, data = lab.arm, lab.data(lab.arm)
+    state = get_state(model, data)
+    before = state.vector.copy()
+    run_ctrl(model, data, 5, seed=10)
+    require_equal(state.vector, before, "a State after its Data moved on")
+    require(not state["qpos"].flags.writeable, "a State can be written into")
+    require_equal(state["qpos"], np.zeros(model.nq), "State['qpos']")
+
+
+def check_a_state_moves_between_variants(lab: Lab) -> None:
+    """A State fits every variant that `replace` makes of a Model."""
+    model = lab.scene
+    data = lab.data(model)
+    run_ctrl(model, data, 20, seed=11)
+    state = get_state(model, data)
+    variant = model.replace(gravity=[0.0, 0.0, -1.6])
+    with make_data(variant) as other:
+        set_state(variant, other, state)
+        require_equal(inputs_of(variant, other), inputs_of(model, data), "inputs in a variant")
+        step(variant, other, 5)
+
+
+def check_foreign_states_are_refused(lab: Lab) -> None:
+    """Another layout, another backend, a cut or a bad State: refused, Data unchanged."""
+    model, data = lab.arm, lab.data(lab.arm)
+    run_ctrl(model, data, 5, seed=12)
+    good = get_state(model, data)
+    boxed = get_state(lab.box, lab.data(lab.box))
+    bad = good.vector.copy()
+    bad[2] = np.nan
+    for state in (
+        boxed,
+        dataclasses.replace(good, backend="elsewhere"),
+        dataclasses.replace(good, fingerprint="0" * 16),
+        dataclasses.replace(good, blob=good.blob[:-8]),
+        dataclasses.replace(good, blob=good.blob + b"\0" * 8),
+        dataclasses.replace(good, layout=good.layout[::-1]),
+    ):
+        require_raises(ForeignStateError, lambda s=state: set_state(model, data, s))
+    require_raises(
+        BadInputError,
+        lambda: set_state(model, data, dataclasses.replace(good, blob=bad.tobytes())),
+    )
+    require_raises(TypeError, lambda: set_state(model, data, good.vector))  # pyright: ignore
+    require(get_state(model, data) == good, "a refused State changed the Data")

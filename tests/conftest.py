@@ -1,0 +1,100 @@
+"""What the tests share: the engines that must be here, and data from beside the checkout."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from statemachine.backends import backend_engine, backend_names
+from statemachine.engines import ENGINES, require
+from statemachine.errors import MissingEngineError
+
+ROOT = Path(__file__).resolve().parent.parent
+SHARED = ROOT.parent / "shared"
+REQUIRED = set(filter(None, os.environ.get("STATEMACHINE_REQUIRE", "").split(",")))
+
+
+def need_engine(name: str) -> None:
+    """Skip without an engine, or fail where STATEMACHINE_REQUIRE names it."""
+    try:
+        require(name)
+    except MissingEngineError as error:
+        if name in REQUIRED:
+            pytest.fail(f"STATEMACHINE_REQUIRE names {name}: {error}")
+        pytest.skip(str(error))
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    unknown = REQUIRED - set(ENGINES) - {"render"}
+    if unknown:
+        raise pytest.UsageError(f"STATEMACHINE_REQUIRE names no engine: {sorted(unknown)}")
+
+
+@pytest.fixture(autouse=True)
+def _plain_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("MENAGERIE", "COLUMNS", "FORCE_COLOR", "NO_COLOR"):
+        monkeypatch.delenv(name, raising=False)
+
+
+@pytest.fixture(params=backend_names())
+def backend(request: pytest.FixtureRequest) -> str:
+    """Every backend whose engine is here."""
+    engine = backend_engine(request.param)
+    if engine:
+        need_engine(engine)
+    return request.param
+
+
+@pytest.fixture
+def pinocchio() -> None:
+    """Only where the witness is."""
+    need_engine("pinocchio")
+
+
+@pytest.fixture
+def menagerie() -> Path:
+    """The folder of public models beside the checkout."""
+    folder = SHARED / "menagerie"
+    if not folder.is_dir():
+        pytest.skip(f"no public models at {folder.parent.name}/{folder.name}")
+    return folder
+
+
+@pytest.fixture
+def golden() -> Callable[[str], np.ndarray]:
+    """Golden data from the public reference model, by file name: columns by name."""
+
+    def read(name: str) -> np.ndarray:
+        path = SHARED / "so101" / f"{name}.csv"
+        if not path.is_file():
+            pytest.skip(f"no golden data at shared/so101/{path.name}")
+        return np.genfromtxt(path, delimiter=",", names=True)
+
+    return read
+
+
+Cli = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+@pytest.fixture
+def cli(tmp_path: Path) -> Cli:
+    """Run the command line in a process of its own, from an empty folder."""
+
+    def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "statemachine", *arguments],
+            capture_output=True,
+            text=True,
+            timeout=120,
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUTF8": "1", **environment},
+            check=False,
+        )
+
+    return run

@@ -1,0 +1,134 @@
+"""The arm and its scenes: what they are made of, and what the course says of them."""
+
+from __future__ import annotations
+
+import importlib.util
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.models import model_names, models_dir
+from statemachine.records import JointType
+
+ARM = models_dir() / "so101" / "so101.xml"
+JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
+
+
+def test_models_that_come_with_the_library() -> None:
+    assert model_names() == ["so101/scene", "so101/so101", "so101/scene_box"]
+
+
+def test_every_parser_can_read_the_arm() -> None:
+    root = ET.parse(ARM).getroot()
+    assert len(root.findall("worldbody/body")) == 1
+    assert len(root.findall("default")) == 1
+    assert not root.findall(".//include")
+    assert not root.findall("keyframe")
+    assert all(body.find("inertial") is not None for body in root.iter("body"))
+
+
+def test_collision_shapes_are_primitives() -> None:
+    raw = sm.load("so101").raw
+    touching = raw.geom_contype.astype(bool)
+    kinds = set(raw.geom_type[touching].tolist())
+    assert kinds <= {2, 3, 6}  # sphere, capsule, box
+    assert 20 <= touching.sum() <= 30
+    assert all(raw.geom(int(g)).name for g in np.flatnonzero(touching))
+
+
+def test_fingertip_is_nowhere_until_forward() -> None:
+    model = sm.load("so101")
+    tip = model.site_id("gripperframe")
+    with sm.make_data(model) as data:
+        assert data.site_xpos[tip].tolist() == [0.0, 0.0, 0.0]
+        sm.forward(model, data)
+        assert np.round(data.site_xpos[tip], 4).tolist() == [0.3914, -0.001, 0.2463]
+        assert data.time == 0.0
+
+
+def test_scene_box_has_the_sizes_of_the_course() -> None:
+    model = sm.load("so101/scene_box")
+    assert (model.nq, model.nv, model.nu) == (13, 12, 6)
+    assert model.joint_names == (*JOINTS, "box")
+    assert model.actuator_names == JOINTS
+    assert model.jnt_qposadr.tolist() == [0, 1, 2, 3, 4, 5, 6]
+    assert model.jnt_type.tolist() == [JointType.HINGE] * 6 + [JointType.FREE]
+    assert [frame.name for frame in model.keyframes] == ["held", "pickup"]
+
+
+def test_servos_hold_within_a_thirtieth_of_a_degree() -> None:
+    model = sm.load("so101/scene")
+    with sm.make_data(model) as data:
+        for _ in range(4):
+            sm.step(model, data, 200)
+            assert f"{np.degrees(data.qpos[1]):.3f}" == "0.033"
+
+
+def _touching(model: sm.Model, data: sm.Data) -> tuple[int, set[str]]:
+    """Number of contacts, and the bodies that touch the box."""
+    contacts, box = data.contacts, model.body_id("box")
+    pairs = model.geom_bodyid[contacts.geom]
+    others = pairs[(pairs == box).any(axis=1)].ravel()
+    return len(contacts), {model.body_names[b] for b in others if b != box}
+
+
+@pytest.mark.parametrize("move", [(0.0, 0.0), (0.4, -0.2)])
+def test_keyframe_0_holds_the_box(move: tuple[float, float]) -> None:
+    model = sm.load("so101/scene_box")
+    box = int(model.jnt_qposadr[model.joint_id("box")])
+    gripper = model.body_id("gripper")
+    with sm.make_data(model) as data:
+        sm.reset(model, data, keyframe=0)
+        assert data.time == 6.0
+        data.ctrl[:2] += move
+        places, counts = [], []
+        for _ in range(600):
+            sm.step(model, data)
+            count, bodies = _touching(model, data)
+            counts.append(count)
+            assert bodies == {"gripper", "moving_jaw_so101_v1"}
+            sm.forward(model, data)
+            turn = data.raw.xmat[gripper].reshape(3, 3)
+            places.append(turn.T @ (data.qpos[box : box + 3] - data.xpos[gripper]))
+            assert data.qpos[box + 2] > 0.06
+        swing = abs(data.qpos[0])
+    assert 8 <= min(counts) <= max(counts) <= 12
+    slip = np.linalg.norm(np.ptp(places, axis=0))
+    assert slip < 1.0e-3
+    if any(move):
+        assert swing > 0.35
+
+
+def test_keyframe_1_has_the_box_on_the_floor_between_open_jaws() -> None:
+    model = sm.load("so101/scene_box")
+    with sm.make_data(model) as data:
+        sm.reset(model, data, keyframe=1)
+        sm.forward(model, data)
+        count, bodies = _touching(model, data)
+        assert (count, bodies) == (4, {"world"})
+
+
+def test_no_contact_at_the_zero_pose() -> None:
+    model = sm.load("so101/scene")
+    with sm.make_data(model) as data:
+        sm.forward(model, data)
+        assert len(data.contacts) == 0
+
+
+def test_meshes_are_what_the_script_makes(tmp_path: Path) -> None:
+    folder = ARM.parent / "look"
+    spec = importlib.util.spec_from_file_location("make_meshes", folder / "make_meshes.py")
+    assert spec and spec.loader
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    script.main(tmp_path)
+    made = {path.name: path for path in tmp_path.glob("*.stl")}
+    assert made.keys() == {path.name for path in folder.glob("*.stl")}
+    for name, path in made.items():
+        new, old = (np.frombuffer(p.read_bytes(), np.uint8) for p in (path, folder / name))
+        assert new.shape == old.shape, name
+        # Another machine's sine may round the last bit of a float32 otherwise.
+        assert (new != old).mean() < 0.01, name

@@ -1,0 +1,169 @@
+"""What the backend relies on MuJoCo to do. When the engine changes, this notices."""
+
+from __future__ import annotations
+
+import threading
+import warnings
+
+import mujoco
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.backends import mujoco_backend
+from statemachine.errors import DivergedError, EngineWarning
+
+
+@pytest.fixture
+def raw() -> tuple[mujoco.MjModel, mujoco.MjData]:
+    model = sm.load("so101").raw
+    return model, mujoco.MjData(model)
+
+
+def test_a_warning_is_given_only_the_first_time(
+    raw: tuple[mujoco.MjModel, mujoco.MjData],
+) -> None:
+    model, data = raw
+    mujoco_backend._listen()
+    mujoco_backend._drain()
+    data.ctrl[0] = np.nan
+    mujoco.mj_step(model, data)
+    mujoco.mj_step(model, data)
+    assert len(mujoco_backend._drain()) == 1
+    assert data.warning[int(mujoco.mjtWarning.mjWARN_BADCTRL)].number == 2
+    mujoco.mj_resetData(model, data)
+    assert data.warning[int(mujoco.mjtWarning.mjWARN_BADCTRL)].number == 0
+
+
+def test_automatic_reset_is_off_and_would_rewind_time() -> None:
+    model = sm.load("so101")
+    flag = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    assert model.raw.opt.disableflags & flag
+    native = sm.load("so101", defaults="engine").raw
+    assert not native.opt.disableflags & flag
+    mujoco_backend._listen()
+    data = mujoco.MjData(native)
+    data.time, data.qpos[0] = 5.0, np.nan
+    mujoco.mj_step(native, data)
+    mujoco_backend._drain()
+    assert data.time < 1.0
+    assert np.isfinite(data.qpos).all()
+
+
+def test_a_divergence_is_raised_with_the_engines_defaults_too() -> None:
+    model = sm.load("so101", defaults="engine")
+    with sm.make_data(model) as data:
+        data.qpos[0] = np.nan
+        with pytest.raises(DivergedError):
+            sm.step(model, data)
+
+
+def test_time_and_entry_are_told_from_inside_a_bulk_step() -> None:
+    model = sm.load("so101")
+    with sm.make_data(model) as data:
+        sm.step(model, data, 100)
+        data.qvel[3] = np.nan
+        with pytest.raises(DivergedError, match="wrist_flex") as caught:
+            sm.step(model, data, 500)
+    assert caught.value.time == pytest.approx(0.5)
+    assert caught.value.index == 3
+    assert caught.value.quantity == "qvel"
+
+
+def test_a_divergence_belongs_to_its_own_data() -> None:
+    """Two threads, one of which diverges: the other never hears of it."""
+    model = sm.load("so101")
+    ended: dict[str, object] = {}
+
+    def work(name: str, bad: bool) -> None:
+        with sm.make_data(model) as data:
+            try:
+                for k in range(400):
+                    if bad and k == 200:
+                        data.qpos[0] = np.nan
+                    sm.step(model, data)
+            except DivergedError as error:
+                ended[name] = error
+            else:
+                ended[name] = data.qpos.copy()
+
+    threads = [threading.Thread(target=work, args=(f"t{i}", i % 2 == 0)) for i in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(isinstance(ended[f"t{i}"], DivergedError) for i in (0, 2, 4))
+    poses = [ended[f"t{i}"] for i in (1, 3, 5)]
+    assert all(isinstance(pose, np.ndarray) for pose in poses)
+    assert all(np.array_equal(pose, poses[0]) for pose in poses)  # pyright: ignore
+    assert not mujoco_backend._ALARMS
+
+
+def test_other_warnings_come_up_as_python_warnings() -> None:
+    model = sm.load("so101")
+    with sm.make_data(model) as data:
+        mujoco_backend._on_warning("something that is no divergence")
+        with pytest.warns(EngineWarning, match="no divergence"):
+            sm.step(model, data)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            sm.step(model, data)
+
+
+def test_another_handler_is_replaced_when_a_data_is_made() -> None:
+    model = sm.load("so101")
+    mujoco.set_mju_user_warning(lambda _text: None)
+    with sm.make_data(model) as data:
+        data.qpos[0] = np.nan
+        with pytest.raises(DivergedError):
+            sm.step(model, data)
+
+
+def test_no_noise_and_no_log_file(capfd: pytest.CaptureFixture[str], tmp_path, monkeypatch) -> None:  # noqa: ANN001
+    monkeypatch.chdir(tmp_path)
+    model = sm.load("so101")
+    with sm.make_data(model) as data:
+        data.qpos[0] = np.nan
+        with pytest.raises(DivergedError):
+            sm.step(model, data, 10)
+    assert capfd.readouterr() == ("", "")
+    assert not list(tmp_path.iterdir())
+
+
+def test_restoring_the_plain_state_mid_contact_is_not_exact() -> None:
+    """Why a State has the warm start: without it the future differs."""
+    model = sm.load("so101/scene_box")
+    with sm.make_data(model) as data, sm.make_data(model) as other:
+        sm.reset(model, data, keyframe=0)
+        data.ctrl[0] += 0.3
+        sm.step(model, data, 30)
+        for part in ("qpos", "qvel", "ctrl"):
+            setattr(other, part, getattr(data, part))
+        other.time = data.time
+        for each in (data, other):
+            sm.step(model, each, 20)
+        assert not np.array_equal(data.qpos, other.qpos)
+
+
+def test_components_of_the_state_are_all_there() -> None:
+    integration = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+    assert sum(int(bit) for bit in mujoco_backend._COMPONENTS.values()) == integration
+    values = [int(bit) for bit in mujoco_backend._COMPONENTS.values()]
+    assert values == sorted(values)
+
+
+def test_a_raw_flag_switches_the_servos_off() -> None:
+    """The course's own exercise: the student's way through the escape hatch works."""
+    model = sm.load("so101/scene")
+    model.raw.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    with sm.make_data(model) as data:
+        sm.step(model, data, 800)
+        assert f"{np.degrees(data.qpos[1]):.2f}" == "23.92"
+
+
+def test_without_the_floor_the_arm_goes_on_to_its_stop() -> None:
+    """What catches the falling arm is the floor."""
+    model = sm.load("so101/scene").replace(actuation=False, contacts=False)
+    with sm.make_data(model) as data:
+        sm.step(model, data, 2000)
+        assert np.degrees(data.qpos[1]) == pytest.approx(100, abs=0.5)

@@ -1,0 +1,144 @@
+"""The arm against golden data of the public reference model, from outside this project."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.experiments import hold
+
+Golden = Callable[[str], np.ndarray]
+
+
+def _columns(table: np.ndarray, *names: str) -> np.ndarray:
+    return np.stack([table[name] for name in names], axis=1)
+
+
+def _angles(table: np.ndarray) -> np.ndarray:
+    return _columns(table, *(f"q{i}_rad" for i in range(6)))
+
+
+def _run(ctrl: tuple[float, ...], steps: int, *, actuation: bool = True) -> np.ndarray:
+    model = sm.load("so101/scene").replace(actuation=actuation)
+    with sm.make_data(model) as data:
+        data.ctrl = ctrl
+        rows = [data.qpos.copy()]
+        for _ in range(steps):
+            sm.step(model, data)
+            rows.append(data.qpos.copy())
+    return np.array(rows)
+
+
+def test_fingertip_at_200_poses(golden: Golden) -> None:
+    table = golden("golden_fk")
+    assert len(table) == 200
+    model = sm.load("so101")
+    tip = model.site_id("gripperframe")
+    positions = _columns(table, "x_m", "y_m", "z_m")
+    matrices = _columns(table, *(f"R{i}{j}" for i in range(3) for j in range(3)))
+    with sm.make_data(model) as data:
+        for qpos, position, matrix in zip(_angles(table), positions, matrices, strict=True):
+            data.qpos = qpos
+            sm.forward(model, data)
+            assert np.abs(data.site_xpos[tip] - position).max() < 1e-12
+            assert np.abs(data.site_xmat[tip] - matrix).max() < 1e-12
+
+
+def test_fingertip_by_the_witness(golden: Golden, pinocchio: None) -> None:
+    table = golden("golden_fk")
+    poses = sm.Kinematics("so101").poses(_angles(table), "gripperframe")
+    assert np.abs(poses.pos - _columns(table, "x_m", "y_m", "z_m")).max() < 1e-12
+
+
+def test_servos_on(golden: Golden) -> None:
+    expected = _angles(golden("golden_gravity_on"))
+    assert np.abs(_run((0.0,) * 6, 800) - expected).max() < 1e-6
+
+
+def test_servos_off(golden: Golden) -> None:
+    expected = _angles(golden("golden_gravity_off"))
+    run = _run((0.0,) * 6, 800, actuation=False)
+    assert np.abs(np.degrees(run - expected)).max() < 0.02
+    lift = [f"{np.degrees(run[k, 1]):.2f}" for k in (200, 400, 600, 800)]
+    assert lift == ["23.88", "23.89", "23.90", "23.92"]
+
+
+def test_hold_until_and_after_its_first_contact(golden: Golden) -> None:
+    table = golden("golden_hold")
+    expected = _angles(table)
+    run = _run(hold.TARGET, 400)
+    first = int(np.flatnonzero(table["ncon"])[0])
+    assert first == 56
+    assert np.abs(run[:first] - expected[:first]).max() < 1e-6
+    # From there on it depends on the shape of the jaw, which is ours.
+    assert np.abs(np.degrees(run - expected)).max() < 0.03
+    assert np.abs(np.degrees(run[-1] - expected[-1])).max() < 0.002
+
+
+def test_golden_data_notice_a_missing_armature(golden: Golden) -> None:
+    expected = _angles(golden("golden_gravity_on"))
+    model = sm.load("so101/scene").replace(armature=0.0)
+    with sm.make_data(model) as data:
+        sm.step(model, data, 2)
+        assert np.abs(data.qpos - expected[2]).max() > 1e-6
+
+
+def test_figures_are_the_public_models(menagerie: Path) -> None:
+    ours = sm.load("so101").raw
+    public = sm.load("so101", menagerie=menagerie).raw
+    for name in (
+        "body_pos", "body_quat", "body_mass", "body_ipos", "body_iquat", "body_inertia",
+        "jnt_range", "jnt_axis", "dof_armature", "dof_damping", "dof_frictionloss",
+        "actuator_gainprm", "actuator_biasprm", "actuator_ctrlrange", "actuator_forcerange",
+        "site_pos", "site_quat",
+    ):  # fmt: skip
+        assert np.abs(getattr(ours, name) - getattr(public, name)).max() < 1e-15, name
+    assert [ours.body(i).name for i in range(9)] == [public.body(i).name for i in range(9)]
+    for name in ("timestep", "integrator", "cone", "impratio", "iterations", "ls_iterations"):
+        assert getattr(ours.opt, name) == getattr(public.opt, name), name
+
+
+def test_keyframe_pickup_is_the_public_one(menagerie: Path) -> None:
+    ours = sm.load("so101/scene_box")
+    public = sm.load("so101/scene_box", menagerie=menagerie)
+    frame, reference = ours.keyframes[1], public.keyframes[0]
+    assert frame.name == reference.name == "pickup"
+    assert frame.time == reference.time
+    for part in ("qpos", "qvel", "ctrl"):
+        assert np.abs(getattr(frame, part) - getattr(reference, part)).max() < 1e-7, part
+    for part in ("body_mass", "body_inertia"):
+        gap = getattr(ours.raw, part)[-1] - getattr(public.raw, part)[-1]
+        assert np.abs(gap).max() < 1e-6, part
+
+
+@pytest.mark.slow
+def test_it_looks_like_an_so101(menagerie: Path) -> None:
+    from .rendering import need_rendering, silhouette
+
+    need_rendering()
+    overlaps = []
+    for qpos in ((0, 0, 0, 0, 0, 0.2), (0.3, -0.8, 0.9, 0.6, 0.4, 0.8)):
+        for azimuth, elevation in ((90, -5), (180, -10), (135, -30), (160, -80)):
+            ours, public = (
+                silhouette(model.raw, qpos, azimuth, elevation)
+                for model in (sm.load("so101"), sm.load("so101", menagerie=menagerie))
+            )
+            overlaps.append((ours & public).sum() / (ours | public).sum())
+    assert min(overlaps) > 0.93
+    assert np.mean(overlaps) > 0.96
+
+
+def test_reference_reproduces_the_golden_data(menagerie: Path, golden: Golden) -> None:
+    """The golden data are what the installed engine makes of the public model."""
+    expected = _angles(golden("golden_gravity_off"))
+    raw = sm.load("so101/scene", menagerie=menagerie).raw
+    raw.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    data = mujoco.MjData(raw)
+    for row in expected[1:]:
+        mujoco.mj_step(raw, data)
+        assert np.abs(data.qpos - row).max() < 1e-6
