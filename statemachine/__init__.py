@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .backends import load as load
     from .interface import Data as Data
     from .interface import Model as Model
+    from .kinematics import Kinematics as Kinematics
     from .records import State as State
     from .verbs import forward as forward
     from .verbs import get_state as get_state
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from .verbs import reset as reset
     from .verbs import set_state as set_state
     from .verbs import step as step
-    from .kinematics import Kinematics as Kinematics
 
 _HOMES = {
     "load": "backends",
@@ -55,7 +55,20 @@ _HOMES = {
 }
 _MODULES = ("backends", "conformance", "errors", "experiments", "kinematics", "models", "rotations")
 
-__all__ = [*_HOMES, "__version__"]
+__all__ = [
+    "Data",
+    "Kinematics",
+    "Model",
+    "State",
+    "__version__",
+    "forward",
+    "get_state",
+    "load",
+    "make_data",
+    "reset",
+    "set_state",
+    "step",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -4,10 +4,21 @@ from __future__ import annotations
 
 import argparse
 import difflib
+import io
 import os
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
+
+import statemachine
+
+if not hasattr(statemachine, "_HOMES"):  # not our __init__: its distribution was installed over us
+    print(
+        "statemachine: the package python-statemachine uses the same import name: "
+        "pip uninstall python-statemachine, then pip install --force-reinstall statemachine-sim",
+        file=sys.stderr,
+    )
+    raise SystemExit(2)
 
 from . import __version__
 from .errors import MissingEngineError, StateMachineError
@@ -30,12 +41,18 @@ class _Parser(argparse.ArgumentParser):
             close = difflib.get_close_matches(given, known, n=1, cutoff=0.5)
             hint = f". Did you mean {close[0]}?" if close else ""
             message = f"{wrong}no {given!r}; known: {', '.join(known)}{hint}"
+        if "expected one argument" in message:
+            flag = message.split(":")[0].removeprefix("argument ").split("/")[0]
+            message += f" (one that begins with a minus: {flag}=-1)"
         print(f"{self.prog}: {message}", file=sys.stderr)
         raise SystemExit(BAD_INPUT)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code: 0 well, 1 the result says no, 2 bad input."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a console without Unicode must not end a lesson
+            stream.reconfigure(errors="replace")
     parser = _parser()
     options = parser.parse_args(arguments)
     if getattr(options, "run", None) is None:
@@ -69,7 +86,7 @@ def _overview() -> str:
         *(f"  {PROGRAM} lesson {name:<9} {lesson.question}" for name, lesson in LESSONS.items()),
         "",
         "And beside them:",
-        f"  {PROGRAM} fingertip        the engine's fingertip and an independent witness",
+        f"  {PROGRAM} fingertip        the engine against an independent witness",
         f"  {PROGRAM} doctor           what this machine has, and what to do",
         "",
         f"Each takes --help. Start with: {PROGRAM} lesson state",
@@ -133,7 +150,7 @@ def _add_lesson(named: Any, lesson: Lesson) -> None:
 
 
 def _numbers(text: str) -> list[float]:
-    """"0,-0.6,1.2" as numbers."""
+    """Numbers of a list like 0,-0.6,1.2."""
     try:
         return [float(part) for part in text.replace(",", " ").split()]
     except ValueError:

@@ -13,10 +13,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .checks import TINY, as_count, as_scalar, as_switch, as_vector, index_of, whole_number
 from .errors import (
@@ -121,9 +121,8 @@ class Model(ABC):
 
     def __init__(self, **facts: Any) -> None:
         for name, value in facts.items():
-            if isinstance(value, np.ndarray):
-                value = read_only(value)
-            object.__setattr__(self, name, value)
+            constant = read_only(value) if isinstance(value, np.ndarray) else value
+            object.__setattr__(self, name, constant)
 
     def __setattr__(self, name: str, value: object) -> NoReturn:
         raise ReadOnlyError(
@@ -283,6 +282,24 @@ class Model(ABC):
         """Another Model; `options` are checked: bools, floats, (3,) and (nv,) arrays."""
 
 
+# By name, so that type checkers take the inputs for the descriptors below.
+_SLOTS = ("_home", "_model", "_trouble", "_alarms", "_advance", *INPUTS)
+
+if TYPE_CHECKING:
+
+    class _Input:
+        """An input as a type checker sees it: read as an array, assigned array-likes."""
+
+        def __get__(self, data: object, owner: object) -> Array: ...
+        def __set__(self, data: object, value: ArrayLike) -> None: ...
+
+    class _Time:
+        """The time as a type checker sees it."""
+
+        def __get__(self, data: object, owner: object) -> float: ...
+        def __set__(self, data: object, value: float) -> None: ...
+
+
 class Data(ABC):
     """Everything that changes: the state, the command, and what follows from them.
 
@@ -302,26 +319,23 @@ class Data(ABC):
 
     # `_model` is the owner while the Data is usable and None while it refuses, so
     # that a verb needs one comparison; `_home` is the owner for good.
-    __slots__ = ("_home", "_model", "_trouble", "_alarms", "_advance", "qpos", "qvel", "ctrl")
+    __slots__ = _SLOTS
 
     _home: Model
     _model: Model | None
     _trouble: str
     _alarms: list[Any]  # truthy when the engine has something to say
     _advance: Callable[[int], None]  # the engine's own step
-    qpos: Array
-    qvel: Array
-    ctrl: Array
+    if TYPE_CHECKING:
+        qpos = _Input()
+        qvel = _Input()
+        ctrl = _Input()
+        time = _Time()
 
     @property
     @abstractmethod
     def raw(self) -> Any:
         """The engine's own object, for what this interface does not offer."""
-
-    @property
-    @abstractmethod
-    def time(self) -> float:
-        """Simulated time [s]; may be assigned to."""
 
     @property
     @abstractmethod

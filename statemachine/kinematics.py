@@ -8,10 +8,10 @@ two agree, neither has copied from the other.
 from __future__ import annotations
 
 import os
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -224,6 +224,12 @@ def _read(pin: Any, path: Path) -> tuple[Any, list[str]]:
         if root.find("keyframe") is not None:
             reason += "; it has keyframes, which Pinocchio takes only where they fit the arm"
         raise ModelError(f"Pinocchio cannot read {path}: {reason}") from error
+    if root.tag == "mujoco":
+        # MuJoCo's qpos of a free body is its pose in the world, whatever pose the file
+        # gives the body; Pinocchio would put the one on top of the other.
+        for i, joint in enumerate(model.joints):
+            if joint.shortname().endswith("FreeFlyer"):
+                model.jointPlacements[i] = pin.SE3.Identity()
     in_file = _mjcf_joints(root) if root.tag == "mujoco" else list(model.names)[1:]
     return model, in_file
 

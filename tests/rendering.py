@@ -1,10 +1,17 @@
-"""Offscreen pictures for the tests; probed first, since a missing library kills the process."""
+"""Offscreen pictures for the tests, each in a process of its own.
+
+Which OpenGL is used is settled when MuJoCo is imported, and one that is missing kills
+the process: so the tests' own process stays out of it.
+"""
 
 from __future__ import annotations
 
-import functools
+import json
 import os
+import subprocess
+import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,27 +19,38 @@ import pytest
 
 from statemachine.report import doctor
 
-from .conftest import REQUIRED
+from .conftest import REQUIRED, ROOT
+
+POSES = ((0, 0, 0, 0, 0, 0.2), (0.3, -0.8, 0.9, 0.6, 0.4, 0.8))
+VIEWS = ((90, -5), (180, -10), (135, -30), (160, -80))
 
 
-@functools.cache
-def _probe() -> doctor.Finding:
-    return doctor._rendering()
+def rendering_environment() -> dict[str, str]:
+    """Environment in which MuJoCo renders; skips without one, or fails where CI wants it."""
+    found = doctor._rendering()
+    if not found.works:
+        if "render" in REQUIRED:
+            pytest.fail(f"STATEMACHINE_REQUIRE names render: {found.found}")
+        pytest.skip(found.found)
+    chosen = {"MUJOCO_GL": found.found.rpartition("=")[2]} if "=" in found.found else {}
+    return {**os.environ, **chosen, "PYTHONPATH": str(ROOT)}
 
 
-def need_rendering() -> None:
-    """Skip where nothing can be rendered, or fail where CI wants it."""
-    found = _probe()
-    if found.works:
-        if "MUJOCO_GL=" in found.found:
-            os.environ["MUJOCO_GL"] = found.found.rpartition("=")[2]
-        return
-    if "render" in REQUIRED:
-        pytest.fail(f"STATEMACHINE_REQUIRE names render: {found.found}")
-    pytest.skip(found.found)
+def overlaps_of_silhouettes(one: str | Path, other: str | Path) -> list[float]:
+    """Intersection over union of two arms' silhouettes, from several sides, in poses."""
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.rendering", str(one), str(other)],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        env=rendering_environment(),
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
 
 
-def silhouette(model: Any, qpos: Sequence[float], azimuth: float, elevation: float) -> np.ndarray:
+def _silhouette(model: Any, qpos: Sequence[float], azimuth: float, elevation: float) -> np.ndarray:
     """Where the arm is seen in a picture of 480 × 360, as a boolean mask."""
     import mujoco
 
@@ -50,3 +68,20 @@ def silhouette(model: Any, qpos: Sequence[float], azimuth: float, elevation: flo
         renderer.enable_segmentation_rendering()
         renderer.update_scene(data, camera, shown)
         return renderer.render()[..., 1] == int(mujoco.mjtObj.mjOBJ_GEOM)
+
+
+def main() -> None:
+    """Print the overlaps of two models as JSON."""
+    import statemachine as sm
+
+    models = [sm.load(name).raw for name in sys.argv[1:3]]
+    overlaps = []
+    for qpos in POSES:
+        for view in VIEWS:
+            one, other = (_silhouette(model, qpos, *view) for model in models)
+            overlaps.append(float((one & other).sum() / (one | other).sum()))
+    print(json.dumps(overlaps))
+
+
+if __name__ == "__main__":
+    main()

@@ -121,7 +121,8 @@ def test_no_contact_at_the_zero_pose() -> None:
 def test_meshes_are_what_the_script_makes(tmp_path: Path) -> None:
     folder = ARM.parent / "look"
     spec = importlib.util.spec_from_file_location("make_meshes", folder / "make_meshes.py")
-    assert spec and spec.loader
+    assert spec is not None
+    assert spec.loader is not None
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
     script.main(tmp_path)

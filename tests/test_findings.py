@@ -119,7 +119,7 @@ def test_another_handler_is_replaced_when_a_data_is_made() -> None:
             sm.step(model, data)
 
 
-def test_no_noise_and_no_log_file(capfd: pytest.CaptureFixture[str], tmp_path, monkeypatch) -> None:  # noqa: ANN001
+def test_no_noise_and_no_log_file(capfd: pytest.CaptureFixture[str], tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     model = sm.load("so101")
     with sm.make_data(model) as data:

@@ -118,17 +118,10 @@ def test_keyframe_pickup_is_the_public_one(menagerie: Path) -> None:
 
 @pytest.mark.slow
 def test_it_looks_like_an_so101(menagerie: Path) -> None:
-    from .rendering import need_rendering, silhouette
+    from .rendering import overlaps_of_silhouettes
 
-    need_rendering()
-    overlaps = []
-    for qpos in ((0, 0, 0, 0, 0, 0.2), (0.3, -0.8, 0.9, 0.6, 0.4, 0.8)):
-        for azimuth, elevation in ((90, -5), (180, -10), (135, -30), (160, -80)):
-            ours, public = (
-                silhouette(model.raw, qpos, azimuth, elevation)
-                for model in (sm.load("so101"), sm.load("so101", menagerie=menagerie))
-            )
-            overlaps.append((ours & public).sum() / (ours | public).sum())
+    overlaps = overlaps_of_silhouettes("so101", menagerie / "robotstudio_so101" / "so101.xml")
+    assert len(overlaps) == 8
     assert min(overlaps) > 0.93
     assert np.mean(overlaps) > 0.96
 

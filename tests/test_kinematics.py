@@ -148,7 +148,7 @@ def test_a_urdf_is_read_too(tmp_path: Path) -> None:
         ("<mujoco><worldbody/></mujoco>", "0 root bodies"),
         (
             f"<mujoco><worldbody><body name='a'>{BODY}<joint name='j'/></body></worldbody>"
-            "<keyframe><key qpos='0 0 0'/></keyframe></mujoco>",
+            "<keyframe><key name='k' qpos='0 0 0'/></keyframe></mujoco>",
             "keyframes",
         ),
         (
@@ -191,4 +191,4 @@ def test_bad_input_is_refused() -> None:
 def test_a_zero_quaternion_is_refused(tmp_path: Path) -> None:
     kinematics = sm.Kinematics(_write(tmp_path, ZOO))
     with pytest.raises(BadInputError, match="zero"):
-        kinematics.pose(np.zeros(13), "s")
+        kinematics.pose(np.zeros(kinematics.nq), "s")

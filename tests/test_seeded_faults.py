@@ -29,7 +29,9 @@ def replaced(owner: type, name: str) -> Callable[[Callable[..., Any]], Patch]:
         def apply(monkeypatch: pytest.MonkeyPatch) -> None:
             old = owner.__dict__[name]
             if isinstance(old, property):
-                new: Any = property(lambda self: function(self, lambda: old.fget(self)))
+                assert old.fget is not None
+                get = old.fget
+                new: Any = property(lambda self: function(self, lambda: get(self)))
             else:
                 new = _bound(function, old)
             monkeypatch.setattr(owner, name, new)
@@ -249,7 +251,7 @@ def fresh_arrays_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def faulty(self: MujocoData, key: int | None) -> None:
         right(self, key)
-        object.__setattr__(self, "qpos", self.raw.qpos)
+        object.__setattr__(self, "qpos", self.raw.qpos[:])
 
     monkeypatch.setattr(MujocoData, "_reset", faulty)
 

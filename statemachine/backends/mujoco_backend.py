@@ -235,21 +235,10 @@ def _ranges(ranges: Array, limited: Any) -> Array:
     return np.where(limited[:, None].astype(bool), ranges, [-np.inf, np.inf])
 
 
-def _view(name: str) -> Any:
-    """A property that shows one array of the MjData, read-only."""
-
-    def read(self: MujocoData) -> Array:
-        if self._model is None:
-            self._refuse_if_troubled()
-        return self._views[name]
-
-    return property(read)
-
-
 class MujocoData(Data):
     """An MjData. Inputs and derived arrays are views of its memory."""
 
-    __slots__ = ("_raw", "_views", "_layout")
+    __slots__ = ("_layout", "_raw", "_views")
 
     _raw: mujoco.MjData | None
     _views: dict[str, Array]
@@ -271,15 +260,41 @@ class MujocoData(Data):
             view.setflags(write=False)
         self._recover()
 
-    xpos = _view("xpos")
-    xquat = _view("xquat")
-    site_xpos = _view("site_xpos")
-    site_xmat = _view("site_xmat")
-    qacc = _view("qacc")
-    qfrc_bias = _view("qfrc_bias")
-    qfrc_actuator = _view("qfrc_actuator")
-    qfrc_passive = _view("qfrc_passive")
-    qfrc_constraint = _view("qfrc_constraint")
+    @property
+    def xpos(self) -> Array:
+        return self._view("xpos")
+
+    @property
+    def xquat(self) -> Array:
+        return self._view("xquat")
+
+    @property
+    def site_xpos(self) -> Array:
+        return self._view("site_xpos")
+
+    @property
+    def site_xmat(self) -> Array:
+        return self._view("site_xmat")
+
+    @property
+    def qacc(self) -> Array:
+        return self._view("qacc")
+
+    @property
+    def qfrc_bias(self) -> Array:
+        return self._view("qfrc_bias")
+
+    @property
+    def qfrc_actuator(self) -> Array:
+        return self._view("qfrc_actuator")
+
+    @property
+    def qfrc_passive(self) -> Array:
+        return self._view("qfrc_passive")
+
+    @property
+    def qfrc_constraint(self) -> Array:
+        return self._view("qfrc_constraint")
 
     @property
     def raw(self) -> mujoco.MjData:
@@ -317,6 +332,11 @@ class MujocoData(Data):
     @property
     def qfrc_limit(self) -> Array:
         return self._constraint_part("limit")
+
+    def _view(self, name: str) -> Array:
+        if self._model is None:
+            self._refuse_if_troubled()
+        return self._views[name]
 
     def _constraint_part(self, part: str) -> Array:
         self._refuse_if_troubled()

@@ -103,7 +103,9 @@ def require_close(got: Any, expected: Any, within: float, what: str) -> None:
     require(bool(gap <= within), f"{what}: off by {gap:.3e}, allowed {within:.1e}")
 
 
-def require_raises(kinds: type[Exception] | tuple[type[Exception], ...], call: Callable[[], Any]) -> Exception:
+def require_raises(
+    kinds: type[Exception] | tuple[type[Exception], ...], call: Callable[[], Any]
+) -> Exception:
     """The call raises one of these errors, whose message is not empty."""
     try:
         call()

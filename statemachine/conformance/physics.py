@@ -33,8 +33,9 @@ def check_the_servo_law(lab: Lab) -> None:
         data.qvel[:] = random.uniform(-0.2, 0.2, 6)
         data.ctrl[:] = data.qpos + scale * random.uniform(-1, 1, 6)
         forward(model, data)
-        require_close(data.qfrc_actuator, servo(model, data.qpos, data.qvel, data.ctrl), 1e-9,
-                      "qfrc_actuator")
+        require_close(
+            data.qfrc_actuator, servo(model, data.qpos, data.qvel, data.ctrl), 1e-9, "qfrc_actuator"
+        )
 
 
 def servo(model: Model, qpos: Array, qvel: Array, ctrl: Array) -> Array:
@@ -215,7 +216,7 @@ def check_options_do_what_they_say(lab: Lab) -> None:
 def check_unsupported_is_said(lab: Lab) -> None:
     """What the capability record does not list raises UnsupportedError, with the facts."""
     model = lab.arm
-    for name in set(("armature", "substeps", "limits")) - set(model.capabilities.options):
+    for name in {"armature", "substeps", "limits"} - set(model.capabilities.options):
         try:
             model.replace(**{name: 1})
         except UnsupportedError as error:

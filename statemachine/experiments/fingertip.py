@@ -15,7 +15,7 @@ import numpy as np
 from ..checks import as_count
 from ..errors import BadInputError
 from ..interface import Model
-from ..kinematics import Kinematics, Pose
+from ..kinematics import Kind, Kinematics, Pose
 from ..records import Array, JointType
 from ..rotations import angle_between, matrix_from_quat
 from ..verbs import forward, make_data
@@ -144,7 +144,7 @@ def run(
     )
 
 
-def _find_frame(kinematics: Kinematics, name: str) -> tuple[str, str]:
+def _find_frame(kinematics: Kinematics, name: str) -> tuple[str, Kind]:
     """A site of an MJCF, or a link of a URDF."""
     try:
         kinematics.definition(name, "site")

@@ -113,7 +113,7 @@ def run(
 def _once(
     model: Model, ctrl: Array, nstep: int, break_with: str | None, progress: Progress
 ) -> tuple[Array, Ints, dict[str, int]]:
-    """qpos after each step (n+1, nq), contacts of each step (n,), steps by body pair."""
+    """Qpos after each step (n+1, nq), contacts of each step (n,), steps by body pair."""
     poses, counts, pairs = [], [], Counter[str]()
     with make_data(model) as data:
         reset(model, data, keyframe=0)

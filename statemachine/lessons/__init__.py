@@ -89,7 +89,7 @@ LESSONS = {
         ),
         Lesson(
             "replay",
-            "The same start, the same commands: the same bits?",
+            "Same start, same commands: the same bits?",
             "so101/scene_box",
             (
                 Option("--steps", 600, "steps of each run", int),

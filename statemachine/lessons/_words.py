@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from .page import Page
@@ -41,16 +41,16 @@ def millimetres(metres: float, digits: int = 2) -> str:
     return f"{metres * 1e3:.{digits}f} mm"
 
 
-def vector(values: Sequence[float], digits: int = 4) -> str:
+def vector(values: Iterable[float], digits: int = 4) -> str:
     """Components in brackets; what rounds to zero has no sign."""
     return "[" + " ".join(f"{round(float(v), digits) + 0.0:.{digits}f}" for v in values) + "]"
 
 
 def count(number: int, thing: str) -> str:
-    """"1 step", "2 steps"."""
+    """A number of things: 1 step, 2 steps."""
     return f"{number:,} {thing}" + ("" if number == 1 else "s")
 
 
 def where(results: Mapping[str, Any], backend: str) -> str:
-    """"mujoco: " where several engines are shown, else nothing."""
+    """The prefix "mujoco: " where several engines are shown, else nothing."""
     return f"{backend}: " if len(results) > 1 else ""

@@ -48,8 +48,6 @@ def page(results: Mapping[str, forward.Forward]) -> Page:
         )
         unmoved = all(reading.time == result.readings[0].time for reading in result.readings)
         blocks.append(
-            Verdict(
-                f"{where(results, name)}data.time is the same in all four readings", unmoved
-            )
+            Verdict(f"{where(results, name)}data.time is the same in all four readings", unmoved)
         )
     return page_of("The arm that is nowhere", results, blocks)

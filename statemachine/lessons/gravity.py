@@ -23,9 +23,7 @@ _REST = 1e-3
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> gravity.Gravity:
     """Servos on, servos off."""
-    return gravity.run(
-        model, seconds=options["seconds"], joint=options["joint"], progress=progress
-    )
+    return gravity.run(model, seconds=options["seconds"], joint=options["joint"], progress=progress)
 
 
 def page(results: Mapping[str, gravity.Gravity]) -> Page:

@@ -62,7 +62,9 @@ def page(diagnosis: Diagnosis) -> Page:
         (finding.name, ("works" if finding.works else "missing"), finding.found)
         for finding in diagnosis.findings
     ]
-    blocks = [Table(("", "", "found"), rows, title="What this machine has", words=frozenset({0, 1, 2}))]
+    blocks = [
+        Table(("", "", "found"), rows, title="What this machine has", words=frozenset({0, 1, 2}))
+    ]
     steps = [f"{f.name}: {f.next_step}" for f in diagnosis.findings if f.next_step]
     return Page(
         "statemachine doctor",
@@ -139,9 +141,7 @@ def _clash() -> Finding:
     )
 
 
-def _run(
-    code: str, environment: dict[str, str] | None = None
-) -> subprocess.CompletedProcess[str]:
+def _run(code: str, environment: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-c", code],
         capture_output=True,

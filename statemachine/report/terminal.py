@@ -10,6 +10,10 @@ from ..lessons.page import Code, Page, Table, Text, Verdict
 if TYPE_CHECKING:
     from rich.console import Console
 
+# Spellings for a terminal that has no Unicode; what is not here becomes a question mark.
+_ASCII = str.maketrans(
+    {"−": "-", "–": "-", "×": "x", "·": "*", "°": " deg", "µ": "u", "Δ": "d", "\u0307": "'"}
+)
 _WIDTH_PIPED = 80
 _WIDTH_MOST = 100
 
@@ -26,6 +30,8 @@ def show(page: Page) -> None:
     text = captured.get()
     if piped:  # cells are padded with blanks that only a terminal needs
         text = "\n".join(line.rstrip() for line in text.splitlines()) + "\n"
+    if _plain():
+        text = text.translate(_ASCII)
     sys.stdout.write(text)
     sys.stdout.flush()
 
@@ -33,7 +39,7 @@ def show(page: Page) -> None:
 def _print(console: Console, page: Page) -> None:
     from rich.markup import escape
 
-    plain = (sys.stdout.encoding or "utf-8").lower().replace("-", "") != "utf8"
+    plain = _plain()
     good, bad = ("yes", "NO ") if plain else ("✓", "✗")
     console.print()
     console.print(f"[bold]{escape(page.title)}[/]")
@@ -59,6 +65,11 @@ def _print(console: Console, page: Page) -> None:
     console.print()
 
 
+def _plain() -> bool:
+    """Whether standard output cannot take more than ASCII."""
+    return (sys.stdout.encoding or "utf-8").lower().replace("-", "") != "utf8"
+
+
 def _grid(block: Table, plain: bool) -> object:
     from rich import box
     from rich.markup import escape
@@ -70,7 +81,9 @@ def _grid(block: Table, plain: bool) -> object:
         show_edge=False,
     )
     for k, header in enumerate(block.headers):
-        grid.add_column(escape(header), justify="left" if k in block.words else "right", overflow="fold")
+        grid.add_column(
+            escape(header), justify="left" if k in block.words else "right", overflow="fold"
+        )
     for k, row in enumerate(block.rows):
         grid.add_row(*map(escape, row), style="bold" if k in block.emphasis else None)
     return grid

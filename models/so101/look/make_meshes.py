@@ -8,6 +8,7 @@ after a change to look.xml. A test runs it and compares.
 
 from __future__ import annotations
 
+import itertools
 import struct
 import sys
 from pathlib import Path
@@ -41,7 +42,7 @@ def turned(profile: list[tuple[float, float]], segments: int) -> np.ndarray:
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     rings = [np.column_stack([r * circle, np.full(segments, z)]) for r, z in profile]
     faces = []
-    for low, high in zip(rings, rings[1:], strict=False):
+    for low, high in itertools.pairwise(rings):
         for i in range(segments):
             j = (i + 1) % segments
             faces += [(low[i], low[j], high[j]), (low[i], high[j], high[i])]

@@ -1,0 +1,130 @@
+"""What the interface costs, against the engine alone: `make bench`.
+
+Every figure is a ratio, taken in one process and in turns; the null is the baseline
+against itself. A null that is far from 1 says that this machine is too noisy now.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+
+import statemachine as sm
+from benchmarks.interleave import Ratio, interleaved
+from statemachine import __version__
+
+STEPS = 500
+
+
+def _loop(call: Callable[[], object]) -> Callable[[], None]:
+    def run() -> None:
+        for _ in range(STEPS):
+            call()
+
+    return run
+
+
+def step(name: str, rounds: int) -> list[Ratio]:
+    """`sm.step` against `mj_step`, one step at a time."""
+    model = sm.load(name)
+    ours, theirs = sm.make_data(model), sm.make_data(model)
+    raw_model, raw_data = model.raw, theirs.raw
+
+    def raw() -> None:
+        call = mujoco.mj_step
+        for _ in range(STEPS):
+            call(raw_model, raw_data)
+
+    def interface() -> None:
+        call = sm.step
+        for _ in range(STEPS):
+            call(model, ours)
+
+    return interleaved(raw, {f"sm.step, {name}": interface}, rounds)
+
+
+def bulk(name: str, rounds: int) -> list[Ratio]:
+    """`sm.step(…, n)` against `mj_step(…, n)`."""
+    model = sm.load(name)
+    ours, theirs = sm.make_data(model), sm.make_data(model)
+    return interleaved(
+        lambda: mujoco.mj_step(model.raw, theirs.raw, STEPS),
+        {f"sm.step in bulk, {name}": lambda: sm.step(model, ours, STEPS)},
+        rounds,
+    )
+
+
+def control_loop(name: str, rounds: int) -> list[Ratio]:
+    """Write ctrl, step, read a joint: the raw idiom against ours."""
+    model = sm.load(name)
+    ours, theirs = sm.make_data(model), sm.make_data(model)
+    raw_model, raw_data = model.raw, theirs.raw
+    target = np.zeros(model.nu)
+
+    def raw() -> None:
+        for _ in range(STEPS):
+            raw_data.ctrl[:] = target
+            mujoco.mj_step(raw_model, raw_data)
+            _ = raw_data.qpos[1]
+
+    def interface() -> None:
+        for _ in range(STEPS):
+            ours.ctrl[:] = target
+            sm.step(model, ours)
+            _ = ours.qpos[1]
+
+    return interleaved(raw, {f"control loop, {name}": interface}, rounds)
+
+
+def kinematics(name: str, rounds: int) -> list[Ratio]:
+    """A batch of poses by Pinocchio against a loop of `mj_kinematics`."""
+    model = sm.load(name)
+    witness = sm.Kinematics(name)
+    data, tip = mujoco.MjData(model.raw), model.site_id("gripperframe")
+    poses = np.random.default_rng(0).uniform(-1, 1, (STEPS, model.nq))
+
+    def raw() -> None:
+        positions, matrices = np.empty((STEPS, 3)), np.empty((STEPS, 9))
+        qpos, pos, mat = data.qpos, data.site_xpos[tip], data.site_xmat[tip]
+        for k in range(STEPS):
+            qpos[:] = poses[k]
+            mujoco.mj_kinematics(model.raw, data)
+            positions[k] = pos
+            matrices[k] = mat
+
+    return interleaved(
+        raw,
+        {f"batch of poses by Pinocchio, {name}": lambda: witness.poses(poses, "gripperframe")},
+        rounds,
+    )
+
+
+# What DESIGN asks of each: at most this, measured on a quiet machine.
+BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float]] = [
+    (step, "so101", 1.02),
+    (step, "so101/scene_box", 1.02),
+    (bulk, "so101", 1.005),
+    (control_loop, "so101", 1.0),
+    (kinematics, "so101", 0.8),
+]
+
+
+def main() -> None:
+    """Print the budget and the measured ratios."""
+    parser = argparse.ArgumentParser(prog="make bench", description=__doc__)
+    parser.add_argument("--rounds", type=int, default=300, help="how often each is called")
+    rounds = parser.parse_args().rounds
+    print(f"statemachine {__version__}, MuJoCo {mujoco.__version__}, {rounds} rounds in turns")
+    print(f"{'':44}{'median':>8}{'middle half':>18}{'budget':>8}")
+    for measure, name, budget in BUDGET:
+        for ratio in measure(name, rounds):
+            limit = "" if "null" in ratio.name else f"{budget:.3f}"
+            spread = f"{ratio.low:.3f} to {ratio.high:.3f}"
+            print(f"{ratio.name:44}{ratio.median:8.3f}{spread:>18}{limit:>8}")
+
+
+if __name__ == "__main__":
+    main()

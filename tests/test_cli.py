@@ -1,0 +1,326 @@
+"""The command line, end to end, each time in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from statemachine.lessons import LESSONS
+
+from .conftest import Cli, need_engine
+
+QUICK = {"speed": ("--steps", "200")}
+
+
+def _json(cli: Cli, *arguments: str) -> Any:
+    done = cli(*arguments, "--json")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    return json.loads(done.stdout, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
+
+
+@pytest.mark.parametrize("lesson", LESSONS)
+def test_every_lesson_runs_and_reads_well_piped(cli: Cli, lesson: str, backend: str) -> None:
+    done = cli("lesson", lesson, "--backend", backend, *QUICK.get(lesson, ()))
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    lines = done.stdout.splitlines()
+    assert len(lines) > 8
+    assert max(map(len, lines)) <= 80
+    assert all(line == line.rstrip() for line in lines)
+    assert "\x1b" not in done.stdout
+    assert "✗" not in done.stdout
+    assert "nan" not in done.stdout.lower().split()
+
+
+@pytest.mark.parametrize("lesson", LESSONS)
+def test_every_lesson_speaks_json_with_its_provenance(cli: Cli, lesson: str, backend: str) -> None:
+    found = _json(cli, "lesson", lesson, "--backend", backend, *QUICK.get(lesson, ()))
+    made = found[backend]["provenance"]
+    assert made["backend"] == backend
+    assert made["versions"].keys() >= {"statemachine", backend, "numpy", "python"}
+    assert re.fullmatch(r"[0-9a-f]{64}", made["model_sha256"])
+    assert made["model_file"] == LESSONS[lesson].model + ".xml"
+    assert made["timestep"] == 0.005
+
+
+def test_all_backends_at_once(cli: Cli) -> None:
+    done = cli("lesson", "state", "--backend", "all")
+    assert done.returncode == 0, done.stderr
+    assert "mujoco" in done.stdout
+
+
+def test_state(cli: Cli) -> None:
+    found = _json(cli, "lesson", "state")["mujoco"]
+    assert [found[name] for name in ("nq", "nv", "nu", "nbody")] == [13, 12, 6, 10]
+    box = found["joints"][-1]
+    assert box["type"] == "free"
+    assert (box["qpos_start"], box["qpos_stop"]) == (6, 13)
+    assert (box["qvel_start"], box["qvel_stop"]) == (6, 12)
+    assert found["keyframe_time"] != 0.0
+    page = cli("lesson", "state").stdout
+    assert "[6:13]" in page
+    assert "[6:12]" in page
+
+
+def test_forward(cli: Cli) -> None:
+    found = _json(cli, "lesson", "forward")["mujoco"]
+    tips = [reading["fingertip"] for reading in found["readings"]]
+    assert tips[0] == [0.0, 0.0, 0.0]
+    assert tips[1] == tips[2] != tips[3]
+    assert found["equal"] == [[1, 2]]
+    assert {reading["time"] for reading in found["readings"]} == {0.0}
+    page = cli("lesson", "forward").stdout
+    assert "[0.3914 -0.0010 0.2463]" in page
+    assert "270.5 mm" in page
+
+
+def test_forward_with_another_joint_and_no_movement(cli: Cli) -> None:
+    found = _json(cli, "lesson", "forward", "--joint", "gripper", "--value", "0.5")["mujoco"]
+    # The moving jaw does not carry the fingertip, so three readings are equal.
+    assert found["equal"] == [[1, 2], [1, 3], [2, 3]]
+    assert "✗" in cli("lesson", "forward", "--joint", "gripper").stdout
+
+
+def test_gravity_prints_the_table_of_the_course(cli: Cli) -> None:
+    page = cli("lesson", "gravity").stdout
+    for row in ("0.000° 0.00°", "0.033° 23.88°", "0.033° 23.89°", "0.033° 23.90°", "0.033° 23.92°"):
+        assert re.search(row.replace(" ", r"\s+").replace(".", r"\."), page), row
+    found = _json(cli, "lesson", "gravity")["mujoco"]
+    off = found["servos_off"]
+    # The floor holds the fallen arm, not damping or dry friction.
+    assert off["forces"]["contact"] / off["forces"]["bias"] > 0.95
+    assert abs(off["forces"]["friction"]) < 0.052
+    assert 0.5 < off["first_contact"] < 1.0
+    assert off["touching"]
+    for run in (found["servos_on"], off):
+        assert abs(run["forces"]["total"]) < 1e-5
+    assert found["servos_on"]["forces"]["contact"] == 0.0
+    assert "the contact carries" in page
+
+
+def test_gravity_beyond_four_seconds_creeps(cli: Cli) -> None:
+    found = _json(cli, "lesson", "gravity", "--seconds", "100")["mujoco"]["servos_off"]
+    angles = dict(zip(found["time"], map(math.degrees, found["angle"]), strict=True))
+    times = sorted(angles)
+    assert times[-1] == pytest.approx(100)
+    assert angles[times[-1]] > 45
+
+
+def test_hold(cli: Cli) -> None:
+    found = _json(cli, "lesson", "hold")["mujoco"]
+    assert max(found["lag"]) == pytest.approx(9.95e-3, abs=0.02e-3)
+    assert len(found["error"]) == 401
+    assert math.degrees(found["error"][-1]) < 1.5
+    assert "9.95" in cli("lesson", "hold").stdout
+
+
+def test_hold_another_target(cli: Cli) -> None:
+    found = _json(cli, "lesson", "hold", "--target=-0.1,0,0,0,0,0", "--seconds", "1")["mujoco"]
+    assert found["target"][0] == -0.1
+    assert abs(found["qpos"][-1][0] + 0.1) < 0.01
+
+
+def test_replay(cli: Cli) -> None:
+    found = _json(cli, "lesson", "replay")["mujoco"]
+    assert found["identical"] is True
+    assert max(found["difference"]) == 0.0
+    assert len(found["contacts"]) == 600
+    assert 8 <= min(found["contacts"]) <= max(found["contacts"]) <= 12
+    assert set(found["pairs"].values()) == {600}
+    assert found["travel"] > 0.3
+
+
+@pytest.mark.parametrize("way", ["extra-step", "late-ctrl"])
+def test_replay_broken(cli: Cli, way: str) -> None:
+    found = _json(cli, "lesson", "replay", "--break", way)["mujoco"]
+    assert found["identical"] is False
+    assert max(found["difference"]) > 1e-3
+    assert found["difference"][-1] > 0.0
+    page = cli("lesson", "replay", "--break", way).stdout
+    assert "How far the two runs are apart" in page
+
+
+def test_speed(cli: Cli) -> None:
+    found = _json(cli, "lesson", "speed", "--steps", "1000")["mujoco"]
+    assert found["simulated"] == pytest.approx(5.0)
+    assert found["bulk_factor"] == pytest.approx(found["simulated"] / found["bulk"])
+
+
+def test_lessons_on_the_public_scenes(cli: Cli, menagerie: Path) -> None:
+    page = cli("lesson", "gravity", "--menagerie", str(menagerie)).stdout
+    assert "robotstudio_so101/scene.xml" in page
+    assert re.search(r"0\.033°\s+23\.92°", page)
+    inside = cli("lesson", "state", MENAGERIE=str(menagerie / "robotstudio_so101"))
+    assert "'pickup'" in inside.stdout
+    for lesson in LESSONS:
+        done = cli("lesson", lesson, "--menagerie", str(menagerie), *QUICK.get(lesson, ()))
+        assert done.returncode == 0, done.stderr
+
+
+def test_fingertip_certificate(cli: Cli, pinocchio: None) -> None:
+    found = _json(cli, "fingertip", "--poses", "300", "--seed", "3")["mujoco"]
+    assert found["poses"] == 300
+    assert found["provenance"]["seed"] == 3
+    assert found["agrees"] is True
+    assert found["position_worst"] <= 1e-12
+    assert found["rotation_worst"] <= 1e-12
+    assert _json(cli, "fingertip", "--poses", "300", "--seed", "3")["mujoco"] == found
+    page = cli("fingertip").stdout
+    assert "✓ agrees with the witness" in page
+
+
+def test_fingertip_of_the_public_arm(cli: Cli, menagerie: Path, pinocchio: None) -> None:
+    arm = menagerie / "robotstudio_so101" / "so101.xml"
+    done = cli("fingertip", "--model", str(arm))
+    assert done.returncode == 0, done.stderr
+
+
+def test_fingertip_refuses_another_frame(cli: Cli, tmp_path: Path, pinocchio: None) -> None:
+    from statemachine.models import models_dir
+
+    text = (models_dir() / "so101" / "so101.xml").read_text()
+    site = 'name="gripperframe" pos="0.012 -0.000218 -0.098127" quat="0.7071067811865475 0 '
+    assert site in text
+    text = re.sub(r"<mesh name.*\n|<geom class=\"look\".*\n", "", text)
+    # 19.9 mm along z and a quarter turn less.
+    other = site.replace("-0.098127", "-0.078227").replace(
+        'quat="0.7071067811865475 0 ', 'quat="1 0 '
+    )
+    file = tmp_path / "other.xml"
+    file.write_text(text.replace(site + "0.7071067811865475 0", other + "0 0"))
+    done = cli("fingertip", "--witness", str(file))
+    assert done.returncode == 1
+    assert "19.90 mm, 90.00°" in done.stdout
+    assert "refused" in done.stdout
+    found = json.loads(cli("fingertip", "--witness", str(file), "--json").stdout)["mujoco"]
+    assert found["agrees"] is False
+    assert found["position_worst"] is None
+
+
+def test_fingertip_notices_other_kinematics(cli: Cli, tmp_path: Path, pinocchio: None) -> None:
+    from statemachine.models import models_dir
+
+    text = (models_dir() / "so101" / "so101.xml").read_text()
+    text = re.sub(r"<mesh name.*\n|<geom class=\"look\".*\n", "", text)
+    longer = tmp_path / "longer.xml"
+    assert 'pos="-0.11257 -0.028 0"' in text
+    longer.write_text(text.replace('pos="-0.11257 -0.028 0"', 'pos="-0.11258 -0.028 0"'))
+    done = cli("fingertip", "--witness", str(longer))
+    assert done.returncode == 1
+    assert "DISAGREES" in done.stdout
+    assert "1.0e-05" in done.stdout
+
+
+def test_fingertip_of_a_scene_with_the_arm_as_witness(cli: Cli, pinocchio: None) -> None:
+    refused = cli("fingertip", "--model", "so101/scene_box")
+    assert refused.returncode == 2
+    assert "<include>" in refused.stderr
+    done = cli("fingertip", "--model", "so101/scene_box", "--witness", "so101")
+    assert done.returncode == 0, done.stderr
+
+
+def test_alone_it_lists_the_lessons_in_order(cli: Cli) -> None:
+    done = cli()
+    assert done.returncode == 0
+    places = [done.stdout.index(f"statemachine lesson {name}") for name in LESSONS]
+    assert places == sorted(places)
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    assert cli("lesson").stdout == done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (("lesson", "gravty"), "Did you mean gravity?"),
+        (("lessn",), "Did you mean lesson?"),
+        (("lesson", "gravity", "--backend", "mujcoo"), "Did you mean 'mujoco'?"),
+        (("lesson", "gravity", "--model", "so101/scen"), "Did you mean 'so101/scene'?"),
+        (("lesson", "gravity", "--model", "nowhere.xml"), "does not exist"),
+        (("lesson", "gravity", "--menagerie", "nowhere"), "does not exist"),
+        (("lesson", "gravity", "--joint", "elbow"), "elbow_flex"),
+        (("lesson", "gravity", "--seconds", "-1"), "above 0"),
+        (("lesson", "gravity", "--seconds", "nan"), "above 0"),
+        (("lesson", "gravity", "--seconds", "inf"), "above 0"),
+        (("lesson", "gravity", "--seconds", "long"), "invalid float"),
+        (("lesson", "forward", "--value", "nan"), "not a finite number"),
+        (("lesson", "forward", "--joint", "box", "--model", "so101/scene_box"), "neither a hinge"),
+        (("lesson", "hold", "--target", "1,2"), "6 numbers"),
+        (("lesson", "hold", "--target", "a,b"), "not a list of numbers"),
+        (("lesson", "hold", "--target", "-1,2"), "--target=-1"),
+        (("lesson", "replay", "--steps", "0"), "at least 1"),
+        (("lesson", "replay", "--break", "legs"), "extra-step"),
+        (("lesson", "replay", "--model", "so101"), "no keyframe"),
+        (("lesson", "replay", "--ctrl", "1,nan,0,0,0,0"), "not a finite number"),
+        (("lesson", "speed", "--steps", "1.5"), "invalid int"),
+        (("fingertip", "--poses", "0"), "at least 1"),
+        (("fingertip", "--seed", "-1"), "negative"),
+        (("fingertip", "--site", "tip"), "gripperframe"),
+        (("--colour",), "unrecognized"),
+    ],
+)
+def test_every_mistake_is_one_clear_line(cli: Cli, arguments: tuple[str, ...], word: str) -> None:
+    if arguments[0] == "fingertip":
+        need_engine("pinocchio")
+    done = cli(*arguments)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert len(done.stderr.splitlines()) == 1, done.stderr
+    assert word in done.stderr
+    assert done.stderr.startswith("statemachine")
+
+
+@pytest.mark.parametrize(
+    "content", ["", "<mujoco", "<mujoco><worldbody><geom/></worldbody></mujoco>"]
+)
+def test_malformed_models_are_one_clear_line(cli: Cli, tmp_path: Path, content: str) -> None:
+    file = tmp_path / "bad.xml"
+    file.write_text(content)
+    done = cli("lesson", "state", "--model", str(file))
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1, done.stderr
+    assert "bad.xml" in done.stderr
+
+
+def test_a_pipe_that_closes_early_is_no_error(cli: Cli, tmp_path: Path) -> None:
+    import subprocess
+    import sys
+
+    from .conftest import ROOT
+
+    done = subprocess.run(
+        ["sh", "-c", f"{sys.executable} -m statemachine lesson state | head -1"],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env={"PATH": "/usr/bin:/bin", "PYTHONPATH": str(ROOT)},
+        check=False,
+    )
+    assert done.stderr == ""
+
+
+def test_a_terminal_without_unicode(cli: Cli) -> None:
+    done = cli("lesson", "gravity", PYTHONUTF8="0", PYTHONIOENCODING="ascii:strict", LC_ALL="C")
+    assert done.returncode == 0, done.stderr
+    assert "23.92" in done.stdout
+
+
+def test_doctor(cli: Cli) -> None:
+    findings = {f["name"]: f for f in json.loads(cli("doctor", "--json").stdout)["findings"]}
+    assert findings.keys() == {
+        "python", "mujoco", "pybullet", "pinocchio", "rendering", "import name",
+    }  # fmt: skip
+    assert findings["mujoco"]["works"]
+    page = cli("doctor").stdout
+    assert max(map(len, page.splitlines())) <= 80
+
+
+def test_version(cli: Cli) -> None:
+    from statemachine import __version__
+
+    assert cli("--version").stdout.split() == ["statemachine", __version__]

@@ -1,0 +1,193 @@
+"""From a name to a file, and from a file to a Model."""
+
+from __future__ import annotations
+
+import pickle
+import stat
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine import backends, errors
+from statemachine.models import models_dir, resolve
+
+
+def test_names() -> None:
+    arm = models_dir() / "so101" / "so101.xml"
+    assert resolve("so101") == resolve("so101/so101") == arm
+    assert resolve("so101/scene").name == "scene.xml"
+    assert resolve(str(arm)) == resolve(arm) == arm
+
+
+def test_paths_are_made_absolute(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.xml").write_text("<mujoco/>")
+    monkeypatch.chdir(tmp_path)
+    assert resolve("a.xml") == tmp_path / "a.xml"
+
+
+def test_a_menagerie_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    home = tmp_path / "robotstudio_so101"
+    home.mkdir()
+    for name in ("so101.xml", "scene.xml"):
+        (home / name).write_text("<mujoco/>")
+    for root in (tmp_path, home):
+        assert resolve("so101/scene", root) == home / "scene.xml"
+        assert resolve("so101", root) == home / "so101.xml"
+        assert resolve("robotstudio_so101/scene", root) == home / "scene.xml"
+    with pytest.raises(errors.UnknownNameError, match="Did you mean 'robotstudio_so101/scene'"):
+        resolve("so101/scen", tmp_path)
+    monkeypatch.setenv("MENAGERIE", str(tmp_path))
+    assert resolve("robotstudio_so101/scene") == home / "scene.xml"
+    # Our own names stay ours, whatever the environment says.
+    assert resolve("so101/scene") == models_dir() / "so101" / "scene.xml"
+
+
+@pytest.mark.parametrize("name", ["", " ", "\0", "a\0.xml", "nowhere.xml", "nowhere/so101.xml"])
+def test_no_such_file(name: str) -> None:
+    with pytest.raises(errors.ModelFileError):
+        resolve(name)
+
+
+def test_a_folder_or_another_suffix_is_no_model(tmp_path: Path) -> None:
+    folder = tmp_path / "robot.xml"
+    folder.mkdir()
+    with pytest.raises(errors.ModelFileError, match="folder"):
+        resolve(folder)
+    text = tmp_path / "robot.txt"
+    text.write_text("hello")
+    with pytest.raises(errors.ModelFileError, match=r"\.xml"):
+        resolve(text)
+
+
+@pytest.mark.parametrize("name", ["so101/scen", "so10", "scene", "../so101", "so101/../so101"])
+def test_no_such_name(name: str) -> None:
+    with pytest.raises(errors.UnknownNameError):
+        resolve(name)
+
+
+@pytest.mark.parametrize(
+    "content",
+    ["", "<mujoco", "<robot", "<mujoco><worldbody><body><geom/></body></worldbody></mujoco>",
+     "\x00\x01\x02", "<mujoco><include file='gone.xml'/></mujoco>",
+     "<mujoco><asset><mesh file='gone.stl'/></asset></mujoco>"],
+)  # fmt: skip
+def test_malformed_files(tmp_path: Path, content: str, capfd: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "bad.xml"
+    file.write_text(content)
+    with pytest.raises(errors.ModelError) as caught:
+        sm.load(file)
+    assert str(file) in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_broken_binary_model(tmp_path: Path) -> None:
+    file = tmp_path / "bad.mjb"
+    file.write_bytes(b"nonsense" * 10)
+    with pytest.raises(errors.ModelError):
+        sm.load(file)
+
+
+def test_a_binary_model(tmp_path: Path) -> None:
+    import mujoco
+
+    file = tmp_path / "arm.mjb"
+    mujoco.mj_saveModel(sm.load("so101").raw, str(file))
+    assert sm.load(file).nq == 6
+
+
+def test_a_file_with_a_unicode_name_and_spaces(tmp_path: Path) -> None:
+    file = tmp_path / "Ärm № 1.xml"
+    file.write_text("<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>")
+    assert sm.load(file).nq == 1
+
+
+def test_load_checks_its_words() -> None:
+    with pytest.raises(errors.UnknownNameError, match="Did you mean 'mujoco'"):
+        sm.load("so101", backend="mujcoo")
+    with pytest.raises(errors.UnknownNameError):
+        sm.load("so101", defaults="mine")  # pyright: ignore[reportArgumentType]
+    with pytest.raises(TypeError):
+        sm.load(3)  # pyright: ignore[reportArgumentType]
+
+
+def test_a_model_survives_a_pickle(backend: str) -> None:
+    model = sm.load("so101/scene_box", backend=backend).replace(gravity=[0, 0, -1])
+    copy = pickle.loads(pickle.dumps(model))
+    assert not copy.jnt_range.flags.writeable
+    assert not copy.keyframes[0].qpos.flags.writeable
+    ends = []
+    for each in (model, copy):
+        with sm.make_data(each) as data:
+            sm.reset(each, data, keyframe=0)
+            sm.step(each, data, 20)
+            ends.append(sm.get_state(each, data))
+    assert ends[0] == ends[1]
+
+
+def test_a_model_is_constant(backend: str) -> None:
+    model = sm.load("so101", backend=backend)
+    for name in ("jnt_range", "actuator_ctrlrange", "actuator_kp", "site_pos", "jnt_qposadr"):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(model, name)[0] = 1
+    with pytest.raises(errors.ReadOnlyError):
+        model.timestep = 1.0
+
+
+def test_gains_and_ranges_are_the_servos() -> None:
+    model = sm.load("so101")
+    assert np.allclose(model.actuator_kp, 998.22)
+    assert np.allclose(model.actuator_kv, 2.731)
+    assert np.allclose(model.actuator_forcerange, [-2.94, 2.94])
+    assert model.actuator_jntid.tolist() == [0, 1, 2, 3, 4, 5]
+
+
+def test_what_is_no_position_servo_has_no_gains(tmp_path: Path) -> None:
+    file = tmp_path / "motor.xml"
+    file.write_text(
+        "<mujoco><worldbody><body><joint name='j'/><geom size='1'/></body></worldbody>"
+        "<actuator><motor joint='j'/><velocity joint='j' kv='2'/></actuator></mujoco>"
+    )
+    model = sm.load(file)
+    assert np.isnan(model.actuator_kp).all()
+    assert np.isinf(model.actuator_ctrlrange).all()
+    assert not model.jnt_limited.any()
+
+
+def test_backends_can_be_registered() -> None:
+    backends.register("other", "statemachine.backends.mujoco_backend:load")
+    try:
+        assert sm.load("so101", backend="other").nq == 6
+        assert "other" in backends.backend_names()
+    finally:
+        backends._BACKENDS.pop("other")
+    with pytest.raises(errors.BadInputError):
+        backends.register("other", "no colon")
+
+
+def test_a_read_only_folder_is_enough(tmp_path: Path) -> None:
+    file = tmp_path / "m.xml"
+    file.write_text("<mujoco/>")
+    tmp_path.chmod(stat.S_IRUSR | stat.S_IXUSR)
+    try:
+        assert sm.load(file).nq == 0
+    finally:
+        tmp_path.chmod(stat.S_IRWXU)
+
+
+def test_a_model_without_anything_steps() -> None:
+    """No joints, no actuators: empty arrays, not errors."""
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "empty.xml"
+        file.write_text("<mujoco/>")
+        model = sm.load(file)
+        with sm.make_data(model) as data:
+            sm.forward(model, data)
+            sm.step(model, data, 3)
+            sm.set_state(model, data, sm.get_state(model, data))
+            assert data.qpos.shape == (0,)
+            assert data.time == pytest.approx(3 * model.timestep)

@@ -1,0 +1,127 @@
+"""What a user installs: the wheel, in an empty environment, used from another folder."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from .conftest import ROOT
+
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+
+def _run(*command: str | Path, cwd: Path) -> str:
+    # Without what the surrounding checkout put into the environment.
+    clean = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "VIRTUAL_ENV")}
+    done = subprocess.run(
+        [str(word) for word in command],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        env={**clean, "PYTHONUTF8": "1"},
+        check=False,
+        timeout=600,
+    )
+    assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    pip = (sys.executable, "-m", "pip", "-q", "--disable-pip-version-check")
+    _run(*pip, "wheel", "--no-deps", "--wheel-dir", folder, ROOT, cwd=folder)
+    (file,) = folder.glob("*.whl")
+    return file
+
+
+@pytest.mark.slow
+@pytest.mark.network
+def test_the_wheel_holds_the_models_and_nothing_else(wheel: Path) -> None:
+    names = zipfile.ZipFile(wheel).namelist()
+    assert "statemachine/_models/so101/so101.xml" in names
+    assert "statemachine/_models/so101/look/base_print.stl" in names
+    assert "statemachine/py.typed" in names
+    tops = {name.split("/")[0] for name in names}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"statemachine"}
+    assert not [name for name in names if "test" in name or "__pycache__" in name]
+
+
+@pytest.mark.slow
+@pytest.mark.network
+def test_the_installed_wheel_runs_a_lesson_from_another_folder(wheel: Path, tmp_path: Path) -> None:
+    home = tmp_path / "environment"
+    _run(sys.executable, "-m", "venv", home, cwd=tmp_path)
+    binaries = home / ("Scripts" if os.name == "nt" else "bin")
+    pip = (binaries / "python", "-m", "pip", "-q", "--disable-pip-version-check")
+    _run(*pip, "install", "-c", ROOT / "constraints.txt", wheel, cwd=tmp_path)
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    page = _run(binaries / "statemachine", "lesson", "gravity", cwd=elsewhere)
+    assert re.search(r"0\.033°\s+23\.92°", page)
+    _run(binaries / "statemachine", "fingertip", cwd=elsewhere)
+    where = _run(
+        binaries / "python",
+        "-c",
+        "import statemachine; print(statemachine.__file__)",
+        cwd=elsewhere,
+    )
+    assert str(home) in where
+    assert not list(elsewhere.iterdir())
+
+
+def test_requirements_name_where_wheels_exist() -> None:
+    markers = {
+        re.split(r"[><=;\s]", line)[0]: line.partition(";")[2].strip()
+        for line in PROJECT["dependencies"]
+    }
+    assert markers["mujoco"] == ""
+    for word in ("linux", "x86_64", "CPython", "3.12"):
+        assert word in markers["pybullet"]
+    assert "win32" in markers["pin"]
+    assert PROJECT["requires-python"] == ">=3.11"
+
+
+def test_constraints_pin_every_dependency_without_addresses() -> None:
+    text = (ROOT / "constraints.txt").read_text()
+    assert "://" not in text
+    pinned = {line.split("==")[0] for line in text.splitlines() if "==" in line}
+    asked = list(PROJECT["dependencies"])
+    for extra in PROJECT["optional-dependencies"].values():
+        asked += extra
+    names = {re.split(r"[\[><=;\s]", line)[0].lower() for line in asked}
+    assert names <= pinned
+
+
+def test_no_machine_path_and_no_address_is_committed() -> None:
+    listed = subprocess.run(
+        ["git", "ls-files"], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    if listed.returncode:
+        pytest.skip("not a git checkout")
+    for name in listed.stdout.split():
+        path = ROOT / name
+        if path.suffix in (".png", ".stl") or not path.is_file():
+            continue
+        text = path.read_text()
+        assert str(ROOT.parent) + "/" not in text, name
+        assert (
+            not re.search(r"index-url|https?://[^ )\"]*(simple|\.whl)", text) or name == __file__
+        ), name
+
+
+def test_every_target_of_the_makefile_that_is_documented_exists() -> None:
+    text = (ROOT / "Makefile").read_text()
+    targets = set(re.findall(r"^([a-z][a-z-]*):", text, re.MULTILINE))
+    assert {"lesson", "test", "check", "bench", "test-fast", "test-newest", "picture"} <= targets
+    documented = set(re.findall(r"^# make ([a-z-]+)", text, re.MULTILINE))
+    assert documented <= targets
+    used = set(re.findall(r"`?make ([a-z-]+)`?", (ROOT / "README.md").read_text()))
+    assert used <= targets

@@ -1,0 +1,97 @@
+"""Determinism where it is easily lost: long runs, other processes, other threads."""
+
+from __future__ import annotations
+
+import multiprocessing
+import pickle
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+
+
+def _continue(backend: str, pickled: bytes, steps: int) -> bytes:
+    """The State after `steps` under a ctrl that swings, from a pickled State."""
+    model = sm.load("so101/scene_box", backend=backend)
+    with sm.make_data(model) as data:
+        sm.set_state(model, data, pickle.loads(pickled))
+        return pickle.dumps(_swing(model, data, steps))
+
+
+def _swing(model: sm.Model, data: sm.Data, steps: int) -> sm.State:
+    start = data.ctrl.copy()
+    for k in range(steps):
+        data.ctrl[0] = start[0] + 0.3 * np.sin(0.01 * k)
+        sm.step(model, data)
+    return sm.get_state(model, data)
+
+
+def _mid_contact(backend: str) -> tuple[sm.Model, sm.State]:
+    model = sm.load("so101/scene_box", backend=backend)
+    with sm.make_data(model) as data:
+        sm.reset(model, data, keyframe=0)
+        sm.step(model, data, 37)
+        assert len(data.contacts) > 0
+        return model, sm.get_state(model, data)
+
+
+def test_other_processes_continue_with_the_same_bits(backend: str) -> None:
+    model, state = _mid_contact(backend)
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(2, mp_context=context) as pool:
+        jobs = [pool.submit(_continue, backend, pickle.dumps(state), 200) for _ in range(2)]
+        futures = [pickle.loads(job.result(timeout=60)) for job in jobs]
+    with sm.make_data(model) as data:
+        sm.set_state(model, data, state)
+        here = _swing(model, data, 200)
+    assert futures[0] == futures[1] == here
+
+
+def test_threads_continue_with_the_same_bits(backend: str) -> None:
+    model, state = _mid_contact(backend)
+
+    def work(_: int) -> sm.State:
+        with sm.make_data(model) as data:
+            sm.set_state(model, data, state)
+            return _swing(model, data, 300)
+
+    with ThreadPoolExecutor(4) as pool:
+        ends = list(pool.map(work, range(8)))
+    assert len(set(ends)) == 1
+
+
+@pytest.mark.slow
+def test_a_replay_of_20000_steps_is_bit_identical(backend: str) -> None:
+    model = sm.load("so101/scene_box", backend=backend)
+    runs = []
+    with sm.make_data(model) as used:
+        for _ in range(2):
+            for data in (used, sm.make_data(model)):
+                sm.reset(model, data, keyframe=0)
+                runs.append(_swing(model, data, 20_000))
+                if data is not used:
+                    data.close()
+    assert len(set(runs)) == 1
+
+
+def test_many_data_of_one_model(backend: str) -> None:
+    """Ten worlds, stepped in turns, each as if it were alone."""
+    model = sm.load("so101/scene_box", backend=backend)
+    worlds = [sm.make_data(model) for _ in range(10)]
+    try:
+        for k, data in enumerate(worlds):
+            sm.reset(model, data, keyframe=0)
+            data.ctrl[0] += 0.05 * k
+        for _ in range(50):
+            for data in worlds:
+                sm.step(model, data)
+        with sm.make_data(model) as alone:
+            sm.reset(model, alone, keyframe=0)
+            alone.ctrl[0] += 0.05 * 7
+            sm.step(model, alone, 50)
+            assert sm.get_state(model, alone) == sm.get_state(model, worlds[7])
+    finally:
+        for data in worlds:
+            data.close()

@@ -1,0 +1,89 @@
+"""Every command, code block and number of the README holds."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from .conftest import ROOT, Cli, need_engine
+
+README = (ROOT / "README.md").read_text()
+COMMANDS = [
+    line.split("#")[0].strip()
+    for block in re.findall(r"```console\n(.*?)```", README, re.DOTALL)
+    for line in block.splitlines()
+    if line.startswith("statemachine")
+]
+
+
+def test_there_are_commands() -> None:
+    assert len(COMMANDS) >= 12
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_command(cli: Cli, command: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    words = shlex.split(command)[1:]
+    if "fingertip" in words:
+        need_engine("pinocchio")
+    if "path/to/menagerie" in words:
+        folder = request.getfixturevalue("menagerie")
+        words = [str(folder) if word == "path/to/menagerie" else word for word in words]
+    if "path/to/robot.xml" in words:
+        file = tmp_path / "robot.xml"
+        file.write_text(
+            "<mujoco><worldbody><body name='a'><inertial mass='1' pos='0 0 0' diaginertia='1 1 1'/>"
+            "<joint name='j'/><site name='tip' pos='1 0 0'/></body></worldbody></mujoco>"
+        )
+        words = [str(file) if word == "path/to/robot.xml" else word for word in words]
+    done = cli(*words)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+
+
+def test_python_block(tmp_path: Path) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin"},
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("9.0")  # 6 s of the keyframe and 600 steps
+
+
+def test_files_that_are_linked_exist() -> None:
+    for file in (ROOT / "README.md", ROOT / "models" / "so101" / "README.md"):
+        for target in re.findall(r"\]\((?!https?:)([^)#]+)\)", file.read_text()):
+            assert (file.parent / target).exists(), target
+
+
+def test_numbers_of_the_models_readme() -> None:
+    """The figures that the README of the model states are those of the model."""
+    import numpy as np
+
+    import statemachine as sm
+
+    text = (ROOT / "models" / "so101" / "README.md").read_text()
+    model = sm.load("so101")
+    mass = model.raw.body_mass.sum()
+    assert f"{mass:.2f} kg" in text
+    for value in ("0.028", "0.052", "998.22", "2.731", "2.94", "2.841", "2.744"):
+        assert value in text
+    assert model.dof_armature[0] == 0.028
+    box = sm.load("so101/scene_box")
+    with sm.make_data(box) as data:
+        sm.reset(box, data, keyframe=0)
+        sm.forward(box, data)
+        geom = box.geom_id("box")
+        corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+        turn = data.raw.geom_xmat[geom].reshape(3, 3)
+        low = (data.raw.geom_xpos[geom] + (corners * box.raw.geom_size[geom]) @ turn.T)[:, 2].min()
+    assert f"{low * 1e3:.0f} mm clear" in text

@@ -1,0 +1,145 @@
+"""Errors, rotations, records, and the size of the core."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import io
+import pickle
+import tokenize
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import statemachine as sm
+from statemachine import errors, rotations
+from statemachine.checks import as_vector
+from statemachine.report.as_json import dumps
+
+from .conftest import ROOT
+
+CORE = (
+    "errors.py", "rotations.py", "records.py", "checks.py", "engines.py", "models.py",
+    "interface.py", "verbs.py", "kinematics.py", "backends",
+)  # fmt: skip
+
+angles = st.floats(-3.0, 3.0)
+quats = st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(
+    lambda q: float(np.linalg.norm(q)) > 0.1
+)
+
+
+def test_every_error_is_also_a_fitting_builtin_and_survives_a_pickle() -> None:
+    kinds = [
+        kind
+        for _, kind in inspect.getmembers(errors, inspect.isclass)
+        if issubclass(kind, errors.StateMachineError)
+    ]
+    assert len(kinds) > 10
+    for kind in kinds:
+        error = kind("what happened", time=1.5, index=3)
+        copy = pickle.loads(pickle.dumps(error))
+        assert type(copy) is kind
+        assert str(copy) == "what happened"
+        assert (getattr(copy, "time"), getattr(copy, "index")) == (1.5, 3)  # noqa: B009
+        if kind is not errors.StateMachineError:
+            assert len(kind.__bases__) == 2
+            assert kind.__bases__[1].__module__ == "builtins"
+
+
+@given(quats)
+def test_quaternion_orders_are_inverse(quat: list[float]) -> None:
+    assert np.array_equal(rotations.wxyz_from_xyzw(rotations.xyzw_from_wxyz(quat)), quat)
+    assert rotations.xyzw_from_wxyz(quat)[3] == quat[0]
+
+
+@given(quats)
+def test_matrices_of_quaternions(quat: list[float]) -> None:
+    unit = np.array(quat) / np.linalg.norm(quat)
+    matrix = rotations.matrix_from_quat(unit)
+    assert np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(matrix) == pytest.approx(1)
+    assert np.allclose(matrix, rotations.matrix_from_quat(-unit), atol=1e-12)
+    # The vector part is the axis, which a rotation leaves alone.
+    assert np.allclose(matrix @ unit[1:], unit[1:], atol=1e-12)
+
+
+@given(st.sampled_from(["x", "y", "z"]), st.one_of(angles, st.floats(-1e-9, 1e-9)))
+def test_angle_between_keeps_its_digits(axis: str, angle: float) -> None:
+    vector = np.eye(3)["xyz".index(axis)]
+    quat = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * vector])
+    found = rotations.angle_between(np.eye(3), rotations.matrix_from_quat(quat))
+    assert float(found) == pytest.approx(abs(angle), rel=1e-9, abs=1e-15)
+
+
+@given(st.lists(st.floats(allow_nan=True, allow_infinity=True), max_size=8))
+def test_as_vector_takes_what_is_finite_and_nothing_else(values: list[float]) -> None:
+    good = len(values) == 6 and all(abs(v) <= 1e10 for v in values)
+    if good:
+        assert np.array_equal(as_vector(values, (6,), "x"), values)
+    else:
+        with pytest.raises(errors.BadInputError):
+            as_vector(values, (6,), "x")
+
+
+def test_a_state_reads_as_what_it_holds(backend: str) -> None:
+    model = sm.load("so101", backend=backend)
+    with sm.make_data(model) as data:
+        data.qpos[1] = 0.5
+        data.time = 3.0
+        state = sm.get_state(model, data)
+    assert state.time == 3.0
+    assert state["qpos"].tolist() == [0, 0.5, 0, 0, 0, 0]
+    assert state.backend == backend
+    with pytest.raises(errors.UnknownNameError, match="qpos"):
+        state["qpo"]
+    with pytest.raises(AttributeError):
+        state.blob = b""  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_json_has_no_nan() -> None:
+    assert dumps({"a": float("nan"), "b": np.array([1.0, np.inf])}) == dumps(
+        {"a": None, "b": [1.0, None]}
+    )
+
+
+def _code_lines(source: str) -> int:
+    """Lines that hold code: no blank lines, comments or docstrings."""
+    words: set[int] = set()
+    skipped = (
+        tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,
+        tokenize.ENDMARKER,
+    )  # fmt: skip
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type not in skipped:
+            words.update(range(token.start[0], token.end[0] + 1))
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(
+            node
+        ):
+            text = node.body[0]
+            words -= set(range(text.lineno, (text.end_lineno or text.lineno) + 1))
+    return len(words)
+
+
+def test_the_core_stays_thin() -> None:
+    """At most 2,000 lines of code, for all backends together."""
+    package = ROOT / "statemachine"
+    files = [
+        file
+        for name in CORE
+        for file in ([package / name] if name.endswith(".py") else (package / name).glob("*.py"))
+    ]
+    assert sum(_code_lines(file.read_text()) for file in files) <= 2000
+
+
+def test_the_core_does_not_import_what_stands_on_it() -> None:
+    above = {"experiments", "conformance", "lessons", "report", "cli"}
+    package = ROOT / "statemachine"
+    for name in CORE:
+        for file in [package / name] if name.endswith(".py") else (package / name).glob("*.py"):
+            for node in ast.walk(ast.parse(file.read_text())):
+                if isinstance(node, ast.ImportFrom):
+                    assert not above & set((node.module or "").split(".")), file

@@ -1,0 +1,129 @@
+"""First contact is instant: no engine, and nothing heavy, before a command needs it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import statemachine as sm
+
+from .conftest import ROOT
+
+HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "xml.etree")
+
+
+@pytest.mark.parametrize(
+    ("code", "allowed"),
+    [
+        ("import statemachine", set()),
+        ("import statemachine as sm; dir(sm)", set()),
+        ("from statemachine.cli import main; main([])", set()),
+        ("from statemachine.cli import main; main(['--help'])", set()),
+        ("from statemachine.cli import main; main(['lesson', 'gravity', '--help'])", set()),
+        ("from statemachine.cli import main; main(['fingertip', '--help'])", set()),
+        ("import statemachine.interface, statemachine.verbs", {"numpy"}),
+        ("import statemachine.backends, statemachine.conformance", {"numpy", "xml.etree"}),
+        ("import statemachine.kinematics", {"numpy", "xml.etree"}),
+    ],
+)
+def test_nothing_heavy_is_imported(code: str, allowed: set[str]) -> None:
+    probe = f"""
+import sys
+try:
+    {code}
+except SystemExit:
+    pass
+print('loaded:', *[name for name in {HEAVY!r} if name in sys.modules])
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", probe], capture_output=True, text=True, cwd=ROOT, check=True
+    )
+    loaded = set(done.stdout.rpartition("loaded:")[2].split())
+    assert loaded <= allowed
+
+
+def test_everything_promised_is_there() -> None:
+    for name in sm.__all__:
+        assert getattr(sm, name) is not None
+    assert set(sm.__all__) <= set(dir(sm))
+    with pytest.raises(AttributeError, match="stpe"):
+        sm.stpe  # noqa: B018  # pyright: ignore
+
+
+def test_the_clash_of_import_names_is_said_in_one_line(tmp_path: Path) -> None:
+    """The other distribution's files lie among ours when it was installed before us."""
+    package = tmp_path / "statemachine"
+    package.mkdir()
+    (package / "__init__.py").write_text((ROOT / "statemachine" / "__init__.py").read_text())
+    (package / "statemachine.py").write_text("")
+    done = subprocess.run(
+        [sys.executable, "-c", "import statemachine"],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        check=False,
+    )
+    assert done.returncode == 1
+    last = done.stderr.strip().splitlines()[-1]
+    assert "pip uninstall python-statemachine" in last
+
+
+def test_the_clash_is_noticed_where_the_other_init_won(tmp_path: Path) -> None:
+    """The other distribution was installed after us: our cli meets its __init__."""
+    package = tmp_path / "statemachine"
+    package.mkdir()
+    (package / "__init__.py").write_text("class StateMachine: ...\n__version__ = '3.0'\n")
+    for name in ("cli.py", "errors.py"):
+        (package / name).write_text((ROOT / "statemachine" / name).read_text())
+    done = subprocess.run(
+        [sys.executable, "-c", "from statemachine.cli import main; main()"],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        check=False,
+    )
+    assert done.returncode != 0
+    assert len(done.stderr.splitlines()) == 1, done.stderr
+    assert "pip uninstall python-statemachine" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("engine", "content", "words"),
+    [
+        ("pinocchio", None, "pip install pin"),
+        ("pinocchio", "test = 1", "is not the engine"),
+        ("mujoco", "raise ImportError('libGL.so.1: cannot open')", "libGL.so.1"),
+        (
+            "pinocchio",
+            "raise ImportError('libgomp.so.1: no such file')",
+            "apt-get install libgomp1",
+        ),
+        ("mujoco", "import nonexistent_dependency", "nonexistent_dependency"),
+    ],
+)
+def test_a_missing_or_broken_engine_is_one_line(
+    tmp_path: Path, engine: str, content: str | None, words: str
+) -> None:
+    if content is None:
+        block = f"sys.modules[{engine!r}] = None"
+        block = (
+            "import importlib.abc\n"
+            "class Gone(importlib.abc.MetaPathFinder):\n"
+            "    def find_spec(self, name, path, target=None):\n"
+            f"        if name == {engine!r}: raise ModuleNotFoundError(name=name)\n"
+            "sys.meta_path.insert(0, Gone())"
+        )
+    else:
+        (tmp_path / f"{engine}.py").write_text(content)
+        block = f"sys.path.insert(0, {str(tmp_path)!r})"
+    command = ["fingertip"] if engine == "pinocchio" else ["lesson", "state"]
+    code = f"import sys\n{block}\nfrom statemachine.cli import main\nsys.exit(main({command}))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert done.returncode == 3, done.stderr
+    assert len(done.stderr.splitlines()) == 1, done.stderr
+    assert words in done.stderr
