@@ -325,7 +325,7 @@ class Data(ABC):
     _model: Model | None
     _trouble: str
     _alarms: list[Any]  # truthy when the engine has something to say
-    _advance: Callable[[int], None]  # the engine's own step
+    _advance: Callable[..., None]  # the engine's own step: (nstep=1)
     if TYPE_CHECKING:
         qpos = _Input()
         qvel = _Input()

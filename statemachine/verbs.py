@@ -51,11 +51,11 @@ def step(model: Model, data: Data, nstep: int = 1) -> None:
             _admit(model, data)
     except AttributeError:
         _admit(model, data)
-    # The default skips the check by identity, which True and 1.0 do not pass.
-    if nstep is not _ONE and (type(nstep) is not int or not 1 <= nstep < 2**31):
-        nstep = as_count(nstep, "nstep")
     advance = data._advance  # as an attribute, which CPython reads faster than a method
-    advance(nstep)
+    if nstep is _ONE:  # by identity, which True and 1.0 do not pass
+        advance()
+    else:
+        advance(as_count(nstep, "nstep"))
     if data._alarms:
         data._attend()
 

@@ -138,10 +138,10 @@ def advance_with(change: Callable[[Any, Any], None]) -> Patch:
     def apply(monkeypatch: pytest.MonkeyPatch) -> None:
         right = mujoco_backend._transition
 
-        def transition(model: MujocoModel, raw: Any) -> Callable[[int], None]:
+        def transition(model: MujocoModel, raw: Any) -> Callable[..., None]:
             advance = right(model, raw)
 
-            def faulty(nstep: int) -> None:
+            def faulty(nstep: int = 1) -> None:
                 for _ in range(nstep):
                     change(model.raw, raw)
                     advance(1)
@@ -169,9 +169,9 @@ step_perturbs_the_warm_start = advance_with(_forward_first)
 def bulk_is_one_short(monkeypatch: pytest.MonkeyPatch) -> None:
     right = mujoco_backend._transition
 
-    def transition(model: MujocoModel, raw: Any) -> Callable[[int], None]:
+    def transition(model: MujocoModel, raw: Any) -> Callable[..., None]:
         advance = right(model, raw)
-        return lambda nstep: advance(max(1, nstep - 1))
+        return lambda nstep=1: advance(max(1, nstep - 1))
 
     monkeypatch.setattr(mujoco_backend, "_transition", transition)
 
@@ -179,10 +179,10 @@ def bulk_is_one_short(monkeypatch: pytest.MonkeyPatch) -> None:
 def step_ends_with_forward(monkeypatch: pytest.MonkeyPatch) -> None:
     right = mujoco_backend._transition
 
-    def transition(model: MujocoModel, raw: Any) -> Callable[[int], None]:
+    def transition(model: MujocoModel, raw: Any) -> Callable[..., None]:
         advance = right(model, raw)
 
-        def faulty(nstep: int) -> None:
+        def faulty(nstep: int = 1) -> None:
             advance(nstep)
             mujoco.mj_forward(model.raw, raw)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import copy
 import functools
 import hashlib
+import math
 import os
 import re
 import threading
@@ -424,25 +425,29 @@ _FATAL = {
 }
 
 
-def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[[int], None]:
+def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:
     """The engine's step bound to its arguments; Python runs only where it must."""
     bare = functools.partial(mujoco.mj_step, model.raw, raw)
     substeps = model.substeps
 
-    def finer(nstep: int) -> None:
+    def finer(nstep: int = 1) -> None:
         if nstep * substeps >= 2**31:  # the engine counts in a C int
             raise BadInputError(f"nstep {nstep} × {substeps} substeps is too large for one call")
         bare(nstep * substeps)
 
     advance = bare if substeps == 1 else finer
-    quats = [(raw.qpos[start : start + 4], joint, start) for joint, start in model.quaternions()]
+    quats = [
+        (memoryview(raw.qpos[start : start + 4]), joint, start)
+        for joint, start in model.quaternions()
+    ]
     if not quats:
         return advance
 
-    def checked(nstep: int) -> None:
-        # MuJoCo takes a zero quaternion for the identity without a word.
+    def checked(nstep: int = 1) -> None:
+        # MuJoCo takes a zero quaternion for the identity without a word. A sum is the
+        # cheapest look at four numbers; only one near zero is looked at again.
         for quat, joint, start in quats:
-            if quat.dot(quat) < TINY * TINY:
+            if -TINY < sum(quat) < TINY and math.hypot(*quat) < TINY:
                 raise model.zero_quaternion(joint, start)
         advance(nstep)
 
