@@ -13,7 +13,7 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13 python3.14; 
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null \
 	&& { echo $$p; break; }; done)
 
-.PHONY: help lesson test test-fast test-newest check format bench picture clean
+.PHONY: help lesson test test-fast test-newest check format hooks bench picture clean
 
 help:
 	@sed -n 's/^# make /  make /p' Makefile
@@ -51,6 +51,10 @@ check: $(VENV)/test.stamp
 format: $(VENV)/test.stamp
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/ruff format .
+
+# make hooks    let git run the checks before a commit and a push
+hooks: $(VENV)/test.stamp
+	@$(BIN)/pre-commit install --hook-type pre-commit --hook-type pre-push
 
 bench: $(VENV)/run.stamp
 	@$(BIN)/python -m benchmarks

@@ -15,6 +15,11 @@ from .errors import unknown_name
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 INPUTS = ("qpos", "qvel", "ctrl")
+# What is derived from them, as far as it is one array; contacts are several.
+POSES = ("xpos", "xquat", "site_xpos", "site_xmat")
+FORCES = ("qfrc_bias", "qfrc_actuator", "qfrc_passive", "qfrc_constraint")
+PARTS = ("qfrc_contact", "qfrc_friction", "qfrc_limit")  # of qfrc_constraint
+DERIVED = (*POSES, "qacc", *FORCES, *PARTS)
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:

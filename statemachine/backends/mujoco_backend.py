@@ -24,7 +24,17 @@ import numpy as np
 from ..checks import TINY
 from ..errors import BadInputError, DivergedError, EngineWarning, ModelError
 from ..interface import OPTIONS, Data, Model
-from ..records import INPUTS, Array, Behaviour, Capabilities, Contacts, Keyframe, State
+from ..records import (
+    FORCES,
+    INPUTS,
+    POSES,
+    Array,
+    Behaviour,
+    Capabilities,
+    Contacts,
+    Keyframe,
+    State,
+)
 
 _DISABLE = mujoco.mjtDisableBit
 _SWITCHES = {  # option of `replace` -> the flag that turns it off
@@ -76,18 +86,6 @@ _CAPABILITIES = Capabilities(
     },
     shared_model=True,
     exact_restore=True,
-)
-
-_DERIVED = (
-    "xpos",
-    "xquat",
-    "site_xpos",
-    "site_xmat",
-    "qacc",
-    "qfrc_bias",
-    "qfrc_actuator",
-    "qfrc_passive",
-    "qfrc_constraint",
 )
 
 # (thread, text) of every warning that MuJoCo gave and nobody has looked at yet. The
@@ -256,7 +254,7 @@ class MujocoData(Data):
         put("_layout", _layout(model))
         for name in INPUTS:
             put(name, getattr(raw, name))
-        put("_views", {name: getattr(raw, name) for name in _DERIVED})
+        put("_views", {name: getattr(raw, name) for name in (*POSES, "qacc", *FORCES)})
         for view in self._views.values():
             view.setflags(write=False)
         self._recover()

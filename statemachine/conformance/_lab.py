@@ -12,24 +12,9 @@ import numpy as np
 from ..backends import load
 from ..errors import UnsupportedError
 from ..interface import Data, Model
-from ..records import Array
+from ..records import DERIVED, Array
 from ..verbs import forward, get_state, make_data, reset, step
 
-# Everything derived that a Data offers as an array.
-DERIVED = (
-    "xpos",
-    "xquat",
-    "site_xpos",
-    "site_xmat",
-    "qacc",
-    "qfrc_bias",
-    "qfrc_actuator",
-    "qfrc_passive",
-    "qfrc_constraint",
-    "qfrc_contact",
-    "qfrc_friction",
-    "qfrc_limit",
-)
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
 
 

@@ -17,9 +17,9 @@ from ..errors import (
     UnknownNameError,
     UnsupportedError,
 )
-from ..records import INPUTS
+from ..records import DERIVED, INPUTS
 from ..verbs import forward, get_state, make_data, reset, set_state, step
-from ._lab import DERIVED, Lab, inputs_of, require, require_equal, require_raises
+from ._lab import Lab, inputs_of, require, require_equal, require_raises
 
 
 def check_inputs_are_the_same_arrays_for_life(lab: Lab) -> None:
