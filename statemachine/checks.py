@@ -22,8 +22,10 @@ TINY = 1e-15
 def as_count(value: Any, name: str) -> int:
     """`value` as a whole number of at least 1, or BadInputError."""
     number = whole_number(value)
-    if number is None or not 1 <= number < 2**31:
+    if number is None or number < 1:
         raise BadInputError(f"{name} must be a whole number of at least 1; got {value!r}")
+    if number >= 2**31:  # engines count in a C int
+        raise BadInputError(f"{name} must be below {2**31}; got {value!r}")
     return number
 
 
@@ -84,6 +86,13 @@ def check_entries(array: Array, name: str, label: Callable[[str, int], str] | No
         where += label(name, index)
     problem = f"is beyond {HUGE:g}" if math.isfinite(value) else "is not a finite number"
     raise BadInputError(f"{where} = {value} {problem}", quantity=name, index=index)
+
+
+def check_finite(array: Array, name: str) -> None:
+    """Raise BadInputError for the first entry that is NaN or infinite."""
+    if not np.isfinite(array).all():
+        index = int(np.flatnonzero(~np.isfinite(array))[0])
+        raise BadInputError(f"{name}[{index}] = {array[index]} is not a finite number")
 
 
 def index_of(kind: str, name: str, names: Sequence[str]) -> int:

@@ -11,7 +11,7 @@ arrays beside it and moves values across in the hooks, whose names begin with `_
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -76,7 +76,8 @@ class Model(ABC):
         actuator_ctrlrange, actuator_forcerange: (nu, 2), infinite where unlimited.
         actuator_kp, actuator_kv: (nu,) gains of a position servo, NaN if it is none.
         dof_armature, dof_damping, dof_frictionloss: (nv,) of each degree of freedom.
-        geom_bodyid, site_bodyid: The body that carries each geom and site.
+        body_parentid: (nbody,) the body that carries each body; the world carries itself.
+        jnt_bodyid, geom_bodyid, site_bodyid: The body of each joint, geom and site.
         site_pos, site_quat: (nsite, 3) [m] and (nsite, 4) wxyz, in that body's frame.
         keyframes: The states that the file names.
     """
@@ -113,6 +114,8 @@ class Model(ABC):
     dof_armature: Array
     dof_damping: Array
     dof_frictionloss: Array
+    body_parentid: Ints
+    jnt_bodyid: Ints
     geom_bodyid: Ints
     site_bodyid: Ints
     site_pos: Array
@@ -120,6 +123,9 @@ class Model(ABC):
     keyframes: tuple[Keyframe, ...]
 
     def __init__(self, **facts: Any) -> None:
+        missing = Model.__annotations__.keys() - facts.keys()
+        if missing:
+            raise TypeError(f"a backend must give its Model: {', '.join(sorted(missing))}")
         for name, value in facts.items():
             constant = read_only(value) if isinstance(value, np.ndarray) else value
             object.__setattr__(self, name, constant)
@@ -195,14 +201,16 @@ class Model(ABC):
                 error = unknown_name("option", name, OPTIONS)
                 raise UnsupportedError(
                     str(error), backend=self.backend, feature=name, reason="unknown"
-                )
+                ) from None
             if name not in self.capabilities.options:
-                raise self.unsupported(name, "the engine has no such setting")
+                raise self._unsupported(name)
             checked[name] = self._checked_option(name, value)
         return self._replace(checked)
 
-    def unsupported(self, feature: str, reason: str) -> UnsupportedError:
-        """The error for something that this backend cannot do."""
+    def _unsupported(self, feature: str) -> UnsupportedError:
+        """The error for what this backend cannot do; the reason is in its record."""
+        known = self.capabilities.behaviours.get(feature)
+        reason = known.note if known else "the engine has no such setting"
         return UnsupportedError(
             f"backend {self.backend!r} does not support {feature!r}: {reason}",
             backend=self.backend,
@@ -210,7 +218,7 @@ class Model(ABC):
             reason=reason,
         )
 
-    def quaternions(self) -> list[tuple[int, int]]:
+    def _quaternions(self) -> list[tuple[int, int]]:
         """(joint id, address in qpos) of every quaternion."""
         found = []
         for joint, kind in enumerate(self.jnt_type):
@@ -219,21 +227,21 @@ class Model(ABC):
                 found.append((joint, int(self.jnt_qposadr[joint]) + offset))
         return found
 
-    def check_quaternions(self, qpos: Array) -> None:
+    def _check_quaternions(self, qpos: Array) -> None:
         """Raise BadInputError for a quaternion of `qpos` (nq,) that is zero."""
-        for joint, start in self.quaternions():
+        for joint, start in self._quaternions():
             quat = qpos[start : start + 4]
             if quat.dot(quat) < TINY * TINY:
-                raise self.zero_quaternion(joint, start)
+                raise self._zero_quaternion(joint, start)
 
-    def zero_quaternion(self, joint: int, start: int) -> BadInputError:
+    def _zero_quaternion(self, joint: int, start: int) -> BadInputError:
         """The error for a quaternion of a joint that is no rotation."""
         return BadInputError(
             f"qpos[{start}:{start + 4}], the quaternion of joint {self.joint_names[joint]!r}, "
             "is zero: it names no rotation; the identity is 1 0 0 0"
         )
 
-    def coordinate_name(self, array: str, index: int) -> str:
+    def _coordinate_name(self, array: str, index: int) -> str:
         """' (elbow_flex)' for an entry of qpos, qvel, qacc or ctrl; '' if it has no name."""
         label = ""
         if array == "ctrl":
@@ -262,16 +270,15 @@ class Model(ABC):
         return self._per_dof(name, value)
 
     def _per_dof(self, name: str, value: Any) -> Array:
-        if np.ndim(value):
-            array = as_vector(value, (self.nv,), name)
-        else:
-            # One number is meant for the joints of the robot, not for a free body.
-            array = np.array(getattr(self, f"dof_{name}"))
-            for kind, dof in zip(self.jnt_type, self.jnt_dofadr, strict=True):
-                if kind in (JointType.SLIDE, JointType.HINGE):
-                    array[dof] = as_scalar(value, name)
-        if (array < 0).any():
+        each = as_vector(value, (self.nv,) if np.ndim(value) else (), name)
+        if (each < 0).any():
             raise BadInputError(f"{name} must not be negative; got {value!r}")
+        if each.ndim:
+            return each
+        # One number is meant for the joints of the robot, not for a free body.
+        array = np.array(getattr(self, f"dof_{name}"))
+        scalar = np.isin(self.jnt_type, (JointType.SLIDE, JointType.HINGE))
+        array[self.jnt_dofadr[scalar]] = each
         return array
 
     @abstractmethod
@@ -310,6 +317,8 @@ class Data(ABC):
             then angular in body axes.
         ctrl: (nu,) commands [unit of the actuator].
         time: simulated time [s].
+    An assignment is checked before anything changes. NumPy's in-place operators
+    (`data.ctrl *= x`) write first: what they leave is checked then, and by the verbs.
 
     All else is derived and read-only. It belongs to the state before the last engine
     step, or to that of the last `forward`; a write to an input changes none of it.
@@ -331,6 +340,34 @@ class Data(ABC):
         qvel = _Input()
         ctrl = _Input()
         time = _Time()
+    else:
+
+        @property
+        @abstractmethod
+        def time(self) -> float:
+            """Simulated time [s]; may be assigned to."""
+
+    def __init__(
+        self,
+        model: Model,
+        advance: Callable[..., None],
+        alarms: list[Any],
+        inputs: Mapping[str, Array],
+    ) -> None:
+        """Fill the slots; a backend's own `__init__` calls this.
+
+        Args:
+            model: The Model that makes this Data.
+            advance: The engine's own step, called with a number of steps or, for
+                one, with nothing.
+            alarms: A list; whatever is in it after a step makes the verb call `_attend`.
+            inputs: The arrays qpos, qvel and ctrl, the same for the whole life.
+        """
+        for name, value in (("_home", model), ("_advance", advance), ("_alarms", alarms)):
+            object.__setattr__(self, name, value)
+        for name in INPUTS:
+            object.__setattr__(self, name, inputs[name])
+        self._recover()
 
     @property
     @abstractmethod
@@ -403,6 +440,11 @@ class Data(ABC):
         """(nv,) the part that joint limits exert."""
 
     @property
+    @abstractmethod
+    def qfrc_equality(self) -> Array:
+        """(nv,) the part that equality constraints exert."""
+
+    @property
     def model(self) -> Model:
         """The Model that made this Data."""
         return self._home
@@ -412,8 +454,13 @@ class Data(ABC):
         if self._trouble == "closed":
             return
         self._give_up("closed")
-        for name in INPUTS:  # the last values stay readable
-            getattr(self, name).setflags(write=False)
+        for name in INPUTS:
+            # The last values stay readable, apart from the engine's memory, which a view
+            # would keep alive; a view that the caller kept can no longer be written into.
+            view = getattr(self, name)
+            object.__setattr__(self, name, read_only(view))
+            view.setflags(write=False)
+        object.__setattr__(self, "_advance", None)
         self._close()
 
     def __enter__(self) -> Data:
@@ -428,7 +475,7 @@ class Data(ABC):
             target = getattr(self, name)
             checked = as_vector(value, target.shape, name)
             if name == "qpos":
-                self._home.check_quaternions(checked)
+                self._home._check_quaternions(checked)
             target[:] = checked
         elif name == "time":
             self._refuse_if_troubled()

@@ -8,6 +8,7 @@ two agree, neither has copied from the other.
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -21,10 +22,11 @@ from .engines import require
 from .errors import BadInputError, ModelError, unknown_name
 from .models import resolve
 from .records import Array
-from .rotations import matrix_from_quat
+from .rotations import matrix_from_quat, xyzw_from_wxyz
 
 Kind = Literal["site", "body"]
 # Elements that make or move bodies and that Pinocchio's parser passes over in silence.
+_PLACES = {"pos", "quat", "euler", "axisangle", "xyaxes", "zaxis", "fromto"}
 _PASSED_OVER = ("frame", "replicate", "composite", "flexcomp", "attach")
 
 
@@ -69,6 +71,7 @@ class Kinematics:
         self._model, in_file = _read(self._pin, self.path)
         self._data: Any = self._model.createData()
         self.joint_names: tuple[str, ...] = tuple(in_file if joint_names is None else joint_names)
+        self._oblique = _sites_by_fromto(self.path)
         self._segments = _segments(self._model, in_file, self.joint_names, self.path)
         self.nq: int = sum(segment.nq for segment in self._segments)
         self.nv: int = sum(segment.nv for segment in self._segments)
@@ -129,13 +132,13 @@ class Kinematics:
             BadInputError: `qpos` has the wrong shape or is not finite.
         """
         vector = as_vector(qpos, (self.nq,), "qpos")
-        theirs = self._pin.computeFrameJacobian(
+        theirs: Array = self._pin.computeFrameJacobian(
             self._model,
             self._data,
             self._configurations(vector[None])[0],
             self._frame(name, kind),
             self._pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
-        )
+        ).reshape(6, self._model.nv)  # of one joint it comes as a vector
         ours = np.empty((6, self.nv))
         qadr = vadr = 0
         for segment in self._segments:
@@ -164,6 +167,11 @@ class Kinematics:
         wanted = {"site": types.OP_FRAME, "body": types.BODY}
         if kind not in wanted:
             raise unknown_name("kind of frame", kind, wanted)
+        if kind == "site" and name in self._oblique:
+            raise ModelError(
+                f"site {name!r} of {self.path.name} is placed by fromto, which Pinocchio's "
+                "parser does not read"
+            )
         # A joint and a body may share a name, so the name alone does not tell.
         if not self._model.existFrame(name, wanted[kind]):
             known = (frame.name for frame in self._model.frames if frame.type == wanted[kind])
@@ -186,7 +194,7 @@ class Kinematics:
             if segment.kind in ("free", "ball"):
                 # Positions as they are, then the quaternion: wxyz here, xyzw there.
                 quat = _unit(part[:, -4:])
-                part = np.hstack([part[:, :-4], quat[:, 1:], quat[:, :1]])
+                part = np.hstack([part[:, :-4], xyzw_from_wxyz(quat)])
             elif segment.kind == "unbounded":
                 part = np.hstack([np.cos(part), np.sin(part)])
             theirs[:, segment.idx_q : segment.idx_q + part.shape[1]] = part
@@ -210,15 +218,18 @@ def _read(pin: Any, path: Path) -> tuple[Any, list[str]]:
         root = ElementTree.parse(path).getroot()
     except (ElementTree.ParseError, OSError, UnicodeDecodeError) as error:
         raise ModelError(f"{path} is not an XML file: {error}") from error
-    if root.tag == "robot":
-        build = pin.buildModelFromUrdf
-    elif root.tag == "mujoco":
-        build = pin.buildModelFromMJCF
-        _refuse_misread(root, path)
-    else:
-        raise ModelError(f"{path} is neither MJCF nor URDF: its root element is <{root.tag}>")
+    in_file: list[str] = []
     try:
-        model = build(str(path))
+        if root.tag == "robot":
+            model = pin.buildModelFromUrdf(str(path))
+        elif root.tag == "mujoco":
+            _refuse_misread(root, path)
+            in_file = _mjcf_joints(root)
+            model = _build_mjcf(pin, root, path)
+        else:
+            raise ModelError(f"{path} is neither MJCF nor URDF: its root element is <{root.tag}>")
+    except ModelError:
+        raise
     except Exception as error:  # the bindings raise RuntimeError, ValueError and others
         reason = _reason(error)
         if root.find("keyframe") is not None:
@@ -230,8 +241,29 @@ def _read(pin: Any, path: Path) -> tuple[Any, list[str]]:
         for i, joint in enumerate(model.joints):
             if joint.shortname().endswith("FreeFlyer"):
                 model.jointPlacements[i] = pin.SE3.Identity()
-    in_file = _mjcf_joints(root) if root.tag == "mujoco" else list(model.names)[1:]
-    return model, in_file
+    return model, in_file or list(model.names)[1:]
+
+
+def _build_mjcf(pin: Any, root: ElementTree.Element, path: Path) -> Any:
+    """Pinocchio's model; of a file whose root stands still, with a body put under it.
+
+    Of a root body without a joint, and of the world, Pinocchio drops the pose and the
+    sites. Below one more body that stands still at the origin, it keeps them.
+    """
+    (world,) = root.findall("worldbody")
+    (body,) = world.findall("body")
+    sites = world.findall("site")
+    if body.find("joint") is not None or body.find("freejoint") is not None:
+        return pin.buildModelFromMJCF(str(path))
+    ground = _still_body(world, "the ground")
+    under = {"site": _still_body(ground, "the world"), "body": ground}
+    for element in (*sites, body):
+        world.remove(element)
+        under[element.tag].append(element)
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / path.name
+        ElementTree.ElementTree(root).write(copy, encoding="utf-8")
+        return pin.buildModelFromMJCF(str(copy))
 
 
 def _refuse_misread(root: ElementTree.Element, path: Path) -> None:
@@ -245,12 +277,44 @@ def _refuse_misread(root: ElementTree.Element, path: Path) -> None:
     for tag in _PASSED_OVER:
         if root.find(f".//worldbody//{tag}") is not None:
             raise ModelError(f"{path.name} uses <{tag}>, which Pinocchio's parser does not read")
+    compilers, defaults = root.findall("compiler"), root.findall("default")
+    for tag, found in (("compiler", compilers), ("default", defaults)):
+        if len(found) > 1:
+            raise ModelError(
+                f"{path.name} has {len(found)} <{tag}> elements at the top, and Pinocchio "
+                "reads one: merge them"
+            )
+    if any(c.get("eulerseq", "xyz") != "xyz" for c in compilers):
+        raise ModelError(f"{path.name} sets eulerseq, which Pinocchio's parser does not read")
+    degrees = not any(c.get("angle") == "radian" for c in compilers)
+    if degrees and root.find(".//worldbody//*[@axisangle]") is not None:
+        raise ModelError(f"{path.name} gives axisangle in degrees, and Pinocchio reads radians")
+    for default in defaults:
+        for element in (*default.iter("joint"), *default.iter("site")):
+            placed = sorted(_PLACES & set(element.keys()))
+            if placed:
+                raise ModelError(
+                    f"{path.name} gives {placed[0]} of a {element.tag} in a <default>, which "
+                    "Pinocchio's parser does not read: write it where it is used"
+                )
     roots = [body.get("name", "?") for body in root.findall("worldbody/body")]
     if len(roots) != 1 or len(root.findall("worldbody")) != 1:
         raise ModelError(
             f"{path.name} has {len(roots)} root bodies ({', '.join(roots) or 'none'}), and "
             "Pinocchio reads exactly one: put the robot in a file of its own"
         )
+
+
+def _still_body(parent: ElementTree.Element, name: str) -> ElementTree.Element:
+    body = ElementTree.SubElement(parent, "body", name=name)
+    ElementTree.SubElement(body, "inertial", mass="1", pos="0 0 0", diaginertia="1 1 1")
+    return body
+
+
+def _sites_by_fromto(path: Path) -> set[str]:
+    """Names of the sites whose place Pinocchio would not know."""
+    sites = ElementTree.parse(path).getroot().iter("site")
+    return {site.get("name", "") for site in sites if site.get("fromto")}
 
 
 def _mjcf_joints(root: ElementTree.Element) -> list[str]:

@@ -18,7 +18,7 @@ INPUTS = ("qpos", "qvel", "ctrl")
 # What is derived from them, as far as it is one array; contacts are several.
 POSES = ("xpos", "xquat", "site_xpos", "site_xmat")
 FORCES = ("qfrc_bias", "qfrc_actuator", "qfrc_passive", "qfrc_constraint")
-PARTS = ("qfrc_contact", "qfrc_friction", "qfrc_limit")  # of qfrc_constraint
+PARTS = ("qfrc_contact", "qfrc_friction", "qfrc_limit", "qfrc_equality")  # of qfrc_constraint
 DERIVED = (*POSES, "qacc", *FORCES, *PARTS)
 
 
@@ -37,6 +37,34 @@ class JointType(IntEnum):
     SLIDE = 2
     HINGE = 3
 
+    @property
+    def nq(self) -> int:
+        """Numbers that a joint of this type has in qpos."""
+        return {JointType.FREE: 7, JointType.BALL: 4}.get(self, 1)
+
+    @property
+    def nv(self) -> int:
+        """Numbers that it has in qvel."""
+        return {JointType.FREE: 6, JointType.BALL: 3}.get(self, 1)
+
+
+# The promises of the contract that a capability record speaks of, all of them.
+BEHAVIOURS = (
+    "stale after a write",
+    "stale after a step",
+    "zeros when fresh",
+    "position servo",
+    "armature",
+    "joint damping",
+    "dry friction",
+    "joint limits",
+    "free joint conventions",
+    "forces by part",
+    "contacts",
+    "exact restore",
+    "no automatic reset",
+)
+
 
 @dataclass(frozen=True)
 class Behaviour:
@@ -53,8 +81,7 @@ class Capabilities:
     Attributes:
         options: Names that `Model.replace` takes.
         integrators: Values of its `integrator`.
-        behaviours: Each promise of the contract (stale writes, zeros when fresh,
-            the servo, armature, forces by part, exact restore …).
+        behaviours: How each promise in `BEHAVIOURS` is kept.
         shared_model: Whether several Data share one compiled model in memory.
         exact_restore: Whether `set_state` continues bit-exactly from any State,
             mid-contact too; otherwise two restores of one State agree bit by bit.
@@ -97,6 +124,10 @@ class Contacts:
         frame: (n, 3, 3) rows are the contact axes in world coordinates; the first
             is the normal, from geom 0 to geom 1.
         force: (n, 3) force of geom 0 on geom 1 along those axes [N], normal first.
+        torque: (n, 3) torsional and rolling friction about them [N·m]; zero where the
+            contact, or the engine, has none.
+
+    All are read-only.
     """
 
     geom: Ints
@@ -104,6 +135,11 @@ class Contacts:
     pos: Array
     frame: Array
     force: Array
+    torque: Array
+
+    def __post_init__(self) -> None:
+        for array in (self.geom, self.dist, self.pos, self.frame, self.force, self.torque):
+            array.setflags(write=False)
 
     def __len__(self) -> int:
         return len(self.dist)

@@ -6,7 +6,7 @@ a step through them costs what the engine's own step costs.
 
 from __future__ import annotations
 
-from .checks import as_count, check_entries, kind_of
+from .checks import as_count, check_entries, check_finite, kind_of
 from .errors import ForeignDataError, ForeignStateError
 from .interface import Data, Model
 from .records import INPUTS, State
@@ -75,8 +75,8 @@ def forward(model: Model, data: Data) -> None:
     """
     _admit(model, data)
     for name in INPUTS:
-        check_entries(getattr(data, name), name, model.coordinate_name)
-    model.check_quaternions(data.qpos)
+        check_entries(getattr(data, name), name, model._coordinate_name)
+    model._check_quaternions(data.qpos)
     data._recompute()
     if data._alarms:
         data._attend()
@@ -101,7 +101,10 @@ def reset(model: Model, data: Data, keyframe: int | str | None = None) -> None:
 
 
 def get_state(model: Model, data: Data) -> State:
-    """A copy of all that decides the future of `data`.
+    """A copy of what the engine exposes of all that decides the future of `data`.
+
+    Two restores of one State have the same future, bit for bit; where the record says
+    `exact_restore`, it is also the future of `data` itself.
 
     Raises:
         ForeignDataError: `data` was made by another Model.
@@ -111,7 +114,7 @@ def get_state(model: Model, data: Data) -> State:
     """
     _admit(model, data)
     for name in INPUTS:
-        check_entries(getattr(data, name), name, model.coordinate_name)
+        check_entries(getattr(data, name), name, model._coordinate_name)
     return data._get_state()
 
 
@@ -140,7 +143,7 @@ def set_state(model: Model, data: Data, state: State) -> None:
         raise ForeignStateError(
             f"this State has another layout than {model!r}: it was made by another model"
         )
-    check_entries(state.vector, "state")
+    check_finite(state.vector, "state")
     data._set_state(state)
     data._recover()
 

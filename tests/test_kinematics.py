@@ -192,3 +192,88 @@ def test_a_zero_quaternion_is_refused(tmp_path: Path) -> None:
     kinematics = sm.Kinematics(_write(tmp_path, ZOO))
     with pytest.raises(BadInputError, match="zero"):
         kinematics.pose(np.zeros(kinematics.nq), "s")
+
+
+JOINT = '<joint name="j" axis="0 0 1"/>'
+SITE = '<site name="s" pos="0.3 0.1 0.2"/>'
+
+
+def _robot(
+    body: str = "", joint: str = JOINT, site: str = SITE, top: str = "", world: str = ""
+) -> str:
+    return (
+        f"<mujoco>{top}<worldbody>{world}<body name='r' {body}>{BODY}<site name='low' pos='1 0 0'/>"
+        f"<body name='b' pos='0.1 0.2 0.3'>{BODY}{joint}{site}</body></body></worldbody></mujoco>"
+    )
+
+
+TRAPS = {
+    "a root with a pose": _robot("pos='0 0 1' euler='10 20 30'"),
+    "a root with a quaternion": _robot("quat='0 0 0 -1'"),
+    "axisangle in degrees": _robot(site='<site name="s" axisangle="0 0 1 30"/>'),
+    "axisangle in radians": _robot(
+        site='<site name="s" axisangle="0 0 1 0.5"/>', top="<compiler angle='radian'/>"
+    ),
+    "an axis beside the body's origin": _robot(
+        joint='<joint name="j" pos="0.1 0.2 0" axis="1 1 0"/>'
+    ),
+    "joint pos from a default": _robot(top="<default><joint pos='0.2 0 0'/></default>"),
+    "joint pos from a class": _robot(
+        joint='<joint name="j" class="c"/>',
+        top="<default><default class='c'><joint pos='0 1 0'/></default></default>",
+    ),
+    "joint axis from a default": _robot(
+        joint='<joint name="j"/>', top="<default><joint axis='0 1 0'/></default>"
+    ),
+    "site pos from a default": _robot(
+        site='<site name="s"/>', top="<default><site pos='1 2 3'/></default>"
+    ),
+    "two compilers": _robot(
+        "euler='0.3 0 0'", top="<compiler angle='degree'/><compiler angle='radian'/>"
+    ),
+    "two defaults": _robot(
+        top="<default><joint damping='1'/></default><default><site size='1'/></default>"
+    ),
+    "a site by fromto": _robot(
+        site='<site name="s" type="capsule" size="0.1" fromto="0 0 0 1 0 0.5"/>'
+    ),
+    "another order of euler angles": _robot("euler='10 20 30'", top="<compiler eulerseq='ZYX'/>"),
+    "a joint with a ref": _robot(joint='<joint name="j" axis="0 0 1" ref="30"/>'),
+    "a site by zaxis": _robot(site='<site name="s" zaxis="1 1 0"/>'),
+    "a site by xyaxes": _robot(site='<site name="s" xyaxes="0 1 0 0 0 1"/>'),
+    "a hinge without a name": _robot(joint="<joint axis='0 0 1'/>"),
+    "two joints without a name": _robot(joint="<joint axis='0 0 1'/><joint axis='1 0 0'/>"),
+    "slide and hinge in one body": _robot(
+        joint='<joint name="j" type="slide" axis="0 1 0"/><joint name="k" axis="1 0 0"/>'
+    ),
+    "slide and ball in one body": _robot(
+        joint='<joint name="j" type="slide" axis="0 1 0"/><joint name="k" type="ball"/>'
+    ),
+    "a body without a name": _robot().replace("name='b'", ""),
+}
+
+
+@pytest.mark.parametrize("trap", TRAPS)
+def test_what_could_be_misread_agrees_or_is_refused(tmp_path: Path, trap: str) -> None:
+    model = sm.load(_write(tmp_path, TRAPS[trap]))
+    refused = False
+    for site in ("s", "low"):
+        for seed in range(3):
+            qpos = np.random.default_rng(seed).normal(size=model.nq)
+            try:
+                pose, jacobian = _against_mujoco(model, qpos, site)
+            except ModelError:
+                refused = True
+                continue
+            assert pose < 1e-12
+            assert jacobian < 1e-12
+    if trap.startswith(("a root", "axisangle in rad", "an axis", "joint axis")):
+        assert not refused
+
+
+def test_sites_of_the_world_and_of_the_base(tmp_path: Path) -> None:
+    text = _robot("pos='0 0 1'", world="<site name='w' pos='0 5 0'/>")
+    kinematics = sm.Kinematics(_write(tmp_path, text))
+    assert kinematics.pose([0.3], "w").pos.tolist() == [0, 5, 0]
+    assert kinematics.pose([0.3], "low").pos.tolist() == [1, 0, 1]
+    assert sm.Kinematics("so101").pose(np.zeros(6), "baseframe").pos.tolist() == [0, 0, 0]

@@ -21,10 +21,11 @@ from typing import Any, Literal, cast
 import mujoco
 import numpy as np
 
-from ..checks import TINY
+from ..checks import TINY, check_finite
 from ..errors import BadInputError, DivergedError, EngineWarning, ModelError
 from ..interface import OPTIONS, Data, Model
 from ..records import (
+    BEHAVIOURS,
     FORCES,
     INPUTS,
     POSES,
@@ -32,9 +33,9 @@ from ..records import (
     Behaviour,
     Capabilities,
     Contacts,
-    Keyframe,
     State,
 )
+from ._mjcf import compile_file, facts
 
 _DISABLE = mujoco.mjtDisableBit
 _SWITCHES = {  # option of `replace` -> the flag that turns it off
@@ -42,9 +43,9 @@ _SWITCHES = {  # option of `replace` -> the flag that turns it off
     "contacts": _DISABLE.mjDSBL_CONTACT,
     "limits": _DISABLE.mjDSBL_LIMIT,
 }
+# Not RK4: after its step the derived values are neither of the state before nor after.
 _INTEGRATORS = {
     "euler": mujoco.mjtIntegrator.mjINT_EULER,
-    "rk4": mujoco.mjtIntegrator.mjINT_RK4,
     "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
     "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
 }
@@ -57,6 +58,7 @@ _PARTS = {
     ),
     "friction": (_CONSTRAINT.mjCNSTR_FRICTION_DOF, _CONSTRAINT.mjCNSTR_FRICTION_TENDON),
     "limit": (_CONSTRAINT.mjCNSTR_LIMIT_JOINT, _CONSTRAINT.mjCNSTR_LIMIT_TENDON),
+    "equality": (_CONSTRAINT.mjCNSTR_EQUALITY,),
 }
 # Every single component of the integration state, in the engine's own order.
 _COMPONENTS = {
@@ -67,26 +69,33 @@ _COMPONENTS = {
     and int(bit) & int(mujoco.mjtState.mjSTATE_INTEGRATION)
 }
 _NATIVE = Behaviour("native", "the engine's own")
-_CAPABILITIES = Capabilities(
-    options=OPTIONS,
-    integrators=tuple(_INTEGRATORS),
-    behaviours={
-        "stale after a write": _NATIVE,
-        "stale after a step": _NATIVE,
-        "zeros when fresh": _NATIVE,
-        "position servo": _NATIVE,
-        "armature": _NATIVE,
-        "joint damping": _NATIVE,
-        "dry friction": _NATIVE,
-        "joint limits": _NATIVE,
-        "free joint conventions": _NATIVE,
-        "forces by part": Behaviour("native", "rows of the constraint solver, by their type"),
-        "exact restore": Behaviour("native", "mjSTATE_INTEGRATION, warm start included"),
-        "no automatic reset": Behaviour("native", "mjDSBL_AUTORESET is set at load"),
-    },
-    shared_model=True,
-    exact_restore=True,
-)
+_NOTES = {
+    "stale after a step": Behaviour(
+        "unsupported", "with RK4 the derived values are those of its fourth stage"
+    ),
+    "forces by part": Behaviour("native", "rows of the constraint solver, by their type"),
+    "exact restore": Behaviour("native", "mjSTATE_INTEGRATION, warm start included"),
+    "no automatic reset": Behaviour("native", "the engine's flag mjDSBL_AUTORESET"),
+}
+
+
+def _capabilities(raw: mujoco.MjModel) -> Capabilities:
+    """The record of one compiled model: two of its own settings show in it."""
+    behaviours = {name: _NOTES.get(name, _NATIVE) for name in BEHAVIOURS}
+    if raw.opt.integrator != int(mujoco.mjtIntegrator.mjINT_RK4):
+        behaviours["stale after a step"] = _NATIVE
+    if not raw.opt.disableflags & int(_DISABLE.mjDSBL_AUTORESET):
+        behaviours["no automatic reset"] = Behaviour(
+            "unsupported", "the engine's default: it resets, and the divergence is raised after"
+        )
+    return Capabilities(
+        options=OPTIONS,
+        integrators=tuple(_INTEGRATORS),
+        behaviours=behaviours,
+        shared_model=True,
+        exact_restore=True,
+    )
+
 
 # (thread, text) of every warning that MuJoCo gave and nobody has looked at yet. The
 # handler is the process's, so a Data trusts its own counters for what is its own.
@@ -106,8 +115,9 @@ def _listen() -> None:
 
 
 def _drain() -> list[str]:
-    """The warnings of this thread, taken off the list."""
-    mine = [entry for entry in _ALARMS if entry[0] == threading.get_ident()]
+    """The warnings of this thread, taken off the list, and of threads that are gone."""
+    others = {thread.ident for thread in threading.enumerate()} - {threading.get_ident()}
+    mine = [entry for entry in _ALARMS if entry[0] not in others]
     for entry in mine:
         _ALARMS.remove(entry)
     return [text for _, text in mine]
@@ -133,20 +143,15 @@ def load(
         ModelError: MuJoCo cannot compile the file; with its reason.
     """
     _listen()
-    text = os.fspath(path)
     try:
-        if text.lower().endswith(".mjb"):
-            raw = mujoco.MjModel.from_binary_path(text)
-        else:
-            raw = mujoco.MjModel.from_xml_path(text)
-    except (ValueError, mujoco.FatalError) as error:
+        raw = compile_file(path)
+    except ModelError:
         _drain()
-        reason = " ".join(str(error).split())
-        raise ModelError(f"MuJoCo cannot read {text}: {reason}") from error
+        raise
     if defaults == "model":
         raw.opt.disableflags |= int(_DISABLE.mjDSBL_AUTORESET)
     _pass_on(_drain())
-    return MujocoModel(raw, Path(text), substeps=1)
+    return MujocoModel(raw, Path(path), substeps=1)
 
 
 class MujocoModel(Model):
@@ -155,57 +160,15 @@ class MujocoModel(Model):
     raw: mujoco.MjModel
 
     def __init__(self, raw: mujoco.MjModel, path: Path, substeps: int) -> None:
-        m = raw
-        on_joint = m.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
-        servo = (
-            (m.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_FIXED))
-            & (m.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE))
-            & (m.actuator_biasprm[:, 1] == -m.actuator_gainprm[:, 0])
-            & (m.actuator_gainprm[:, 0] != 0)
-        )
         super().__init__(
             backend="mujoco",
             engine_version=mujoco.__version__,
             path=path,
             raw=raw,
-            capabilities=_CAPABILITIES,
-            timestep=float(m.opt.timestep) * substeps,
+            capabilities=_capabilities(raw),
+            timestep=float(raw.opt.timestep) * substeps,
             substeps=substeps,
-            nq=m.nq,
-            nv=m.nv,
-            nu=m.nu,
-            nbody=m.nbody,
-            njnt=m.njnt,
-            nsite=m.nsite,
-            ngeom=m.ngeom,
-            body_names=tuple(m.body(i).name for i in range(m.nbody)),
-            joint_names=tuple(m.joint(i).name for i in range(m.njnt)),
-            site_names=tuple(m.site(i).name for i in range(m.nsite)),
-            geom_names=tuple(m.geom(i).name for i in range(m.ngeom)),
-            actuator_names=tuple(m.actuator(i).name for i in range(m.nu)),
-            jnt_type=m.jnt_type.astype(np.int64),
-            jnt_qposadr=m.jnt_qposadr.astype(np.int64),
-            jnt_dofadr=m.jnt_dofadr.astype(np.int64),
-            jnt_limited=m.jnt_limited.astype(bool),
-            jnt_range=m.jnt_range,
-            actuator_jntid=np.where(on_joint, m.actuator_trnid[:, 0], -1).astype(np.int64),
-            actuator_ctrlrange=_ranges(m.actuator_ctrlrange, m.actuator_ctrllimited),
-            actuator_forcerange=_ranges(m.actuator_forcerange, m.actuator_forcelimited),
-            actuator_kp=np.where(servo, m.actuator_gainprm[:, 0], np.nan),
-            actuator_kv=np.where(servo, -m.actuator_biasprm[:, 2], np.nan),
-            dof_armature=m.dof_armature,
-            dof_damping=m.dof_damping,
-            dof_frictionloss=m.dof_frictionloss,
-            geom_bodyid=m.geom_bodyid.astype(np.int64),
-            site_bodyid=m.site_bodyid.astype(np.int64),
-            site_pos=m.site_pos,
-            site_quat=m.site_quat,
-            keyframes=tuple(
-                Keyframe(
-                    m.key(i).name, float(m.key_time[i]), m.key_qpos[i], m.key_qvel[i], m.key_ctrl[i]
-                )
-                for i in range(m.nkey)
-            ),
+            **facts(raw),
         )
 
     def _make_data(self) -> MujocoData:
@@ -230,10 +193,6 @@ class MujocoModel(Model):
         return MujocoModel(raw, self.path, substeps)
 
 
-def _ranges(ranges: Array, limited: Any) -> Array:
-    return np.where(limited[:, None].astype(bool), ranges, [-np.inf, np.inf])
-
-
 class MujocoData(Data):
     """An MjData. Inputs and derived arrays are views of its memory."""
 
@@ -246,18 +205,13 @@ class MujocoData(Data):
     def __init__(self, model: MujocoModel) -> None:
         _listen()
         raw = mujoco.MjData(model.raw)
-        put = functools.partial(object.__setattr__, self)
-        put("_home", model)
-        put("_raw", raw)
-        put("_alarms", _ALARMS)
-        put("_advance", _transition(model, raw))
-        put("_layout", _layout(model))
-        for name in INPUTS:
-            put(name, getattr(raw, name))
-        put("_views", {name: getattr(raw, name) for name in (*POSES, "qacc", *FORCES)})
-        for view in self._views.values():
+        views = {name: getattr(raw, name) for name in (*POSES, "qacc", *FORCES)}
+        for view in views.values():
             view.setflags(write=False)
-        self._recover()
+        for name, value in (("_raw", raw), ("_views", views), ("_layout", _layout(model))):
+            object.__setattr__(self, name, value)
+        inputs = {name: getattr(raw, name) for name in INPUTS}
+        super().__init__(model, _transition(model, raw), _ALARMS, inputs)
 
     @property
     def xpos(self) -> Array:
@@ -318,6 +272,7 @@ class MujocoData(Data):
             pos=np.array(found.pos).reshape(count, 3),
             frame=np.array(found.frame).reshape(count, 3, 3),
             force=force[:, :3],
+            torque=force[:, 3:],
         )
 
     @property
@@ -331,6 +286,10 @@ class MujocoData(Data):
     @property
     def qfrc_limit(self) -> Array:
         return self._constraint_part("limit")
+
+    @property
+    def qfrc_equality(self) -> Array:
+        return self._constraint_part("equality")
 
     def _view(self, name: str) -> Array:
         if self._model is None:
@@ -351,6 +310,7 @@ class MujocoData(Data):
         mujoco.mj_forward(self._home.raw, self.raw)
 
     def _reset(self, key: int | None) -> None:
+        _listen()
         if key is None:
             mujoco.mj_resetData(self._home.raw, self.raw)
         else:
@@ -362,9 +322,11 @@ class MujocoData(Data):
         mujoco.mj_getState(
             self._home.raw, self.raw, vector, int(mujoco.mjtState.mjSTATE_INTEGRATION)
         )
+        check_finite(vector, "state")
         return State("mujoco", mujoco.__version__, fingerprint, layout, vector.tobytes())
 
     def _set_state(self, state: State) -> None:
+        _listen()
         # A reset first: it clears the counters, without which a second divergence
         # would go unreported, and whatever else the last run left behind.
         mujoco.mj_resetData(self._home.raw, self.raw)
@@ -380,7 +342,6 @@ class MujocoData(Data):
 
     def _close(self) -> None:
         object.__setattr__(self, "_raw", None)
-        object.__setattr__(self, "_advance", None)
         self._views.clear()
 
     def _attend(self) -> None:
@@ -394,7 +355,7 @@ class MujocoData(Data):
         if bad:
             quantity, index, time = bad[0][1], int(bad[0][2]), float(bad[0][3])
         quantity = quantity.lower()
-        entry = f"{quantity}[{index}]{self._home.coordinate_name(quantity, index)}"
+        entry = f"{quantity}[{index}]{self._home._coordinate_name(quantity, index)}"
         if quantity == "ctrl":
             value = float(self.ctrl[index])
             self._give_up(f"it was stepped with a bad {entry}")
@@ -436,7 +397,7 @@ def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:
     advance = bare if substeps == 1 else finer
     quats = [
         (memoryview(raw.qpos[start : start + 4]), joint, start)
-        for joint, start in model.quaternions()
+        for joint, start in model._quaternions()
     ]
     if not quats:
         return advance
@@ -446,7 +407,7 @@ def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:
         # cheapest look at four numbers; only one near zero is looked at again.
         for quat, joint, start in quats:
             if -TINY < sum(quat) < TINY and math.hypot(*quat) < TINY:
-                raise model.zero_quaternion(joint, start)
+                raise model._zero_quaternion(joint, start)
         advance(nstep)
 
     return checked
@@ -456,7 +417,8 @@ def _layout(model: MujocoModel) -> tuple[str, tuple[tuple[str, int], ...]]:
     sizes = {
         name: int(mujoco.mj_stateSize(model.raw, int(bit))) for name, bit in _COMPONENTS.items()
     }
-    layout = tuple((name, size) for name, size in sizes.items() if size)
+    kept = ("time", *INPUTS)  # even where they are empty
+    layout = tuple((name, size) for name, size in sizes.items() if size or name in kept)
     identity = (
         "mujoco",
         layout,

@@ -183,12 +183,11 @@ def check_the_witness_agrees(lab: Lab) -> None:
 def check_addresses_cover_qpos_and_qvel(lab: Lab) -> None:
     """Joints own every slot of qpos and qvel once, in order."""
     model = lab.box
-    sizes = {JointType.FREE: (7, 6), JointType.BALL: (4, 3)}
     place = dof = 0
     for joint, name in enumerate(model.joint_names):
         require(model.joint_id(name) == joint, f"joint_id({name!r})")
         require(int(model.jnt_qposadr[joint]) == place, f"jnt_qposadr of {name}")
         require(int(model.jnt_dofadr[joint]) == dof, f"jnt_dofadr of {name}")
-        nq, nv = sizes.get(JointType(int(model.jnt_type[joint])), (1, 1))
-        place, dof = place + nq, dof + nv
+        kind = JointType(int(model.jnt_type[joint]))
+        place, dof = place + kind.nq, dof + kind.nv
     require((place, dof) == (model.nq, model.nv), "joints do not fill qpos and qvel")

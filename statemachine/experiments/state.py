@@ -9,13 +9,6 @@ from ..records import JointType
 from ..verbs import make_data, reset
 from ._common import Provenance, provenance
 
-_SIZES = {
-    JointType.FREE: (7, 6),
-    JointType.BALL: (4, 3),
-    JointType.SLIDE: (1, 1),
-    JointType.HINGE: (1, 1),
-}
-
 
 @dataclass(frozen=True)
 class Joint:
@@ -56,15 +49,15 @@ def run(model: Model) -> Layout:
     for name, kind, place, dof in zip(
         model.joint_names, model.jnt_type, model.jnt_qposadr, model.jnt_dofadr, strict=True
     ):
-        nq, nv = _SIZES[JointType(int(kind))]
+        known = JointType(int(kind))
         joints.append(
             Joint(
                 name=name,
-                type=JointType(int(kind)).name.lower(),
+                type=known.name.lower(),
                 qpos_start=int(place),
-                qpos_stop=int(place) + nq,
+                qpos_stop=int(place) + known.nq,
                 qvel_start=int(dof),
-                qvel_stop=int(dof) + nv,
+                qvel_stop=int(dof) + known.nv,
             )
         )
     with make_data(model) as data:
