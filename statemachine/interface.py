@@ -122,6 +122,9 @@ class Model(ABC):
     site_quat: Array
     keyframes: tuple[Keyframe, ...]
 
+    if TYPE_CHECKING:
+        _quaternions: list[tuple[int, int]]  # (joint id, address in qpos) of each
+
     def __init__(self, **facts: Any) -> None:
         missing = Model.__annotations__.keys() - facts.keys()
         if missing:
@@ -129,6 +132,8 @@ class Model(ABC):
         for name, value in facts.items():
             constant = read_only(value) if isinstance(value, np.ndarray) else value
             object.__setattr__(self, name, constant)
+        # Once: NumPy swallows a Ctrl-C that falls into a comparison with an enum.
+        object.__setattr__(self, "_quaternions", _quaternions(self.jnt_type, self.jnt_qposadr))
 
     def __setattr__(self, name: str, value: object) -> NoReturn:
         raise ReadOnlyError(
@@ -218,18 +223,9 @@ class Model(ABC):
             reason=reason,
         )
 
-    def _quaternions(self) -> list[tuple[int, int]]:
-        """(joint id, address in qpos) of every quaternion."""
-        found = []
-        for joint, kind in enumerate(self.jnt_type):
-            if kind in (JointType.FREE, JointType.BALL):
-                offset = 3 if kind == JointType.FREE else 0
-                found.append((joint, int(self.jnt_qposadr[joint]) + offset))
-        return found
-
     def _check_quaternions(self, qpos: Array) -> None:
         """Raise BadInputError for a quaternion of `qpos` (nq,) that is zero."""
-        for joint, start in self._quaternions():
+        for joint, start in self._quaternions:
             quat = qpos[start : start + 4]
             if quat.dot(quat) < TINY * TINY:
                 raise self._zero_quaternion(joint, start)
@@ -287,6 +283,17 @@ class Model(ABC):
     @abstractmethod
     def _replace(self, options: dict[str, Any]) -> Model:
         """Another Model; `options` are checked: bools, floats, (3,) and (nv,) arrays."""
+
+
+def _quaternions(types: Ints, addresses: Ints) -> list[tuple[int, int]]:
+    offsets = {int(JointType.FREE): 3, int(JointType.BALL): 0}
+    return [
+        (joint, address + offsets[kind])
+        for joint, (kind, address) in enumerate(
+            zip(types.tolist(), addresses.tolist(), strict=True)
+        )
+        if kind in offsets
+    ]
 
 
 # By name, so that type checkers take the inputs for the descriptors below.

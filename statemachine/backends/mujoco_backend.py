@@ -397,7 +397,7 @@ def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:
     advance = bare if substeps == 1 else finer
     quats = [
         (memoryview(raw.qpos[start : start + 4]), joint, start)
-        for joint, start in model._quaternions()
+        for joint, start in model._quaternions
     ]
     if not quats:
         return advance
