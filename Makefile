@@ -1,8 +1,8 @@
-# make lesson   set everything up and run the main lesson
-# make test     set everything up and run all checks and tests
-# make check    lint, format, layers and types only
-# make bench    the speed budget, as ratios
-# make help     all targets
+# make lesson       set everything up and run the main lesson
+# make test         set everything up and run all checks and tests
+# make check        lint, format, layers and types only
+# make bench        the speed budget, as ratios
+# make help         all targets
 
 VENV   ?= .venv
 BIN    := $(VENV)/bin
@@ -24,21 +24,23 @@ lesson: $(VENV)/run.stamp
 	@# 3: the witness cannot be had here; it has said so in one line.
 	@$(BIN)/statemachine fingertip || [ $$? -eq 3 ]
 	@echo "Where to go next:"
-	@echo "  source $(BIN)/activate     then statemachine is a command of your shell"
-	@echo "  statemachine               all lessons, in the order of the course"
-	@echo "  statemachine lesson state  the first of them"
-	@echo "  statemachine doctor        what this machine has, and what to do"
+	@echo "  source $(BIN)/activate   makes statemachine a command of your shell"
+	@echo "  statemachine                all lessons, in the order of the course"
+	@echo "  statemachine lesson state   the first of them"
+	@echo "  statemachine doctor         what this machine has, and what to do"
 
 test: check
 	@$(BIN)/python -m pytest -n auto
 
-# make test-fast  without the slow tests
+# make test-fast    without the slow tests
 test-fast: $(VENV)/test.stamp
 	@$(BIN)/python -m pytest -n auto -m "not slow"
 
 # make test-newest  the same tests with the newest versions that pyproject.toml allows
 test-newest:
-	@$(MAKE) --no-print-directory VENV=.venv-newest CONSTRAINTS= .venv-newest/test.stamp
+	@rm -f .venv-newest/*.stamp
+	@$(MAKE) --no-print-directory VENV=.venv-newest CONSTRAINTS="-U --upgrade-strategy eager" \
+	.venv-newest/test.stamp
 	@.venv-newest/bin/python -m pytest -n auto
 
 check: $(VENV)/test.stamp
@@ -47,22 +49,23 @@ check: $(VENV)/test.stamp
 	@$(BIN)/lint-imports
 	@$(BIN)/pyright --pythonpath $(BIN)/python
 
-# make format   put the sources into the project's format
+# make format       put the sources into the project's format
 format: $(VENV)/test.stamp
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/ruff format .
 
-# make hooks    let git run the checks before a commit and a push
+# make hooks        let git run the checks before a commit and a push
 hooks: $(VENV)/test.stamp
 	@$(BIN)/pre-commit install --hook-type pre-commit --hook-type pre-push
 
 bench: $(VENV)/run.stamp
 	@$(BIN)/python -m benchmarks
 
-# make picture  render models/so101/so101.png anew (needs EGL or OSMesa)
+# make picture      render models/so101/so101.png anew (needs EGL or OSMesa)
 picture: $(VENV)/test.stamp
 	@$(BIN)/python models/so101/render.py
 
+# make clean        remove what the others made
 clean:
 	rm -rf .venv .venv-newest build dist .pytest_cache .ruff_cache .hypothesis
 

@@ -23,8 +23,8 @@ __version__ = "0.1.0"
 # where both were installed into one folder, its files lie among ours.
 if _os.path.exists(_os.path.join(_os.path.dirname(__file__), "statemachine.py")):
     raise ImportError(
-        "the package python-statemachine is installed over this one and uses the same import "
-        "name: pip uninstall python-statemachine, then reinstall statemachine-sim"
+        "the package python-statemachine is installed here too and uses the same import name: "
+        "pip uninstall python-statemachine, then pip install --force-reinstall statemachine-sim"
     )
 
 if TYPE_CHECKING:
@@ -83,4 +83,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__, *_MODULES})
+    return sorted({*__all__, *_MODULES})

@@ -103,5 +103,9 @@ def index_of(kind: str, name: str, names: Sequence[str]) -> int:
 
 
 def kind_of(value: object) -> str:
-    """A value's type with its module, for messages."""
-    return f"{type(value).__module__}.{type(value).__qualname__}"
+    """What a value is, for messages: "a Data" of any backend, else its type."""
+    for kind in type(value).__mro__:
+        if kind.__module__ == "statemachine.interface":
+            return f"a {kind.__name__}"
+    module, name = type(value).__module__, type(value).__qualname__
+    return name if module == "builtins" else f"{module}.{name}"

@@ -10,16 +10,6 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
-import statemachine
-
-if not hasattr(statemachine, "_HOMES"):  # not our __init__: its distribution was installed over us
-    print(
-        "statemachine: the package python-statemachine uses the same import name: "
-        "pip uninstall python-statemachine, then pip install --force-reinstall statemachine-sim",
-        file=sys.stderr,
-    )
-    raise SystemExit(2)
-
 from . import __version__
 from .errors import MissingEngineError, StateMachineError
 from .lessons import LESSONS, Lesson, module
@@ -40,12 +30,22 @@ class _Parser(argparse.ArgumentParser):
             known = [choice.strip() for choice in choices.rstrip(")").split(",")]
             close = difflib.get_close_matches(given, known, n=1, cutoff=0.5)
             hint = f". Did you mean {close[0]}?" if close else ""
+            if given in LESSONS:
+                hint = f". Did you mean {PROGRAM} lesson {given}?"
+            elif given in ("fingertip", "doctor"):
+                hint = f". Did you mean {PROGRAM} {given}?"
             message = f"{wrong}no {given!r}; known: {', '.join(known)}{hint}"
         if "expected one argument" in message:
             flag = message.split(":")[0].removeprefix("argument ").split("/")[0]
-            message += f" (one that begins with a minus: {flag}=-1)"
+            message += f" (one that begins with a minus: {flag}={_after(flag)})"
         print(f"{self.prog}: {message}", file=sys.stderr)
         raise SystemExit(BAD_INPUT)
+
+
+def _after(flag: str) -> str:
+    """What was typed after a flag, to show it as it would be taken."""
+    typed = sys.argv[sys.argv.index(flag) + 1 :] if flag in sys.argv else []
+    return typed[0] if typed else "-1"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -188,7 +188,10 @@ def _run_lesson(options: argparse.Namespace) -> int:
     results = _on_each_backend(
         options, lesson.name, lambda model, report: code.run(model, values, report)
     )
-    return _show(options, code, results, lambda _result: True)
+    names = list(LESSONS)
+    later = names[names.index(lesson.name) + 1 :]
+    following = f"lesson {later[0]}" if later else "fingertip"
+    return _show(options, code, results, f"Next: {PROGRAM} {following}")
 
 
 def _fingertip(options: argparse.Namespace) -> int:
@@ -208,7 +211,7 @@ def _fingertip(options: argparse.Namespace) -> int:
             progress=report,
         ),
     )
-    return _show(options, words, results, lambda result: result.agrees)
+    return _show(options, words, results)
 
 
 def _on_each_backend(
@@ -242,8 +245,9 @@ def _show(
     options: argparse.Namespace,
     words: Any,
     results: dict[str, Any],
-    agrees: Callable[[Any], bool],
+    footer: str = "",
 ) -> int:
+    page = words.page(results)
     if options.json:
         from .report.as_json import dumps
 
@@ -251,8 +255,8 @@ def _show(
     else:
         from .report.terminal import show
 
-        show(words.page(results))
-    return 0 if all(agrees(result) for result in results.values()) else SAYS_NO
+        show(page, footer)
+    return 0 if page.holds else SAYS_NO
 
 
 def _doctor(options: argparse.Namespace) -> int:

@@ -52,6 +52,8 @@ def resolve(name: str | os.PathLike[str], menagerie: str | os.PathLike[str] | No
     if path.suffix.lower() in SUFFIXES:
         if path.is_file():
             return path.absolute()
+        if menagerie is None and text.removesuffix(".xml") in model_names():
+            return models_dir() / text  # the name as pages print it
         what = "is a folder, not a file" if path.is_dir() else "does not exist"
         raise ModelFileError(f"model file {text} {what}")
     if menagerie is not None:

@@ -113,7 +113,7 @@ class Keyframe:
         return Keyframe, (self.name, self.time, self.qpos, self.qvel, self.ctrl)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Contacts:
     """The n contacts of one moment, as arrays.
 
@@ -144,8 +144,11 @@ class Contacts:
     def __len__(self) -> int:
         return len(self.dist)
 
+    def __repr__(self) -> str:
+        return f"<Contacts: {len(self)}, between geoms {self.geom.tolist()}>"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class State:
     """All that decides the future of a Data, as far as its engine exposes it.
 
@@ -165,6 +168,10 @@ class State:
     fingerprint: str
     layout: tuple[tuple[str, int], ...]
     blob: bytes
+
+    def __repr__(self) -> str:
+        parts = ", ".join(f"{name} {size}" for name, size in self.layout)
+        return f"<State of {self.backend} {self.engine_version} at {self.time:g} s: {parts}>"
 
     @property
     def vector(self) -> Array:

@@ -47,9 +47,10 @@ def step(model: Model, data: Data, nstep: int = 1) -> None:
         ClosedDataError: `data` is closed.
     """
     try:
-        if data._model is not model:
-            _admit(model, data)
+        ready = data._model is model
     except AttributeError:
+        ready = False
+    if not ready:
         _admit(model, data)
     advance = data._advance  # as an attribute, which CPython reads faster than a method
     if nstep is _ONE:  # by identity, which True and 1.0 do not pass
@@ -150,10 +151,11 @@ def set_state(model: Model, data: Data, state: State) -> None:
 
 def _admit(model: Model, data: Data, even_troubled: bool = False) -> None:
     """Raise unless `data` is a usable Data of `model`."""
-    if not isinstance(model, Model):
-        raise TypeError(f"the first argument must be a Model; got {kind_of(model)}")
-    if not isinstance(data, Data):
-        raise TypeError(f"the second argument must be a Data; got {kind_of(data)}")
+    if not isinstance(model, Model) or not isinstance(data, Data):
+        raise TypeError(
+            "the first two arguments are a Model and a Data; "
+            f"got {kind_of(model)} and {kind_of(data)}"
+        )
     if data._home is not model:
         raise ForeignDataError(
             f"this Data was made by another Model ({data._home!r}): a Data belongs to the "

@@ -30,8 +30,18 @@ def need_engine(name: str) -> None:
         pytest.skip(str(error))
 
 
+def _shared(path: Path) -> Path:
+    """Data of the public model, which are no part of the project: skip without them."""
+    if not path.exists():
+        reason = f"no {path.relative_to(SHARED.parent)} beside the checkout"
+        if "shared" in REQUIRED:
+            pytest.fail(f"STATEMACHINE_REQUIRE names shared: {reason}")
+        pytest.skip(reason)
+    return path
+
+
 def pytest_configure(config: pytest.Config) -> None:
-    unknown = REQUIRED - set(ENGINES) - {"render"}
+    unknown = REQUIRED - set(ENGINES) - {"render", "shared"}
     if unknown:
         raise pytest.UsageError(f"STATEMACHINE_REQUIRE names no engine: {sorted(unknown)}")
 
@@ -60,10 +70,7 @@ def pinocchio() -> None:
 @pytest.fixture
 def menagerie() -> Path:
     """The folder of public models beside the checkout."""
-    folder = SHARED / "menagerie"
-    if not folder.is_dir():
-        pytest.skip(f"no public models at {folder.parent.name}/{folder.name}")
-    return folder
+    return _shared(SHARED / "menagerie")
 
 
 @pytest.fixture
@@ -71,9 +78,7 @@ def golden() -> Callable[[str], np.ndarray]:
     """Golden data from the public reference model, by file name: columns by name."""
 
     def read(name: str) -> np.ndarray:
-        path = SHARED / "so101" / f"{name}.csv"
-        if not path.is_file():
-            pytest.skip(f"no golden data at shared/so101/{path.name}")
+        path = _shared(SHARED / "so101" / f"{name}.csv")
         return np.genfromtxt(path, delimiter=",", names=True)
 
     return read

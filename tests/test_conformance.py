@@ -27,5 +27,6 @@ def test_backend_keeps(lab: conformance.Lab, check: str) -> None:
 def test_run_reports_every_check(backend: str) -> None:
     outcomes = conformance.run(backend)
     assert [outcome.check for outcome in outcomes] == list(conformance.CHECKS)
-    assert {outcome.result for outcome in outcomes} <= {"passed", "skipped"}
+    allowed = {"passed"} if backend == "mujoco" else {"passed", "skipped"}
+    assert {outcome.result for outcome in outcomes} <= allowed, outcomes
     assert len(outcomes) > 40

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 import statemachine as sm
+from statemachine.engines import ENGINES, require
 
-from .conftest import ROOT
+from .conftest import REQUIRED, ROOT
 
 HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "xml.etree")
 
@@ -45,6 +46,12 @@ print('loaded:', *[name for name in {HEAVY!r} if name in sys.modules])
     assert loaded <= allowed
 
 
+def test_every_engine_that_is_required_is_here() -> None:
+    """STATEMACHINE_REQUIRE is a promise of the machine, whether or not a test needs it."""
+    for name in sorted(REQUIRED & set(ENGINES)):
+        require(name)
+
+
 def test_everything_promised_is_there() -> None:
     for name in sm.__all__:
         assert getattr(sm, name) is not None
@@ -71,23 +78,37 @@ def test_the_clash_of_import_names_is_said_in_one_line(tmp_path: Path) -> None:
     assert "pip uninstall python-statemachine" in last
 
 
-def test_the_clash_is_noticed_where_the_other_init_won(tmp_path: Path) -> None:
-    """The other distribution was installed after us: our cli meets its __init__."""
+@pytest.mark.parametrize("ours_beside", [True, False])
+def test_the_command_says_it_in_one_line(tmp_path: Path, ours_beside: bool) -> None:
+    """Theirs is found first, alone or with our files around it."""
     package = tmp_path / "statemachine"
     package.mkdir()
     (package / "__init__.py").write_text("class StateMachine: ...\n__version__ = '3.0'\n")
-    for name in ("cli.py", "errors.py"):
-        (package / name).write_text((ROOT / "statemachine" / name).read_text())
+    (package / "statemachine.py").write_text("")
+    if ours_beside:
+        (package / "cli.py").write_text((ROOT / "statemachine" / "cli.py").read_text())
+    (tmp_path / "statemachine_sim.py").write_text((ROOT / "statemachine_sim.py").read_text())
     done = subprocess.run(
-        [sys.executable, "-c", "from statemachine.cli import main; main()"],
+        [sys.executable, "-m", "statemachine_sim"],
         capture_output=True,
         text=True,
         cwd=tmp_path,
         check=False,
     )
-    assert done.returncode != 0
+    assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1, done.stderr
     assert "pip uninstall python-statemachine" in done.stderr
+
+
+def test_the_command_runs_where_there_is_no_clash() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "statemachine_sim", "--version"],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=True,
+    )
+    assert done.stdout.startswith("statemachine ")
 
 
 @pytest.mark.parametrize(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import importlib
+import importlib.metadata
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Protocol, cast
 
 from ..engines import require
-from ..errors import BadInputError, unknown_name
+from ..errors import BadInputError, MissingEngineError, unknown_name
 from ..interface import Model
 from ..models import resolve
 
@@ -35,6 +36,7 @@ _BACKENDS: dict[str, Backend] = {
 
 def backend_names() -> list[str]:
     """Names that `load` takes for `backend`, whether or not their engine is installed."""
+    _discover()
     return list(_BACKENDS)
 
 
@@ -50,13 +52,21 @@ def backend_engine(name: str) -> str | None:
 def register(name: str, loader: str) -> None:
     """Make a backend of another package known under a name.
 
+    A package that declares it as an entry point of the group "statemachine.backends"
+    is found without this, by the command line too.
+
     Args:
         name: What `load(…, backend=name)` takes.
         loader: "package.module:function" of a `Loader`; imported at first use.
+
+    Raises:
+        BadInputError: The loader is no such path, or the name is another backend's.
     """
     module, _, function = loader.partition(":")
     if not (module and function):
         raise BadInputError(f"loader must read 'package.module:function'; got {loader!r}")
+    if _BACKENDS.get(name, Backend(loader)) != Backend(loader):
+        raise BadInputError(f"there is a backend named {name!r} already; choose another name")
     _BACKENDS[name] = Backend(loader)
 
 
@@ -89,11 +99,24 @@ def load(
     if entry.engine:
         require(entry.engine)
     module, _, function = entry.loader.partition(":")
-    loader = cast("Callable[..., Model]", getattr(importlib.import_module(module), function))
+    try:
+        loader = cast("Callable[..., Model]", getattr(importlib.import_module(module), function))
+    except (ImportError, AttributeError) as error:
+        raise MissingEngineError(
+            f"backend {backend!r} cannot be loaded from {entry.loader!r}: {error}", engine=backend
+        ) from error
     return loader(path, defaults=defaults)
 
 
 def _find(name: str) -> Backend:
     if name not in _BACKENDS:
+        _discover()
+    if name not in _BACKENDS:
         raise unknown_name("backend", name, _BACKENDS)
     return _BACKENDS[name]
+
+
+def _discover() -> None:
+    """Add the backends that installed packages declare; our own names stay ours."""
+    for entry in importlib.metadata.entry_points(group="statemachine.backends"):
+        _BACKENDS.setdefault(entry.name, Backend(entry.value))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..kinematics import Kinematics
-from ..records import JointType
+from ..records import POSES, JointType
 from ..rotations import matrix_from_quat
 from ..verbs import forward, get_state, make_data, reset, set_state, step
 from ._lab import (
@@ -92,7 +92,11 @@ def check_a_step_leaves_values_of_the_state_before(lab: Lab) -> None:
             set_state(model, other, before)
             forward(model, other)
             expected = snapshot(other)
-        for name in ("xpos", "xquat", "site_xpos", "site_xmat", "contacts.dist", "contacts.pos"):
+        names = list(POSES)
+        if model.capabilities.exact_restore:
+            # Elsewhere a restored Data may find the same contact at other points.
+            names += ["contacts.dist", "contacts.pos"]
+        for name in names:
             require_close(left[name], expected[name], 1e-12, f"{name} after a step")
     forward(model, data)
     gap = np.abs(data.site_xpos - left["site_xpos"]).max()

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from xml.etree import ElementTree
+
 import numpy as np
 
 from ..errors import UnsupportedError
 from ..interface import Model
-from ..records import Array
+from ..models import resolve
+from ..records import BEHAVIOURS, Array
 from ..rotations import angle_between, matrix_from_quat
 from ..verbs import forward, make_data, step
 from ._lab import Lab, require, require_close
@@ -51,6 +54,8 @@ def check_ctrl_is_clamped_inside(lab: Lab) -> None:
     ends = []
     for excess in (0.0, 5.0):
         data = lab.data(model)
+        # Near the end of the range, where a servo that is asked for more pushes harder.
+        data.qpos[:] = model.actuator_ctrlrange[:, 1] - 0.002
         data.ctrl[:] = model.actuator_ctrlrange[:, 1] + excess
         step(model, data, 50)
         ends.append(data.qpos.copy())
@@ -163,6 +168,91 @@ def check_contact_carries_the_weight(lab: Lab) -> None:
     require(bool((np.abs(contacts.dist) < 0.002).all()), "surfaces are not together")
 
 
+def check_contact_forces_lean_against_a_push(lab: Lab) -> None:
+    """Under slanted gravity the floor's force on a box is -m·g, its tangent part too."""
+    push = np.array([2.0, -1.0, -_G])
+    model = lab.box.replace(gravity=push)
+    with make_data(model) as data:
+        step(model, data, 300)
+        forward(model, data)
+        contacts, body = data.contacts, model.body_id("box")
+        pairs = model.geom_bodyid[contacts.geom]
+        total, place = np.zeros(3), np.zeros(3)
+        mine = np.flatnonzero((pairs == body).any(axis=1))
+        for k in mine:
+            sign = 1.0 if pairs[k, 1] == body else -1.0
+            force = sign * contacts.frame[k].T @ contacts.force[k]
+            total, place = total + force, place + contacts.pos[k] / len(mine)
+        box = data.xpos[body].copy()
+    require_close(total, -0.096 * push, 0.03 * 0.096 * _G, "force of the floor on a pushed box")
+    require(bool(np.abs(place[:2] - box[:2]).max() < 0.02), "contacts are not below the box")
+    require(abs(place[2]) < 0.002, f"contacts are {place[2]:.4f} m above the floor")
+
+
+def check_depth_of_a_contact(lab: Lab) -> None:
+    """Of a box one millimetre in the floor, every contact's distance is minus that."""
+    model, data = lab.box, lab.data(lab.box)
+    start = int(model.jnt_qposadr[model.joint_id("box")])
+    data.qpos[start + 2] = 0.029
+    forward(model, data)
+    contacts, body = data.contacts, model.body_id("box")
+    mine = (model.geom_bodyid[contacts.geom] == body).any(axis=1)
+    require(int(mine.sum()) >= 3, f"{mine.sum()} contacts")
+    require_close(contacts.dist[mine], np.full(int(mine.sum()), -0.001), 2e-4, "contacts.dist")
+
+
+def check_acceleration_is_the_rate_of_velocity(lab: Lab) -> None:
+    """Qacc is what a very short step does to qvel, in the air and under servo force."""
+    base = lab.arm.replace(timestep=1e-6)
+    random = np.random.default_rng(21)
+    with make_data(base) as data:
+        for _ in range(4):
+            data.qpos[:] = random.uniform(-0.5, 0.5, 6)
+            data.qvel[:] = random.uniform(-1, 1, 6)
+            data.ctrl[:] = data.qpos + random.uniform(-0.002, 0.002, 6)
+            forward(base, data)
+            expected, before = data.qacc.copy(), data.qvel.copy()
+            step(base, data)
+            rate = (data.qvel - before) / base.timestep
+            require_close(rate, expected, 0.02 * np.abs(expected).max(), "change of qvel over h")
+
+
+def check_a_force_accelerates_by_the_armature(lab: Lab) -> None:
+    """With an armature far beyond the links' inertia, qacc is force over armature."""
+    heavy = 1e4
+    model = lab.arm.replace(armature=heavy, gravity=[0, 0, 0], frictionloss=0.0)
+    with make_data(model) as data:
+        data.ctrl[:] = 0.001
+        forward(model, data)
+        expected = servo(model, data.qpos, data.qvel, data.ctrl) / heavy
+        require_close(data.qacc, expected, 1e-4 * np.abs(expected).max(), "qacc")
+        require_close(model.dof_armature, np.full(6, heavy), 0.0, "dof_armature")
+
+
+def check_facts_are_the_files(lab: Lab) -> None:
+    """Ranges, gains and joint parameters of the Model are those that the file states."""
+    model = lab.arm
+    root = ElementTree.parse(resolve("so101")).getroot()
+    ranges = [joint.get("range", "").split() for joint in root.findall(".//worldbody//joint")]
+    servos = root.findall("actuator/position")
+    require_close(model.jnt_range, np.array(ranges, dtype=float), 0.0, "jnt_range")
+    require(bool(model.jnt_limited.all()), "jnt_limited")
+    ends = [servo.get("ctrlrange", "").split() for servo in servos]
+    require_close(model.actuator_ctrlrange, np.array(ends, dtype=float), 0.0, "actuator_ctrlrange")
+    driven = [model.joint_names[joint] for joint in model.actuator_jntid]
+    require(driven == [servo.get("joint") for servo in servos], f"actuator_jntid: {driven}")
+    joint, gains = root.find("default/default/joint"), root.find("default/default/position")
+    require(joint is not None and gains is not None, "the file has no defaults")
+    if joint is None or gains is None:
+        return
+    for name in ("damping", "frictionloss", "armature"):
+        value = np.full(6, float(joint.get(name, "nan")))
+        require_close(getattr(model, f"dof_{name}"), value, 0.0, f"dof_{name}")
+    for name in ("kp", "kv"):
+        value = np.full(6, float(gains.get(name, "nan")))
+        require_close(getattr(model, f"actuator_{name}"), value, 0.0, f"actuator_{name}")
+
+
 def check_the_box_is_held(lab: Lab) -> None:
     """From keyframe 0, under a command that moves the arm, both jaws keep the box."""
     model, data = lab.box, lab.data(lab.box, keyframe=0)
@@ -223,4 +313,8 @@ def check_unsupported_is_said(lab: Lab) -> None:
             require(error.backend == model.backend and error.feature == name, str(error))
         else:
             raise AssertionError(f"{name} is not listed, and was taken")
-    require(bool(model.capabilities.behaviours), "the capability record is empty")
+    told = model.capabilities.behaviours
+    require(told.keys() == set(BEHAVIOURS), f"the record speaks of {sorted(told)}")
+    for name, behaviour in told.items():
+        known = ("native", "emulated", "unsupported")
+        require(behaviour.support in known and bool(behaviour.note), f"the record on {name}")

@@ -66,7 +66,7 @@ def _with_includes(path: Path) -> Iterator[bytes]:
 
 @dataclass(frozen=True)
 class Forces:
-    """The generalized forces on one joint at one moment [N·m or N].
+    """The generalized forces on one joint at one moment [N·m; of a slide, N].
 
     `bias` is on the other side of the equation of motion, so that gravity acts as
     -bias; a part that the engine does not yield is None. `total` is what is left over
@@ -79,11 +79,19 @@ class Forces:
     friction: float | None
     contact: float | None
     limit: float | None
+    equality: float | None
 
     @property
     def total(self) -> float | None:
         """Sum of all parts, -bias among them; None if one is missing."""
-        parts = (self.actuator, self.passive, self.friction, self.contact, self.limit)
+        parts = (
+            self.actuator,
+            self.passive,
+            self.friction,
+            self.contact,
+            self.limit,
+            self.equality,
+        )
         if self.bias is None or any(part is None for part in parts):
             return None
         return sum(part for part in parts if part is not None) - self.bias
@@ -105,6 +113,7 @@ def forces_on(data: Data, dof: int) -> Forces:
         friction=part("friction"),
         contact=part("contact"),
         limit=part("limit"),
+        equality=part("equality"),
     )
 
 
@@ -117,18 +126,37 @@ def body_pairs(model: Model, contacts: Contacts) -> Counter[str]:
     return pairs
 
 
-def geom_label(model: Model, geom: int) -> str:
-    """Name of a geom; of a nameless one, its body's."""
-    body = model.body_names[int(model.geom_bodyid[geom])]
-    return model.geom_names[geom] or f"a shape of {body}"
+def carried_by(model: Model, bodies: Iterable[int]) -> frozenset[int]:
+    """These bodies and all that hang on them."""
+    carried = set(bodies)
+    for body in range(1, model.nbody):  # parents come before children
+        if int(model.body_parentid[body]) in carried:
+            carried.add(body)
+    return frozenset(carried)
 
 
-def touching(model: Model, contacts: Contacts) -> tuple[str, ...]:
-    """Which shapes touch, as "fixed_stud_1 on floor", each pair once."""
-    seen = dict.fromkeys(
-        f"{geom_label(model, int(two))} on {geom_label(model, int(one))}"
-        for one, two in contacts.geom
-    )
+def moved_by_actuators(model: Model) -> frozenset[int]:
+    """The robot's moving part: what the actuated joints carry."""
+    joints = [joint for joint in model.actuator_jntid.tolist() if joint >= 0]
+    return carried_by(model, (int(model.jnt_bodyid[joint]) for joint in joints))
+
+
+def touching(model: Model, contacts: Contacts, bodies: frozenset[int]) -> tuple[str, ...]:
+    """What of `bodies` touches what else, as "fixed_tip (gripper) on floor", each once."""
+
+    def label(geom: int) -> str:
+        body = model.body_names[int(model.geom_bodyid[geom])]
+        name = model.geom_names[geom]
+        if name and body not in (name, "world"):
+            return f"{name} ({body})"
+        return name or body
+
+    seen: dict[str, None] = {}
+    for pair in contacts.geom.tolist():
+        inside = [int(model.geom_bodyid[geom]) in bodies for geom in pair]
+        if inside[0] != inside[1]:
+            ours, other = pair if inside[0] else pair[::-1]
+            seen[f"{label(ours)} on {label(other)}"] = None
     return tuple(seen)
 
 
@@ -140,11 +168,20 @@ def scalar_joint(model: Model, name: str) -> tuple[int, int]:
     return int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
 
 
+# A run that would take hours is a slip of the keyboard.
+_STEPS_MOST = 10_000_000
+
+
 def steps_in(model: Model, seconds: float) -> int:
     """Number of timesteps in a time, at least one."""
     if not np.isfinite(seconds) or seconds <= 0:
         raise BadInputError(f"seconds must be above 0; got {seconds}")
-    return max(1, round(seconds / model.timestep))
+    steps = max(1, round(seconds / model.timestep))
+    if steps > _STEPS_MOST:
+        raise BadInputError(
+            f"{seconds:g} s are {steps:,} steps, and a run has at most {_STEPS_MOST:,}"
+        )
+    return steps
 
 
 def milestones(seconds: float) -> list[float]:
@@ -161,5 +198,7 @@ def command(model: Model, values: Iterable[float], name: str = "ctrl") -> Array:
     """A full ctrl (nu,) from values; the error says how many there should be."""
     array = np.array(list(values), dtype=np.float64)
     if array.shape != (model.nu,):
-        raise BadInputError(f"{name} wants {model.nu} numbers; got {array.size}")
+        raise BadInputError(
+            f"{name} wants {model.nu} numbers, one for each actuator; got {array.size}"
+        )
     return array

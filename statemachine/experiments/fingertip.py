@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..checks import as_count
-from ..errors import BadInputError
+from ..errors import BadInputError, UnknownNameError
 from ..interface import Model
 from ..kinematics import Kind, Kinematics, Pose
 from ..records import Array, JointType
@@ -46,11 +46,12 @@ class Certificate:
         site: The frame on the engine; witness_frame: its name for the witness.
         body: The body that carries it, on the engine.
         poses: How many were compared.
-        frames: Offset between the two frame definitions.
+        frames: Offset between the two frame definitions; None where the files name
+            no common body and the offset between the poses is not steady.
         position_worst, position_median: Difference in position [m]; None if refused.
         rotation_worst, rotation_median: Largest entry of the difference of the
             rotation matrices; None if refused.
-        zero_pose: Fingertip (3,) at qpos 0 on the engine [m].
+        default_pose: Fingertip (3,) at the model's default qpos on the engine [m].
         tolerance: What both worst differences must not exceed.
     """
 
@@ -59,12 +60,12 @@ class Certificate:
     body: str
     witness_file: str
     poses: int
-    frames: Offset
+    frames: Offset | None
     position_worst: float | None
     position_median: float | None
     rotation_worst: float | None
     rotation_median: float | None
-    zero_pose: tuple[float, float, float]
+    default_pose: tuple[float, float, float]
     tolerance: float
     provenance: Provenance
 
@@ -92,7 +93,7 @@ def run(
 
     Args:
         model: On the engine to be certified.
-        poses: How many: the default pose, then random ones.
+        poses: How many, at least 2: the default pose, then random ones.
         seed: Of the random poses.
         site: The frame on the engine.
         witness: The file that Pinocchio reads; by default the engine's own.
@@ -107,10 +108,14 @@ def run(
             has joints that the witness's file has not.
     """
     count = as_count(poses, "poses")
+    if count < 2:
+        raise BadInputError("poses must be at least 2: one cannot tell a frame from a joint")
     if seed < 0:
         raise BadInputError(f"seed must not be negative; got {seed}")
     tip = model.site_id(site)
     known = Kinematics(model.path if witness is None else witness)
+    if not all(known.joint_names):
+        raise BadInputError(f"{known.path.name} has joints without a name: they cannot be matched")
     # Joints that only the engine's scene has (a free box) stay where they are.
     shared = [name for name in model.joint_names if name in known.joint_names]
     if sorted(shared) != sorted(known.joint_names):
@@ -123,10 +128,10 @@ def run(
     theirs = kinematics.poses(configurations[:, _slots(model, shared)], name, kind)
     offset = _declared_offset(model, tip, kinematics, name, kind) or _steady_offset(ours, theirs)
     moved = rotated = None
-    if offset.same:
+    if offset is None or offset.same:
         moved = np.linalg.norm(ours.pos - theirs.pos, axis=1)
         rotated = np.abs(ours.mat - theirs.mat).max(axis=(1, 2))
-    zero = ours.pos[0]
+    first = ours.pos[0]
     return Certificate(
         site=site,
         witness_frame=name,
@@ -138,7 +143,7 @@ def run(
         position_median=None if moved is None else float(np.median(moved)),
         rotation_worst=None if rotated is None else float(rotated.max()),
         rotation_median=None if rotated is None else float(np.median(rotated)),
-        zero_pose=(float(zero[0]), float(zero[1]), float(zero[2])),
+        default_pose=(float(first[0]), float(first[1]), float(first[2])),
         tolerance=TOLERANCE,
         provenance=provenance(model, seed, pinocchio=kinematics.version),
     )
@@ -148,8 +153,11 @@ def _find_frame(kinematics: Kinematics, name: str) -> tuple[str, Kind]:
     """A site of an MJCF, or a link of a URDF."""
     try:
         kinematics.definition(name, "site")
-    except LookupError:
-        kinematics.definition(name, "body")
+    except UnknownNameError as no_site:
+        try:
+            kinematics.definition(name, "body")
+        except UnknownNameError:
+            raise no_site from None
         return name, "body"
     return name, "site"
 
@@ -178,12 +186,11 @@ def _random_qpos(model: Model, joints: list[str], count: int, seed: int) -> Arra
 
 def _slots(model: Model, joints: list[str]) -> list[int]:
     """Slots of qpos that belong to the named joints, in their order."""
-    sizes = {JointType.FREE: 7, JointType.BALL: 4}
     slots: list[int] = []
     for name in joints:
         joint = model.joint_id(name)
         start = int(model.jnt_qposadr[joint])
-        slots += range(start, start + sizes.get(JointType(int(model.jnt_type[joint])), 1))
+        slots += range(start, start + JointType(int(model.jnt_type[joint])).nq)
     return slots
 
 
@@ -215,8 +222,8 @@ def _declared_offset(
     return Offset(distance, angle)
 
 
-def _steady_offset(ours: Pose, theirs: Pose) -> Offset:
-    """The offset that all poses share; none if it changes with the pose.
+def _steady_offset(ours: Pose, theirs: Pose) -> Offset | None:
+    """The offset that all poses share; None if it changes with the pose.
 
     Where the files call their bodies differently, definitions cannot be compared
     word by word. But a frame that is merely another one stays put in the engine's
@@ -227,7 +234,7 @@ def _steady_offset(ours: Pose, theirs: Pose) -> Offset:
     turn = inverse @ theirs.mat
     spread = max(float(np.ptp(shift, axis=0).max()), float(np.ptp(turn, axis=0).max()))
     if spread > _SAME_FRAME:
-        return Offset(0.0, 0.0)
+        return None
     return Offset(float(np.linalg.norm(shift[0])), float(angle_between(np.eye(3), turn[0])))
 
 

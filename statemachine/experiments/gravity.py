@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..interface import Model
-from ..records import Array
+from ..records import Array, JointType
 from ..verbs import forward, make_data, step
 from ._common import (
     Forces,
     Progress,
     Provenance,
+    carried_by,
     forces_on,
     milestones,
     provenance,
@@ -25,31 +26,41 @@ from ._common import (
 
 @dataclass(frozen=True, eq=False)
 class Droop:
-    """One run from the zero pose under an untouched ctrl.
+    """One run from the default pose under an untouched ctrl.
 
     Attributes:
-        time: (n,) moments [s]; angle: (n,) of the joint then [rad].
+        time: (n,) moments [s]; position: (n,) of the joint then [rad; of a slide, m].
         qpos: (nq,) at the end.
         forces: On the joint at the end, after `forward`.
-        acceleration: Of the joint at the end [rad/s²].
-        first_contact: Time of the first step that found a contact [s], or None.
-        touching: What touches at the end.
+        velocity, acceleration: Of the joint at the end [rad/s, rad/s²; or with m].
+        touches: When each contact of what the joint carries was first found [s].
+        touching: Those that are there at the end.
+        ctrl_is_zero: Whether ctrl still is, at the end.
     """
 
     time: Array
-    angle: Array
+    position: Array
     qpos: Array
     forces: Forces
+    velocity: float
     acceleration: float
-    first_contact: float | None
+    touches: dict[str, float]
     touching: tuple[str, ...]
+    ctrl_is_zero: bool
 
 
 @dataclass(frozen=True, eq=False)
 class Gravity:
-    """The same run with the servos on and off."""
+    """The same run with the actuators on and off.
+
+    Attributes:
+        joint: The joint that was watched; slide: whether it is one, and no hinge.
+        servo: Whether a position servo drives it.
+    """
 
     joint: str
+    slide: bool
+    servo: bool
     servos_on: Droop
     servos_off: Droop
     provenance: Provenance
@@ -61,7 +72,7 @@ def run(
     joint: str = "shoulder_lift",
     progress: Progress = silent,
 ) -> Gravity:
-    """Let gravity act for a while, ctrl untouched, servos on and then off.
+    """Let gravity act for a while, ctrl untouched, actuators on and then off.
 
     Args:
         model: Any model with the joint.
@@ -71,38 +82,54 @@ def run(
 
     Raises:
         UnknownNameError: No such joint.
-        UnsupportedError: The backend cannot switch the servos off.
+        BadInputError: It is neither a hinge nor a slide, or `seconds` is not above 0.
+        UnsupportedError: The backend cannot switch the actuators off.
     """
     limp = model.replace(actuation=False)
     on = _droop(model, seconds, joint, lambda part: progress(part / 2))
     off = _droop(limp, seconds, joint, lambda part: progress((1 + part) / 2))
-    return Gravity(joint, on, off, provenance(model))
+    which = model.joint_id(joint)
+    return Gravity(
+        joint=joint,
+        slide=int(model.jnt_type[which]) == int(JointType.SLIDE),
+        servo=bool(np.isfinite(model.actuator_kp[model.actuator_jntid == which]).any()),
+        servos_on=on,
+        servos_off=off,
+        provenance=provenance(model),
+    )
 
 
 def _droop(model: Model, seconds: float, joint: str, progress: Progress) -> Droop:
     place, dof = scalar_joint(model, joint)
+    bodies = carried_by(model, [int(model.jnt_bodyid[model.joint_id(joint)])])
     total = steps_in(model, seconds)
-    marks = [round(mark / model.timestep) for mark in milestones(total * model.timestep)]
-    times, angles, first = [], [], None
+    marks = {round(mark / model.timestep) for mark in milestones(total * model.timestep)}
+    times, positions, touches = [], [], {}
     with make_data(model) as data:
         for k in range(total + 1):
             if k in marks:
                 times.append(data.time)
-                angles.append(float(data.qpos[place]))
+                positions.append(float(data.qpos[place]))
+            if k % 1000 == 0:
                 progress(k / total)
             if k < total:
                 began = data.time
                 step(model, data)
                 # The contacts of a step are those of the state that it started from.
-                if first is None and len(data.contacts):
-                    first = began
+                for touch in touching(model, data.contacts, bodies):
+                    touches.setdefault(touch, began)
         forward(model, data)
+        at_end = touching(model, data.contacts, bodies)
+        for touch in at_end:
+            touches.setdefault(touch, data.time)
         return Droop(
             time=np.array(times),
-            angle=np.array(angles),
+            position=np.array(positions),
             qpos=data.qpos.copy(),
             forces=forces_on(data, dof),
+            velocity=float(data.qvel[dof]),
             acceleration=float(data.qacc[dof]),
-            first_contact=first,
-            touching=touching(model, data.contacts),
+            touches=touches,
+            touching=at_end,
+            ctrl_is_zero=not data.ctrl.any(),
         )

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import BadInputError
+from ..errors import BadInputError, UnsupportedError
 from ..interface import Model
-from ..records import Array
+from ..records import Array, Ints, JointType
 from ..verbs import forward, make_data, step
 from ._common import (
     Progress,
     Provenance,
     command,
+    moved_by_actuators,
     provenance,
     scalar_joint,
     silent,
@@ -27,39 +28,50 @@ TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
 
 @dataclass(frozen=True, eq=False)
 class Hold:
-    """The response to one command from the zero pose.
+    """The response to one command from the default pose.
 
     Attributes:
-        target: (nu,) the command [rad].
+        target: (nu,) the command [rad; of a slide, m].
+        goal: (nu,) the command within ctrlrange, which is what the actuators see.
         time: (n+1,) [s].
-        qpos: (n+1, nu) the actuated joints [rad].
+        qpos: (n+1, nu) the actuated joints.
         lag: (n,) distance [m] between the fingertip that a step leaves in
             `site_xpos` and the one that `forward` computes right after it.
-        first_contact: Time of the first step that found a contact [s], or None.
-        touching: What touches at the end.
-        speed: The fastest entry of qvel at the end [rad/s].
-        joints: Names of the actuated joints.
+        previous: Largest distance [m] between the fingertip that a step leaves and
+            the one that `forward` computed before that step.
+        first_contact: When the robot first touched something [s], or None.
+        touching: What it touches at the end.
+        speed: (nu,) velocities of the actuated joints at the end.
+        without_contacts: (nu,) where the joints end if nothing can touch; None if
+            nothing did, or the backend cannot leave contacts out.
+        joints: Names of the actuated joints; slides: which of them are slides.
+        servo: Whether all are driven by position servos.
     """
 
     target: Array
+    goal: Array
     time: Array
     qpos: Array
     lag: Array
+    previous: float
     first_contact: float | None
     touching: tuple[str, ...]
-    speed: float
+    speed: Array
+    without_contacts: Array | None
     joints: tuple[str, ...]
+    slides: tuple[bool, ...]
+    servo: bool
     provenance: Provenance
 
     @property
     def error(self) -> Array:
-        """(n+1,) the worst joint's distance to the target [rad]."""
-        return np.abs(self.qpos - self.target).max(axis=1)
+        """(n+1,) the worst joint's distance to the goal [rad; of a slide, m]."""
+        return np.abs(self.qpos - self.goal).max(axis=1)
 
 
 def run(
     model: Model,
-    target: Sequence[float] = TARGET,
+    target: Sequence[float] | None = None,
     seconds: float = 2.0,
     site: str = "gripperframe",
     progress: Progress = silent,
@@ -68,47 +80,70 @@ def run(
 
     Args:
         model: Any model whose actuators drive hinge or slide joints.
-        target: The command (nu,) [rad].
+        target: The command (nu,) [rad or m]; by default `TARGET`, for six actuators.
         seconds: Simulated time.
         site: The fingertip.
         progress: Told the fraction that is done.
 
     Raises:
-        BadInputError: `target` has the wrong length.
+        BadInputError: `target` has the wrong length, or `seconds` is not above 0.
         UnknownNameError: No such site.
     """
-    goal, tip = command(model, target, "target"), model.site_id(site)
+    if target is None and model.nu != len(TARGET):
+        raise BadInputError(f"{model.path.name} has {model.nu} actuators: say where to, by target")
+    goal, tip = command(model, TARGET if target is None else target, "target"), model.site_id(site)
     names = [model.joint_names[i] if i >= 0 else "" for i in model.actuator_jntid]
-    if not all(names):
-        raise BadInputError(f"{model.path.name} has actuators that drive no joint")
-    places = np.array([scalar_joint(model, name)[0] for name in names], dtype=np.int64)
-    total = steps_in(model, seconds)
-    times, poses, lags, first = [0.0], [], [], None
+    if not all(names) or not names:
+        raise BadInputError(f"{model.path.name} has no actuators, or some that drive no joint")
+    addresses = np.array([scalar_joint(model, name) for name in names], dtype=np.int64)
+    robot, total = moved_by_actuators(model), steps_in(model, seconds)
+    times, poses, lags, first, previous = [0.0], [], [], None, 0.0
     with make_data(model) as data:
-        poses.append(data.qpos[places])
+        poses.append(data.qpos[addresses[:, 0]])
         data.ctrl = goal
+        forward(model, data)
+        fresh = np.array(data.site_xpos[tip])
         for k in range(total):
             began = data.time
             step(model, data)
-            if first is None and len(data.contacts):
+            if first is None and touching(model, data.contacts, robot):
                 first = began
             stale = np.array(data.site_xpos[tip])
+            previous = max(previous, float(np.linalg.norm(stale - fresh)))
             forward(model, data)
-            lags.append(float(np.linalg.norm(data.site_xpos[tip] - stale)))
+            fresh = np.array(data.site_xpos[tip])
+            lags.append(float(np.linalg.norm(fresh - stale)))
             times.append(data.time)
-            poses.append(data.qpos[places])
+            poses.append(data.qpos[addresses[:, 0]])
             if k % 100 == 0:
                 progress(k / total)
-        found = touching(model, data.contacts)
-        moving = float(np.abs(data.qvel).max())
-    return Hold(
-        target=goal,
-        time=np.array(times),
-        qpos=np.array(poses),
-        lag=np.array(lags),
-        first_contact=first,
-        touching=found,
-        speed=moving,
-        joints=tuple(names),
-        provenance=provenance(model),
-    )
+        return Hold(
+            target=goal,
+            goal=np.clip(goal, *model.actuator_ctrlrange.T),
+            time=np.array(times),
+            qpos=np.array(poses),
+            lag=np.array(lags),
+            previous=previous,
+            first_contact=first,
+            touching=touching(model, data.contacts, robot),
+            speed=data.qvel[addresses[:, 1]].copy(),
+            without_contacts=None if first is None else _freely(model, goal, total, addresses),
+            joints=tuple(names),
+            slides=tuple(
+                int(model.jnt_type[model.joint_id(name)]) == int(JointType.SLIDE) for name in names
+            ),
+            servo=bool(np.isfinite(model.actuator_kp).all()),
+            provenance=provenance(model),
+        )
+
+
+def _freely(model: Model, goal: Array, steps: int, addresses: Ints) -> Array | None:
+    """Where the actuated joints end if nothing can touch anything."""
+    try:
+        alone = model.replace(contacts=False)
+    except UnsupportedError:
+        return None
+    with make_data(alone) as data:
+        data.ctrl = goal
+        step(alone, data, steps)
+        return data.qpos[addresses[:, 0]].copy()

@@ -34,7 +34,7 @@ class Replay:
         apart: (n+1,) distance [m] between the free body's positions in the two
             runs; None without a free body.
         qpos: (nq,) at the end of the first run.
-        travel: Largest joint movement of the first run [rad].
+        travel: Largest movement of a hinge in the first run [rad].
         contacts: (n,) contacts that each step of the first run found.
         pairs: For each pair of bodies, in how many steps it touched.
         keyframe: Name of the keyframe; its time was set to zero.
@@ -56,7 +56,7 @@ class Replay:
 
 def run(
     model: Model,
-    nstep: int = 600,
+    steps: int = 600,
     ctrl: Sequence[float] | None = None,
     break_with: Break | None = None,
     progress: Progress = silent,
@@ -65,21 +65,21 @@ def run(
 
     Args:
         model: A model with a keyframe.
-        nstep: Steps of each run.
+        steps: How many, in each run.
         ctrl: The command (nu,); by default the keyframe's own with `MOVE` added.
         break_with: Make the second run differ: "extra-step" takes one step more
             before the count begins, "late-ctrl" writes the command one step late.
         progress: Told the fraction that is done.
 
     Raises:
-        BadInputError: No keyframe, `nstep` is no whole number, or `ctrl` has the wrong length.
+        BadInputError: No keyframe, `steps` is no whole number, or `ctrl` has the wrong length.
         UnknownNameError: `break_with` is none of `BREAKS`.
     """
     if break_with is not None and break_with not in BREAKS:
         raise unknown_name("way to break a replay", break_with, BREAKS)
     if not model.keyframes:
         raise BadInputError(f"{model.path.name} has no keyframe to start from: try so101/scene_box")
-    nstep = as_count(nstep, "nstep")
+    nstep = as_count(steps, "steps")
     goal = model.keyframes[0].ctrl.copy()
     if ctrl is None:
         goal[: len(MOVE)] += MOVE[: model.nu]
@@ -93,7 +93,7 @@ def run(
         if kind == JointType.FREE
     ]
     gap = first - second
-    hinges = model.jnt_qposadr[model.jnt_type >= int(JointType.SLIDE)]
+    hinges = model.jnt_qposadr[model.jnt_type == int(JointType.HINGE)]
     return Replay(
         ctrl=goal,
         broken_by=break_with,
@@ -102,7 +102,7 @@ def run(
         difference=np.abs(gap).max(axis=1),
         apart=np.linalg.norm(gap[:, free[0] : free[0] + 3], axis=1) if free else None,
         qpos=first[-1],
-        travel=float(np.ptp(first[:, hinges], axis=0).max()),
+        travel=float(np.ptp(first[:, hinges], axis=0).max(initial=0.0)),
         contacts=contacts,
         pairs=pairs,
         keyframe=model.keyframes[0].name,

@@ -40,18 +40,18 @@ class Speed:
         return self.simulated / self.one_by_one
 
 
-def run(model: Model, nstep: int = 20_000, progress: Progress = silent) -> Speed:
-    """Time `nstep` steps, in bulk and one by one, each from the same start.
+def run(model: Model, steps: int = 20_000, progress: Progress = silent) -> Speed:
+    """Time a number of steps, in bulk and one by one, each from the same start.
 
     Args:
         model: Started from keyframe 0 if it has one.
-        nstep: Number of steps.
+        steps: How many.
         progress: Told the fraction that is done.
 
     Raises:
-        BadInputError: `nstep` is no whole number.
+        BadInputError: `steps` is no whole number.
     """
-    total = as_count(nstep, "nstep")
+    total = as_count(steps, "steps")
     chunks = [total // _CHUNKS + (k < total % _CHUNKS) for k in range(_CHUNKS)]
     chunks = [chunk for chunk in chunks if chunk]
     walls = []

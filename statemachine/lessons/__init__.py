@@ -67,6 +67,7 @@ LESSONS = {
             (
                 Option("--joint", "shoulder_lift", "joint to write"),
                 Option("--value", 0.8, "what to write [rad]", float),
+                Option("--site", "gripperframe", "the fingertip"),
             ),
         ),
         Lesson(
@@ -76,6 +77,7 @@ LESSONS = {
             (
                 Option("--seconds", 2.0, "simulated time", float),
                 Option("--target", None, "command, one number an actuator", float, many=True),
+                Option("--site", "gripperframe", "the fingertip"),
             ),
         ),
         Lesson(

@@ -24,8 +24,18 @@ def page_of(title: str, results: Mapping[str, Any], blocks: Sequence[Any]) -> Pa
 
 
 def degrees(radians: float, digits: int = 2) -> str:
-    """An angle in degrees, without a negative zero."""
-    return f"{math.degrees(radians) + 0.0:.{digits}f}°".replace("-0.00°", "0.00°")
+    """An angle in degrees; what rounds to zero has no sign."""
+    return f"{_rounded(math.degrees(radians), digits)}°"
+
+
+def position(value: float, slide: bool, digits: int = 2) -> str:
+    """A joint's position: a hinge's in degrees, a slide's in millimetres."""
+    return millimetres(value, digits) if slide else degrees(value, digits)
+
+
+def _rounded(value: float, digits: int) -> str:
+    text = f"{value:.{digits}f}"
+    return text.removeprefix("-") if float(text) == 0 else text
 
 
 def signed(value: float | None, digits: int = 4) -> str:
@@ -38,7 +48,7 @@ def signed(value: float | None, digits: int = 4) -> str:
 
 def millimetres(metres: float, digits: int = 2) -> str:
     """A length in millimetres."""
-    return f"{metres * 1e3:.{digits}f} mm"
+    return f"{_rounded(metres * 1e3, digits)} mm"
 
 
 def vector(values: Iterable[float], digits: int = 4) -> str:

@@ -27,7 +27,7 @@ def page(results: Mapping[str, fingertip.Certificate]) -> Page:
             ("", *results),
             [
                 ("frames apart", *(_offset(r.frames) for r in results.values())),
-                ("fingertip at qpos 0 [m]", *(vector(r.zero_pose, 6) for r in results.values())),
+                ("default pose [m]", *(vector(r.default_pose, 6) for r in results.values())),
                 ("position, worst [m]", *(_figure(r.position_worst) for r in results.values())),
                 ("position, median [m]", *(_figure(r.position_median) for r in results.values())),
                 ("rotation matrix, worst", *(_figure(r.rotation_worst) for r in results.values())),
@@ -44,7 +44,9 @@ def page(results: Mapping[str, fingertip.Certificate]) -> Page:
     return page_of("The fingertip, and an independent witness", results, blocks)
 
 
-def _offset(offset: fingertip.Offset) -> str:
+def _offset(offset: fingertip.Offset | None) -> str:
+    if offset is None:
+        return "no common body: not comparable"
     if offset.same:
         return "0 mm, 0°"
     return f"{millimetres(offset.distance)}, {math.degrees(offset.angle):.2f}°"
@@ -55,7 +57,7 @@ def _figure(value: float | None) -> str:
 
 
 def _said(result: fingertip.Certificate) -> str:
-    if not result.frames.same:
+    if result.frames is not None and not result.frames.same:
         return (
             f"refused: {result.site!r} and the witness's {result.witness_frame!r} are different "
             f"frames, {_offset(result.frames)} apart, so comparing their poses says nothing "

@@ -7,22 +7,32 @@ from typing import Any
 
 from ..experiments import forward
 from ._words import millimetres, page_of, vector, where
-from .page import Page, Table, Text, Verdict
+from .page import Code, Page, Table, Text, Verdict
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> forward.Forward:
     """Four readings."""
-    return forward.run(model, joint=options["joint"], value=options["value"])
+    return forward.run(model, joint=options["joint"], value=options["value"], site=options["site"])
 
 
 def page(results: Mapping[str, forward.Forward]) -> Page:
     """The readings, which are equal, and that no time passed."""
+    first = next(iter(results.values()))
+    write = first.readings[2].after
     blocks: list[Any] = [
         Text(
             "qpos is an input; the fingertip is derived from it. Nothing derived is computed "
             "until you ask: a write to qpos marks nothing as out of date, and what you read "
             "keeps saying what it said before. forward recomputes all of it, and takes no time."
-        )
+        ),
+        Code(
+            (
+                "data = sm.make_data(model)   # 1",
+                "sm.forward(model, data)      # 2",
+                f"data.{write:<24}# 3",
+                "sm.forward(model, data)      # 4",
+            )
+        ),
     ]
     for name, result in results.items():
         twins = {index for pair in result.equal for index in pair}
@@ -33,19 +43,27 @@ def page(results: Mapping[str, forward.Forward]) -> Page:
                     (str(i + 1), reading.after, vector(reading.fingertip), f"{reading.time:g} s")
                     for i, reading in enumerate(result.readings)
                 ],
-                title=f"{where(results, name)}the fingertip, read four times",
+                title=f"{where(results, name)}The fingertip, read four times",
                 words=frozenset({0, 1}),
                 emphasis=frozenset(twins),
             )
         )
-        pairs = " and ".join(f"{i + 1} = {j + 1}" for i, j in result.equal) or "none"
         blocks.append(
             Verdict(
-                f"{where(results, name)}equal bit by bit: {pairs}. The write moved nothing that "
-                f"you can read; the second forward moved it {millimetres(result.moved, 1)}",
-                result.equal == ((1, 2),),
+                f"{where(results, name)}readings 2 and 3 are equal bit by bit: the write changed "
+                "nothing that is derived",
+                (1, 2) in result.equal,
             )
         )
+        moved = millimetres(result.moved, 1)
+        if result.moved:
+            text = f"The second forward moved the fingertip by {moved}"
+        else:
+            text = (
+                f"The second forward moved the fingertip by {moved}: {result.joint} was there "
+                "already, or does not carry it"
+            )
+        blocks.append(Text(f"{where(results, name)}{text}."))
         unmoved = all(reading.time == result.readings[0].time for reading in result.readings)
         blocks.append(
             Verdict(f"{where(results, name)}data.time is the same in all four readings", unmoved)

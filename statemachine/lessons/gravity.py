@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..experiments import gravity
-from ._words import degrees, page_of, signed, where
-from .page import Page, Table, Text, Verdict
+from ._words import page_of, position, signed, where
+from .page import Code, Page, Table, Text, Verdict
 
 _PARTS = (
     ("gravity (−bias)", "bias"),
@@ -16,9 +16,10 @@ _PARTS = (
     ("dry friction", "friction"),
     ("contact", "contact"),
     ("joint limit", "limit"),
+    ("equality", "equality"),
 )
-# Below this a joint counts as being at rest [rad/s²] and a sum as zero [N·m].
-_REST = 1e-3
+_BALANCE = 1e-3  # N·m or N; a sum below it is zero
+_SLOW = 0.01  # rad/s or m/s; a joint below it is at rest or creeps
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> gravity.Gravity:
@@ -36,17 +37,30 @@ def page(results: Mapping[str, gravity.Gravity]) -> Page:
     }
     digits = {name: 3 if name.endswith("on") else 2 for name in columns}
     end = float(first.servos_on.time[-1])
+    steps = f"{round(end / first.provenance.timestep)})"
+    parts = [
+        (label, part)
+        for label, part in _PARTS
+        if part != "equality" or any(_part(run, part) for run in columns.values())
+    ]
     blocks: list[Any] = [
-        Text(
-            "Nobody writes ctrl in either run; it stays at zero. To a position servo, zero is "
-            "a target like any other, and it holds it. The second run has the servos off."
+        Text(_introduction(first)),
+        Code(
+            (
+                f"sm.step(model, data, {steps:<6}             # ctrl was never written",
+                "limp = model.replace(actuation=False)    # another Model: servos off",
+                "sm.forward(model, data)                  # then read data.qfrc_bias, …",
+            )
         ),
         Table(
             ("time", *columns),
             [
                 (
                     f"{time:.2f} s",
-                    *(degrees(run.angle[k], digits[name]) for name, run in columns.items()),
+                    *(
+                        position(run.position[k], first.slide, digits[name])
+                        for name, run in columns.items()
+                    ),
                 )
                 for k, time in enumerate(first.servos_on.time)
             ],
@@ -57,17 +71,37 @@ def page(results: Mapping[str, gravity.Gravity]) -> Page:
             [
                 *(
                     (label, *(signed(_part(run, part)) for run in columns.values()))
-                    for label, part in _PARTS
+                    for label, part in parts
                 ),
                 ("sum", *(signed(run.forces.total) for run in columns.values())),
             ],
-            title=f"Who holds {first.joint}, at {end:g} s [N·m]",
-            emphasis=frozenset({len(_PARTS)}),
+            title=f"Who holds {first.joint}, at {end:g} s [{_unit(first)}]",
+            emphasis=frozenset({len(parts)}),
         ),
     ]
     for name, run in columns.items():
-        blocks.append(Verdict(f"{name}: {_who(run)}", _balanced(run)))
+        blocks.append(_finding(name, run, first))
+        if run.touching:
+            touches = (f"{touch} (since {run.touches[touch]:.3f} s)" for touch in run.touching)
+            blocks.append(Text(f"{name}: touching at the end: {', '.join(touches)}."))
     return page_of("You never wrote ctrl", results, blocks)
+
+
+def _introduction(first: gravity.Gravity) -> str:
+    runs = (first.servos_on, first.servos_off)
+    text = "Nobody writes ctrl in either run"
+    if all(run.ctrl_is_zero for run in runs):
+        text += "; it is zero from the first step to the last"
+    if first.servo:
+        return text + (
+            ". To a position servo zero is a target like any other: there is no setting that "
+            "means nothing. The second run has the servos switched off."
+        )
+    return f"{text}. No position servo drives {first.joint}."
+
+
+def _unit(result: gravity.Gravity) -> str:
+    return "N" if result.slide else "N·m"
 
 
 def _part(run: gravity.Droop, part: str) -> float | None:
@@ -75,24 +109,30 @@ def _part(run: gravity.Droop, part: str) -> float | None:
     return -value if part == "bias" and value is not None else value
 
 
-def _balanced(run: gravity.Droop) -> bool:
-    total = run.forces.total
-    return total is None or abs(total) < _REST or abs(run.acceleration) > _REST
-
-
-def _who(run: gravity.Droop) -> str:
-    """The largest force against gravity, in words, with its share."""
-    load = _part(run, "bias")
-    others = {
-        label: value
+def _finding(name: str, run: gravity.Droop, first: gravity.Gravity) -> Text | Verdict:
+    """Who carries the load, if the joint is at rest and its forces balance."""
+    total, load = run.forces.total, _part(run, "bias")
+    if abs(run.velocity) > _SLOW:
+        speed = position(run.velocity, first.slide)
+        return Text(f"{name}: {first.joint} still moves, at {speed}/s; nothing holds it yet.")
+    if total is None or load is None:
+        return Text(f"{name}: this engine does not tell all the parts, so no sum is drawn.")
+    if abs(total) > _BALANCE:
+        return Verdict(f"{name}: the joint stands, yet its forces do not sum to zero", False)
+    if abs(load) < _BALANCE:
+        return Verdict(f"{name}: no load, so nothing has to hold {first.joint}", True)
+    against = {
+        label: abs(value)
         for label, part in _PARTS[1:]
-        if (value := _part(run, part)) is not None and load is not None and value * load < 0
+        if (value := _part(run, part)) is not None and value * load < 0
     }
-    if not others or load is None or abs(load) < _REST:
-        return "nothing needs to hold the joint"
-    label = max(others, key=lambda name: abs(others[name]))
-    share = 100 * abs(others[label] / load)
-    text = f"the {label} carries {abs(others[label]):.4f} N·m, {share:.1f} % of the load"
+    label = max(against, key=lambda each: against[each])
+    unit = _unit(first)
+    text = (
+        f"{name}: {first.joint} is held by the {label}: {against[label]:.4f} of "
+        f"{abs(load):.4f} {unit}, and all forces sum to zero"
+    )
     if label == "contact":
-        text += f" ({', '.join(run.touching)}; first touch at {run.first_contact:.2f} s)"
-    return text
+        rest = sum(against.get(part, 0.0) for part in ("damping", "dry friction"))
+        text += f". Damping and dry friction together hold {rest:.4f} {unit}"
+    return Verdict(text, True)

@@ -8,42 +8,59 @@ from typing import Any
 import numpy as np
 
 from ..experiments import hold
-from ._words import degrees, millimetres, page_of, vector, where
+from ._words import millimetres, page_of, position, vector, where
 from .page import Code, Page, Table, Text, Verdict
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
+_SAME = 1e-12  # metres
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> hold.Hold:
     """The response to the command."""
     return hold.run(
         model,
-        target=options["target"] or hold.TARGET,
+        target=options["target"],
         seconds=options["seconds"],
+        site=options["site"],
         progress=progress,
     )
 
 
 def page(results: Mapping[str, hold.Hold]) -> Page:
-    """Error over time, settled pose, fingertip lag."""
+    """Error over time, pose at the end, fingertip lag."""
     first = next(iter(results.values()))
     end = float(first.time[-1])
     times = [t for t in _TIMES if t < end] + [end]
-    rows = [_row(results, t) for t in times]
+    text = "ctrl is the only wire into this robot: one number for each actuator."
+    if first.servo:
+        text += (
+            " Each is a position servo: it pushes with kp·(ctrl − q) − kv·q̇, within its force "
+            "limit, and the arm follows."
+        )
     blocks: list[Any] = [
-        Text(
-            "ctrl is the only wire into this robot: one target angle for each servo. A servo "
-            "pushes with kp·(ctrl − q) − kv·q̇, within its force limit, and the arm follows."
-        ),
+        Text(text),
         Code((f"data.ctrl[:] = {[float(x) for x in first.target]}", "sm.step(model, data)")),
-        Table(("time", *results), rows, title="Worst joint error on the way"),
+    ]
+    for k in np.flatnonzero(first.goal != first.target).tolist():
+        blocks.append(
+            Text(
+                f"{first.joints[k]} was asked for {_at(first, first.target[k], k)}, beyond its "
+                f"range: the servo takes {_at(first, first.goal[k], k)} for it."
+            )
+        )
+    blocks += [
         Table(
-            ("joint", "target", *results),
+            ("time", *results),
+            [_row(results, time) for time in times],
+            title="The worst joint on the way: how far from its goal",
+        ),
+        Table(
+            ("joint", "goal", *results),
             [
                 (
                     joint,
-                    degrees(first.target[k]),
-                    *(degrees(result.qpos[-1, k]) for result in results.values()),
+                    _at(first, first.goal[k], k),
+                    *(_at(result, result.qpos[-1, k], k) for result in results.values()),
                 )
                 for k, joint in enumerate(first.joints)
             ],
@@ -55,30 +72,45 @@ def page(results: Mapping[str, hold.Hold]) -> Page:
         worst = int(np.argmax(result.lag))
         blocks.append(
             Verdict(
-                f"{where(results, name)}the fingertip that step leaves in site_xpos is the one "
-                f"before the step: {millimetres(result.lag[worst])} behind at worst (at "
+                f"{where(results, name)}after each step site_xpos is the fingertip before that "
+                f"step: {millimetres(result.lag[worst])} behind at worst (at "
                 f"{result.time[worst + 1]:.3f} s), {millimetres(result.lag[-1], 4)} at the end. "
-                "Call forward before you read",
-                bool(result.lag[worst] > 0),
+                "step computes poses first and moves afterwards; call forward before you read",
+                result.previous <= _SAME,
             )
         )
     return page_of(f"Hold {vector(first.target, 1)}", results, blocks)
 
 
+def _at(result: hold.Hold, value: float, joint: int) -> str:
+    return position(value, result.slides[joint])
+
+
 def _end(result: hold.Hold) -> str:
-    text = f"At the end the fastest joint moves at {degrees(result.speed, 3)}/s."
+    fastest = int(np.argmax(np.abs(result.speed)))
+    speed = position(abs(result.speed[fastest]), result.slides[fastest], 3)
+    text = f"At the end {result.joints[fastest]} is the fastest, at {speed}/s."
     if result.first_contact is None:
-        return text + " The arm touched nothing."
-    text += f" The arm touches something, first at {result.first_contact:.3f} s"
+        return text + " The robot touched nothing."
+    text += f" The robot touches something, first at {result.first_contact:.3f} s"
     if result.touching:
         text += f"; at the end: {', '.join(result.touching)}"
+    if result.without_contacts is not None:
+        gap = np.abs(result.without_contacts - result.goal)
+        worst = int(np.argmax(gap))
+        joint = int(np.argmax(np.abs(result.qpos[-1] - result.goal)))
+        text += (
+            f". The worst joint is {_at(result, result.error[-1], joint)} from its goal then; "
+            f"with contacts left out it would be {_at(result, gap[worst], worst)}"
+        )
     return text + "."
 
 
 def _row(results: Mapping[str, hold.Hold], time: float) -> tuple[str, ...]:
-    cells = [f"{time:.2f} s"]
+    cells = [f"{time:.3f} s"]
     for result in results.values():
         k = int(np.argmin(np.abs(result.time - time)))
-        joint = result.joints[int(np.argmax(np.abs(result.qpos[k] - result.target)))]
-        cells.append(f"{degrees(result.error[k], 3)}  {joint}")
+        joint = int(np.argmax(np.abs(result.qpos[k] - result.goal)))
+        gap = position(result.error[k], result.slides[joint], 3)
+        cells.append(f"{gap}  {result.joints[joint]}")
     return tuple(cells)

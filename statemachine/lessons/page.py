@@ -67,3 +67,8 @@ class Page:
     title: str
     origin: str
     blocks: Sequence[Block] = field(default_factory=list)
+
+    @property
+    def holds(self) -> bool:
+        """Whether every verdict on it held."""
+        return all(block.holds for block in self.blocks if isinstance(block, Verdict))

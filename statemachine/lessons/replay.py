@@ -22,7 +22,7 @@ def run(model: Any, options: Mapping[str, Any], progress: Any) -> replay.Replay:
     """Two runs."""
     return replay.run(
         model,
-        nstep=options["steps"],
+        steps=options["steps"],
         ctrl=options["ctrl"],
         break_with=options["break"],
         progress=progress,
@@ -48,7 +48,9 @@ def page(results: Mapping[str, replay.Replay]) -> Page:
     if first.broken_by:
         blocks.append(_growth(results, nstep))
     for name, result in results.items():
-        blocks.append(Verdict(f"{where(results, name)}{_said(result)}", _expected(result)))
+        blocks.append(_finding(where(results, name), result))
+    if not first.broken_by:
+        blocks.append(Text("Break it on purpose: --break extra-step, or --break late-ctrl."))
     return page_of("The same start, the same commands", results, blocks)
 
 
@@ -105,23 +107,23 @@ def _growth(results: Mapping[str, replay.Replay], nstep: int) -> Table:
     return Table(headers, rows, title="How far the two runs are apart")
 
 
-def _expected(result: replay.Replay) -> bool:
-    return result.identical is (result.broken_by is None)
-
-
-def _said(result: replay.Replay) -> str:
-    if result.identical:
-        return (
-            f"bit for bit the same after {count(len(result.contacts), 'step')}: largest "
-            f"difference {result.difference.max():.1e}"
+def _finding(prefix: str, result: replay.Replay) -> Text | Verdict:
+    steps = count(len(result.contacts), "step")
+    if result.identical and not result.broken_by:
+        return Verdict(
+            f"{prefix}bit for bit the same after {steps}: largest difference "
+            f"{result.difference.max():.1e}",
+            True,
         )
+    if result.identical:
+        return Text(f"{prefix}The two runs are the same all the same: the break changed nothing.")
     peak = int(np.argmax(result.difference))
     text = (
-        f"not the same: the difference peaks at {result.difference[peak]:.1e} after step {peak} "
-        f"and is {result.difference[-1]:.1e} at the end"
+        f"{prefix}not the same: the difference peaks at {result.difference[peak]:.1e} after step "
+        f"{peak} and is {result.difference[-1]:.1e} at the end"
     )
     if result.difference[-1] < result.difference[peak] / 10:
-        text += ". It shrinks here, because the servos pull both runs to one pose"
+        text += ". A small divergence need not grow: here it shrinks again"
     if result.close:
         text += "; np.allclose would call the two runs equal, np.array_equal does not"
-    return text
+    return Verdict(text, result.broken_by is not None)

@@ -12,7 +12,7 @@ from .page import Page, Table, Text
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> speed.Speed:
     """Bulk, then step by step."""
-    return speed.run(model, nstep=options["steps"], progress=progress)
+    return speed.run(model, steps=options["steps"], progress=progress)
 
 
 def page(results: Mapping[str, speed.Speed]) -> Page:
@@ -33,7 +33,9 @@ def page(results: Mapping[str, speed.Speed]) -> Page:
             Text(
                 f"{count(first.nstep, 'step')} of {first.provenance.timestep:g} s. Nothing in the "
                 "simulator reads a clock, and nothing waits: data.time grows because step adds "
-                "the timestep to it. If a person is to watch, the waiting belongs in your loop."
+                "the timestep to it. If a person is to watch, the waiting belongs in your loop. "
+                "In bulk: one call for many steps. Step by step: a Python loop of single calls, as "
+                "a controller needs it."
             ),
             Table(("", *results), rows, title="Wall time, and × real time, on this machine, now"),
         ],

@@ -1,4 +1,4 @@
-"""The state is two arrays, and they do not line up."""
+"""The state is two arrays; slot k of one need not be slot k of the other."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from ..experiments import state
 from ._words import page_of, where
-from .page import Code, Page, Table, Text, Verdict
+from .page import Code, Page, Table, Text
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> state.Layout:
@@ -48,35 +48,54 @@ def page(results: Mapping[str, state.Layout]) -> Page:
                     )
                     for joint in layout.joints
                 ],
-                title=f"{where(results, name)}who owns which slots",
+                title=f"{where(results, name)}Who owns which slots",
                 words=frozenset({0, 1}),
             )
         )
-    blocks.append(
-        Code(
-            (
-                "joint = model.joint_id('wrist_flex')",
-                "data.qpos[model.jnt_qposadr[joint]]   # never arithmetic",
-                "data.qvel[model.jnt_dofadr[joint]]",
+    last = first.joints[-1] if first.joints else None
+    if last is not None:
+        blocks.append(
+            Code(
+                (
+                    f"j = model.joint_id({last.name!r})",
+                    _line("qpos", "q", last.qpos_stop - last.qpos_start),
+                    _line("qvel", "dof", last.qvel_stop - last.qvel_start),
+                )
             )
         )
-    )
-    if first.nq != first.nv:
+    apart = [
+        joint.name or "(no name)"
+        for joint in first.joints
+        if (joint.qpos_start, joint.qpos_stop) != (joint.qvel_start, joint.qvel_stop)
+    ]
+    if apart:
         blocks.append(
-            Verdict(f"qpos and qvel have different lengths: {first.nq} and {first.nv}", True)
+            Text(
+                f"qpos has {first.nq} numbers and qvel {first.nv}. Of {', '.join(apart)} the slots "
+                "differ: take them from jnt_qposadr and jnt_dofadr, never by arithmetic."
+            )
+        )
+    else:
+        blocks.append(
+            Text("In this model every joint has the same slots in qpos and qvel; in others not.")
         )
     for name, layout in results.items():
         if layout.keyframe_time is None:
             continue
+        times = f"{layout.keyframe_time:g} s; on a fresh Data it is {layout.fresh_time:g} s"
         blocks.append(
-            Verdict(
-                f"{where(results, name)}after a reset to keyframe 0 ({layout.keyframe!r}) "
-                f"data.time is {layout.keyframe_time:g} s, not {layout.fresh_time:g}: time is "
-                "a number of the state like any other",
-                layout.keyframe_time != layout.fresh_time,
+            Text(
+                f"{where(results, name)}After a reset to keyframe 0 ({layout.keyframe!r}), "
+                f"data.time is {times}. Time is a number of the state like any other."
             )
         )
-    return page_of("The state is two arrays, and they do not line up", results, blocks)
+    return page_of("The state is two arrays", results, blocks)
+
+
+def _line(array: str, kind: str, size: int) -> str:
+    address = f"model.jnt_{'qpos' if kind == 'q' else 'dof'}adr[j]"
+    slots = address if size == 1 else f"{address} : {address} + {size}"
+    return f"data.{array}[{slots}]"
 
 
 def _slots(start: int, stop: int) -> str:

@@ -10,8 +10,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 
-from ..engines import ENGINES, engine_version, require
-from ..errors import MissingEngineError
+from ..engines import ENGINES, engine_version
 from ..lessons.page import Page, Table, Text, Verdict
 
 _RENDER = """
@@ -24,7 +23,11 @@ with mujoco.Renderer(model, 32, 32) as renderer:
     assert renderer.render().any()
 """
 _PATIENCE = 60  # seconds for a probe; a software renderer starts slowly
-_ROLES = {"mujoco": "the primary engine", "pybullet": "the second engine", "pinocchio": "witness"}
+_ROLES = {
+    "mujoco": "runs every lesson",
+    "pybullet": "for a backend to come; no lesson needs it yet",
+    "pinocchio": "the witness of `statemachine fingertip`",
+}
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,7 @@ def examine() -> Diagnosis:
 def page(diagnosis: Diagnosis) -> Page:
     """The diagnosis as a page."""
     rows = [
-        (finding.name, ("works" if finding.works else "missing"), finding.found)
+        (finding.name, ("works" if finding.works else "no"), finding.found)
         for finding in diagnosis.findings
     ]
     blocks = [
@@ -100,28 +103,30 @@ def _engine(name: str) -> Finding:
         return Finding(name, True, found, optional=optional)
     reason = (done.stderr.strip().splitlines() or [f"import ended with code {done.returncode}"])[-1]
     reason = reason.removeprefix("statemachine.errors.MissingEngineError: ")
-    step = "" if "pip install" in reason or "apt-get" in reason else f"wheels: {engine.wheels}"
+    told = any(word in reason for word in ("pip install", "apt-get", "unset it"))
+    step = "" if told else f"pip install --force-reinstall {engine.distribution}"
     return Finding(name, False, reason, step, optional)
 
 
 def _rendering() -> Finding:
-    try:
-        require("mujoco")
-    except MissingEngineError:
+    if importlib.util.find_spec("mujoco") is None:
         return Finding("rendering", False, "needs mujoco", optional=True)
-    asked = os.environ.get("MUJOCO_GL")
-    for backend in (asked,) if asked else (None, "egl", "osmesa"):
+    asked = os.environ.get("MUJOCO_GL", "")
+    for backend in dict.fromkeys((asked, "", "egl", "osmesa")):
         # An offscreen library that is missing kills the process that asks for it.
-        environment = dict(os.environ)
+        environment = {key: value for key, value in os.environ.items() if key != "MUJOCO_GL"}
         if backend:
             environment["MUJOCO_GL"] = backend
         try:
             done = _run(_RENDER, environment)
         except subprocess.TimeoutExpired:
             continue
+        if done.returncode == 0 and backend == asked:
+            return Finding("rendering", True, "offscreen", optional=True)
         if done.returncode == 0:
-            found = f"offscreen, MUJOCO_GL={backend}" if backend else "offscreen"
-            return Finding("rendering", True, found, optional=True)
+            found = f"offscreen with MUJOCO_GL={backend}" if backend else "offscreen by default"
+            step = f"export MUJOCO_GL={backend}" if backend else "unset MUJOCO_GL"
+            return Finding("rendering", True, found, f"{step}, before rendering", optional=True)
     step = "on Debian and Ubuntu: apt-get install libegl1 libopengl0 libgl1-mesa-dri"
     if platform.system() != "Linux":
         step = "needs a graphics driver with OpenGL"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ..lessons.page import Code, Page, Table, Text, Verdict
@@ -18,8 +19,8 @@ _WIDTH_PIPED = 80
 _WIDTH_MOST = 100
 
 
-def show(page: Page) -> None:
-    """Print a page on standard output."""
+def show(page: Page, footer: str = "") -> None:
+    """Print a page on standard output, and a last line under it."""
     from rich.console import Console
 
     console = Console(highlight=False, emoji=False)
@@ -27,19 +28,23 @@ def show(page: Page) -> None:
     console.width = _WIDTH_PIPED if piped else min(console.width, _WIDTH_MOST)
     with console.capture() as captured:
         _print(console, page)
+        if footer:
+            console.print(f"[dim]{footer}[/]\n")
     text = captured.get()
     if piped:  # cells are padded with blanks that only a terminal needs
         text = "\n".join(line.rstrip() for line in text.splitlines()) + "\n"
-    if _plain():
-        text = text.translate(_ASCII)
     sys.stdout.write(text)
     sys.stdout.flush()
 
 
 def _print(console: Console, page: Page) -> None:
-    from rich.markup import escape
+    from rich.markup import escape as escaped
 
     plain = _plain()
+
+    def escape(text: str) -> str:
+        return escaped(text.translate(_ASCII) if plain else text)
+
     good, bad = ("yes", "NO ") if plain else ("✓", "✗")
     console.print()
     console.print(f"[bold]{escape(page.title)}[/]")
@@ -57,7 +62,7 @@ def _print(console: Console, page: Page) -> None:
                 console.print()
                 if block.title:
                     console.print(f"[italic]{escape(block.title)}[/]")
-                console.print(_grid(block, plain))
+                console.print(_grid(block, plain, escape))
             case Verdict(text, holds):
                 console.print()
                 mark = f"[green]{good}[/]" if holds else f"[red]{bad}[/]"
@@ -70,9 +75,8 @@ def _plain() -> bool:
     return (sys.stdout.encoding or "utf-8").lower().replace("-", "") != "utf8"
 
 
-def _grid(block: Table, plain: bool) -> object:
+def _grid(block: Table, plain: bool, escape: Callable[[str], str]) -> object:
     from rich import box
-    from rich.markup import escape
     from rich.table import Table as Grid
 
     grid = Grid(
