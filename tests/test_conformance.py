@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 
 import pytest
 
-from statemachine import conformance
+import statemachine
+from statemachine import backends, conformance
+from statemachine.errors import UnknownNameError, UnsupportedError
 
 from .conftest import need_engine
 
@@ -30,3 +33,51 @@ def test_run_reports_every_check(backend: str) -> None:
     allowed = {"passed"} if backend == "mujoco" else {"passed", "skipped"}
     assert {outcome.result for outcome in outcomes} <= allowed, outcomes
     assert len(outcomes) > 40
+
+
+@pytest.fixture
+def hidden() -> Iterator[conformance.Lab]:
+    backends.register("hidden", "tests.hidden_world:load")
+    with conformance.Lab("hidden") as lab:
+        yield lab
+    backends._BACKENDS.pop("hidden")
+
+
+@pytest.mark.parametrize("check", conformance.CHECKS)
+def test_an_engine_that_hides_its_world_can_keep_it_too(
+    hidden: conformance.Lab, check: str
+) -> None:
+    if "witness" in check:
+        need_engine("pinocchio")
+    conformance.CHECKS[check](hidden)
+
+
+def test_a_backend_that_refuses_everything_does_not_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What its record does not declare is a failure, not a skip."""
+    from statemachine.backends.mujoco_backend import MujocoModel
+
+    monkeypatch.setattr(
+        MujocoModel, "_make_data", lambda self: (_ for _ in ()).throw(self._unsupported("data"))
+    )
+    backends.register("lazy", "statemachine.backends.mujoco_backend:load")
+    try:
+        results = [outcome.result for outcome in conformance.run("lazy")]
+    finally:
+        backends._BACKENDS.pop("lazy")
+    assert results.count("failed") > 40
+    assert "skipped" not in results
+
+
+def test_an_option_that_a_record_lacks_is_refused() -> None:
+    model = statemachine.load("so101")
+    record = dataclasses.replace(model.capabilities, options=("gravity",))
+    object.__setattr__(model, "capabilities", record)
+    with pytest.raises(UnsupportedError) as caught:
+        model.replace(armature=0.1)
+    assert (caught.value.backend, caught.value.feature) == ("mujoco", "armature")
+    assert model.replace(gravity=[0, 0, 0]).raw.opt.gravity.tolist() == [0, 0, 0]
+
+
+def test_an_unknown_backend_is_one_error() -> None:
+    with pytest.raises(UnknownNameError):
+        conformance.run("nobody")

@@ -63,7 +63,7 @@ def test_servos_on(golden: Golden) -> None:
 def test_servos_off(golden: Golden) -> None:
     expected = _angles(golden("golden_gravity_off"))
     run = _run((0.0,) * 6, 800, actuation=False)
-    assert np.abs(np.degrees(run - expected)).max() < 0.02
+    assert np.abs(np.degrees(run - expected)).max() < 0.0018
     lift = [f"{np.degrees(run[k, 1]):.2f}" for k in (200, 400, 600, 800)]
     assert lift == ["23.88", "23.89", "23.90", "23.92"]
 
@@ -74,10 +74,10 @@ def test_hold_until_and_after_its_first_contact(golden: Golden) -> None:
     run = _run(hold.TARGET, 400)
     first = int(np.flatnonzero(table["ncon"])[0])
     assert first == 56
-    assert np.abs(run[:first] - expected[:first]).max() < 1e-6
+    assert np.abs(run[:first] - expected[:first]).max() < 1e-15
     # From there on it depends on the shape of the jaw, which is ours.
-    assert np.abs(np.degrees(run - expected)).max() < 0.03
-    assert np.abs(np.degrees(run[-1] - expected[-1])).max() < 0.002
+    assert np.abs(np.degrees(run - expected)).max() < 0.0146
+    assert np.abs(np.degrees(run[-1] - expected[-1])).max() < 0.0006
 
 
 def test_golden_data_notice_a_missing_armature(golden: Golden) -> None:

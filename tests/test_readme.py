@@ -57,6 +57,13 @@ def test_python_block(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("9.0")  # 6 s of the keyframe and 600 steps
+    tip = [float(word) for word in re.findall(r"-?\d\.\d+", done.stdout)[1:]]
+    assert f"[{' '.join(f'{value:.4f}' for value in tip)}]" in README
+
+
+def test_the_output_that_is_shown(cli: Cli) -> None:
+    (shown,) = re.findall(r"```text\n(.*?)```", README, re.DOTALL)
+    assert shown in cli("lesson", "gravity").stdout
 
 
 def test_files_that_are_linked_exist() -> None:
