@@ -65,10 +65,9 @@ class HiddenData(Data):
 
     @property
     def time(self) -> float:
-        world: Any = self._world
-        if world is None:
+        if self._trouble == "closed":
             self._refuse_if_troubled()
-        return world.time
+        return self._world.time
 
     def _shown(self, name: str) -> Any:
         self._refuse_if_troubled()
