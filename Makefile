@@ -13,7 +13,7 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13 python3.14; 
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null \
 	&& { echo $$p; break; }; done)
 
-.PHONY: help lesson test test-fast test-newest check format hooks bench picture clean
+.PHONY: help lesson test test-fast test-newest check format hooks bench picture urdf clean
 
 help:
 	@sed -n 's/^# make /  make /p' Makefile
@@ -65,6 +65,10 @@ bench: $(VENV)/run.stamp
 picture: $(VENV)/test.stamp
 	@$(BIN)/python models/so101/render.py
 
+# make urdf         write models/so101/so101.urdf anew from so101.xml
+urdf: $(VENV)/run.stamp
+	@$(BIN)/python models/so101/make_urdf.py
+
 # make clean        remove what the others made
 clean:
 	rm -rf .venv .venv-newest build dist .pytest_cache .ruff_cache .hypothesis
@@ -74,7 +78,7 @@ CONSTRAINTS ?= -c constraints.txt
 $(VENV)/run.stamp: pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "no Python 3.11 or newer with venv and ensurepip here" \
 	"(Debian, Ubuntu: apt-get install python3-venv)"; exit 1; }
-	@echo "setting up $(VENV) with $(PYTHON), once: about a minute ..."
+	@echo "setting up $(VENV) with $(PYTHON): about a minute the first time ..."
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@$(PIP) $(CONSTRAINTS) -e .
 	@touch $@

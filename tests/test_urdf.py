@@ -1,0 +1,241 @@
+"""URDF from a compiled MJCF: read by Pinocchio and by PyBullet, it is the same robot."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.backends import _bullet_urdf as urdf
+from statemachine.errors import UnsupportedError
+from statemachine.models import models_dir
+from statemachine.rotations import matrix_from_quat, wxyz_from_xyzw
+
+from .conftest import ROOT, need_engine
+
+INERTIAL = '<inertial mass="0.3" pos="0.1 0.02 0.03" quat="0.6 0.1 -0.4 0.3" diaginertia="3 4 2"/>'
+# Anchored and slanted joints, a slide, a fixed body, every shape, a site called as a body.
+ZOO = f"""
+<mujoco model="zoo">
+  <compiler angle="radian"/>
+  <asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>
+  <worldbody>
+    <body name="root" pos="0.1 0.2 0.3" euler="0.1 0.2 0.3">{INERTIAL}
+      <geom type="box" size="0.1 0.2 0.3" pos="0.1 0 0"/>
+      <body name="a" pos="0.1 0.2 0.3" euler="0 1.5707963267948966 0.2">{INERTIAL}
+        <joint name="ja" pos="0.05 0.01 0.02" axis="1 2 3" range="-1 2" damping="0.5"/>
+        <geom type="capsule" size="0.1 0.2" euler="1 1 1"/><geom type="cylinder" size="0.1 0.2"/>
+        <site name="a" pos="0.3 0.2 0.1" euler="0.3 0.2 0.1"/>
+        <body name="b" pos="0 0 0.5" euler="1 2 3">{INERTIAL}
+          <joint name="jb" type="slide" axis="0 1 1" range="-0.5 0.5"/>
+          <geom type="sphere" size="0.1"/>
+          <body name="c" pos="0.2 0 0">{INERTIAL}<site name="tip" pos="0.1 0.1 0.1"/></body>
+        </body>
+      </body>
+      <body name="d" pos="0 1 0">{INERTIAL}<joint name="jd" axis="0 0 1" pos="0.1 0 0"/>
+        <site name="end" pos="0 0 1"/></body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def _zoo(folder: Path) -> Any:
+    file = folder / "zoo.xml"
+    file.write_text(ZOO)
+    return sm.load(file)
+
+
+def _poses(model: sm.Model, seed: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """(qpos, xpos of all bodies, xmat) at random poses, by MuJoCo."""
+    random = np.random.default_rng(seed)
+    found = []
+    with sm.make_data(model) as data:
+        for _ in range(10):
+            data.qpos = random.uniform(-1, 1, model.nq)
+            sm.forward(model, data)
+            found.append((data.qpos.copy(), data.site_xpos.copy(), data.site_xmat.copy()))
+    return found
+
+
+def _by_pinocchio(model: sm.Model, file: Path) -> float:
+    """Worst difference of any site's pose."""
+    witness = sm.Kinematics(file, joint_names=model.joint_names)
+    worst = 0.0
+    for qpos, pos, mat in _poses(model, 1):
+        for site in range(model.nsite):
+            pose = witness.pose(qpos, urdf.tip_name(model.raw, site), "body")
+            worst = max(worst, float(np.abs(pose.pos - pos[site]).max()))
+            worst = max(worst, float(np.abs(pose.mat.ravel() - mat[site]).max()))
+    return worst
+
+
+def _by_pybullet(model: sm.Model, file: Path) -> float:
+    """Worst difference of any site's pose; the process is a fresh one, for the noise."""
+    code = f"""
+import json, sys, numpy as np, pybullet as pb
+from pathlib import Path
+poses = json.loads(sys.stdin.read())
+pb.connect(pb.DIRECT)
+body = pb.loadURDF({str(file)!r}, useFixedBase=1, flags=pb.URDF_USE_INERTIA_FROM_FILE)
+links = [pb.getJointInfo(body, i) for i in range(pb.getNumJoints(body))]
+joints = {{info[1].decode(): info[0] for info in links}}
+tips = {{info[12].decode(): info[0] for info in links}}
+# The base stands where its inertial frame says: put its link frame at the file's pose.
+out = []
+for qpos in poses["qpos"]:
+    for name, q in zip(poses["joints"], qpos): pb.resetJointState(body, joints[name], q)
+    states = [pb.getLinkState(body, tips[n], computeForwardKinematics=1) for n in poses["tips"]]
+    out.append([state[:2] for state in states])
+print("RESULT", json.dumps(out))
+"""
+    import json
+
+    found = _poses(model, 2)
+    question = {
+        "qpos": [qpos.tolist() for qpos, _, _ in found],
+        "joints": model.joint_names,
+        "tips": [urdf.tip_name(model.raw, site) for site in range(model.nsite)],
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        input=json.dumps(question),
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    answers = json.loads(done.stdout.rpartition("RESULT")[2])
+    worst = 0.0
+    for (_, pos, mat), sites in zip(found, answers, strict=True):
+        for site, (where, quat) in enumerate(sites):
+            turn = matrix_from_quat(wxyz_from_xyzw(quat))
+            worst = max(worst, float(np.abs(np.array(where) - pos[site]).max()))
+            worst = max(worst, float(np.abs(turn.ravel() - mat[site]).max()))
+    return worst
+
+
+def test_the_committed_file_is_what_the_script_writes(tmp_path: Path) -> None:
+    home = models_dir() / "so101"
+    raw = sm.load("so101").raw
+    text = urdf.write(raw, urdf.roots(raw)[0], urdf.Dialect(folder=home))
+    committed = (home / "so101.urdf").read_text()
+    if sys.platform == "linux" and os.uname().machine == "x86_64":
+        assert text == committed
+        return
+    for new, old in zip(ET.fromstring(text).iter(), ET.fromstring(committed).iter(), strict=True):
+        assert new.tag == old.tag
+        for key, value in new.attrib.items():
+            try:
+                numbers = np.array([value.split(), old.attrib[key].split()], dtype=float)
+            except ValueError:
+                assert value == old.attrib[key]
+            else:
+                assert np.abs(numbers[0] - numbers[1]).max() < 1e-14
+
+
+def test_the_arm_by_pinocchio(pinocchio: None) -> None:
+    assert _by_pinocchio(sm.load("so101"), models_dir() / "so101" / "so101.urdf") < 1e-12
+
+
+def test_the_arm_by_pybullet() -> None:
+    need_engine("pybullet")
+    assert _by_pybullet(sm.load("so101"), models_dir() / "so101" / "so101.urdf") < 1e-12
+
+
+def test_every_kind_of_joint(tmp_path: Path, pinocchio: None) -> None:
+    model = _zoo(tmp_path)
+    file = tmp_path / "zoo.urdf"
+    file.write_text(urdf.write(model.raw, 1))
+    # A URDF starts at its root link; the pose of the root in the world is not part of it.
+    witness = sm.Kinematics(file, joint_names=model.joint_names)
+    root = model.body_id("root")
+    for qpos, pos, mat in _poses(model, 3):
+        turn = matrix_from_quat(model.raw.body_quat[root])
+        for site in range(model.nsite):
+            pose = witness.pose(qpos, urdf.tip_name(model.raw, site), "body")
+            placed = model.raw.body_pos[root] + turn @ pose.pos
+            assert np.abs(placed - pos[site]).max() < 1e-12
+            assert np.abs((turn @ pose.mat).ravel() - mat[site]).max() < 1e-12
+
+
+def test_masses_and_inertias_survive(tmp_path: Path, pinocchio: None) -> None:
+    """The mass matrix and the bias that Pinocchio computes from the URDF are MuJoCo's."""
+    import pinocchio as pin
+
+    model = _zoo(tmp_path)
+    file = tmp_path / "zoo.urdf"
+    file.write_text(urdf.write(model.raw, 1))
+    built = pin.buildModelFromUrdf(str(file))
+    order = [list(built.names).index(name) - 1 for name in model.joint_names]
+    # Gravity as the root sees it.
+    turn = matrix_from_quat(model.raw.body_quat[1])
+    built.gravity.linear = turn.T @ np.array([0, 0, -9.81])
+    work, random = built.createData(), np.random.default_rng(4)
+    data = mujoco.MjData(model.raw)
+    for _ in range(5):
+        qpos, qvel = random.uniform(-1, 1, 3), random.uniform(-1, 1, 3)
+        data.qpos[:], data.qvel[:] = qpos, qvel
+        mujoco.mj_forward(model.raw, data)
+        theirs_q, theirs_v = np.empty(4), np.empty(3)
+        for joint, place in enumerate(order):
+            pinned = built.joints[place + 1]
+            theirs_v[pinned.idx_v] = qvel[joint]
+            if pinned.nq == 2:
+                theirs_q[pinned.idx_q : pinned.idx_q + 2] = np.cos(qpos[joint]), np.sin(qpos[joint])
+            else:
+                theirs_q[pinned.idx_q] = qpos[joint]
+        bias = pin.nonLinearEffects(built, work, theirs_q, theirs_v)
+        found = [bias[built.joints[place + 1].idx_v] for place in order]
+        assert np.abs(found - data.qfrc_bias).max() < 1e-11
+
+
+def test_numbers_are_written_to_the_last_digit() -> None:
+    root = ET.parse(models_dir() / "so101" / "so101.urdf").getroot()
+    model = sm.load("so101")
+    for body in range(1, model.nbody):
+        link = root.find(f"link[@name='{model.body_names[body]}']")
+        assert link is not None
+        mass = link.find("inertial/mass")
+        assert mass is not None
+        assert float(mass.attrib["value"]) == model.raw.body_mass[body]
+    names = {link.attrib["name"] for link in root.findall("link")}
+    assert names >= {"gripperframe", "baseframe"}
+    for mesh in root.iter("mesh"):
+        assert (models_dir() / "so101" / mesh.attrib["filename"]).is_file()
+    limits = root.find("joint[@name='elbow_flex']/limit")
+    assert limits is not None
+    assert float(limits.attrib["effort"]) == 2.94
+
+
+def test_solids_of_a_capsule(tmp_path: Path) -> None:
+    raw = _zoo(tmp_path).raw
+    plain = ET.fromstring(urdf.write(raw, 1))
+    bullet = ET.fromstring(urdf.write(raw, 1, urdf.Dialect(capsules=True)))
+    assert len(list(bullet.iter("capsule"))) == 1
+    assert not list(plain.iter("capsule"))
+    assert len(list(plain.iter("sphere"))) == len(list(bullet.iter("sphere"))) + 2
+
+
+@pytest.mark.parametrize(
+    ("body", "word"),
+    [
+        ("<body><joint type='ball'/><geom size='1'/></body>", "ball"),
+        ("<body><joint ref='0.3'/><geom size='1'/></body>", "ref"),
+        ("<body><joint axis='1 0 0'/><joint axis='0 1 0'/><geom size='1'/></body>", "several"),
+        ("<body mocap='true'><geom size='1'/></body>", "mocap"),
+    ],
+)
+def test_what_urdf_cannot_say_is_refused(tmp_path: Path, body: str, word: str) -> None:
+    file = tmp_path / "x.xml"
+    file.write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    with pytest.raises(UnsupportedError, match=word):
+        urdf.check(sm.load(file).raw, "pybullet")
