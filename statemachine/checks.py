@@ -105,7 +105,7 @@ def index_of(kind: str, name: str, names: Sequence[str]) -> int:
 def kind_of(value: object) -> str:
     """What a value is, for messages: "a Data" of any backend, else its type."""
     for kind in type(value).__mro__:
-        if kind.__module__ == "statemachine.interface":
+        if kind.__module__ in ("statemachine.interface", "statemachine.model"):
             return f"a {kind.__name__}"
     module, name = type(value).__module__, type(value).__qualname__
     return name if module == "builtins" else f"{module}.{name}"

@@ -22,7 +22,7 @@ from .conftest import ROOT
 
 CORE = (
     "errors.py", "rotations.py", "records.py", "checks.py", "engines.py", "models.py",
-    "interface.py", "verbs.py", "kinematics.py", "backends",
+    "model.py", "interface.py", "verbs.py", "witness_file.py", "kinematics.py", "backends",
 )  # fmt: skip
 
 angles = st.floats(-3.0, 3.0)

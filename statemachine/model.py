@@ -1,0 +1,273 @@
+"""The contract of a Model: everything that never changes while a simulation runs."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .checks import TINY, as_count, as_scalar, as_switch, as_vector, index_of, whole_number
+from .errors import BadInputError, ReadOnlyError, UnsupportedError, unknown_name
+from .records import Array, Capabilities, Ints, JointType, Keyframe, read_only
+
+if TYPE_CHECKING:
+    from .interface import Data
+
+OPTIONS = (
+    "actuation",
+    "gravity",
+    "timestep",
+    "substeps",
+    "contacts",
+    "armature",
+    "damping",
+    "frictionloss",
+    "limits",
+    "integrator",
+)
+
+
+class Model(ABC):
+    """Everything that never changes while a simulation runs.
+
+    Made by `load`; constant from then on (`replace` gives another Model). Arrays
+    are read-only. Ids are MuJoCo's, on every backend.
+
+    Attributes:
+        backend: Name of the backend.
+        engine_version: Version of the engine behind it.
+        path: The file that it was made from.
+        raw: The engine's own object, for what this interface does not offer.
+        capabilities: What this backend can do.
+        timestep: Simulated time of one `step` [s].
+        substeps: Engine steps that one `step` takes.
+        nq, nv, nu: Lengths of qpos, qvel and ctrl.
+        nbody, njnt, nsite, ngeom: Counts; body 0 is the world.
+        jnt_type: (njnt,) `JointType`.
+        jnt_qposadr, jnt_dofadr: (njnt,) where each joint starts in qpos and qvel.
+        jnt_limited: (njnt,) bool; jnt_range: (njnt, 2) [rad or m].
+        actuator_jntid: (nu,) joint that each actuator drives, -1 if none.
+        actuator_ctrlrange, actuator_forcerange: (nu, 2), infinite where unlimited.
+        actuator_kp, actuator_kv: (nu,) gains of a position servo, NaN if it is none.
+        dof_armature, dof_damping, dof_frictionloss: (nv,) of each degree of freedom.
+        body_parentid: (nbody,) the body that carries each body; the world carries itself.
+        jnt_bodyid, geom_bodyid, site_bodyid: The body of each joint, geom and site.
+        site_pos, site_quat: (nsite, 3) [m] and (nsite, 4) wxyz, in that body's frame.
+        keyframes: The states that the file names.
+    """
+
+    backend: str
+    engine_version: str
+    path: Path
+    raw: Any
+    capabilities: Capabilities
+    timestep: float
+    substeps: int
+    nq: int
+    nv: int
+    nu: int
+    nbody: int
+    njnt: int
+    nsite: int
+    ngeom: int
+    body_names: tuple[str, ...]
+    joint_names: tuple[str, ...]
+    site_names: tuple[str, ...]
+    geom_names: tuple[str, ...]
+    actuator_names: tuple[str, ...]
+    jnt_type: Ints
+    jnt_qposadr: Ints
+    jnt_dofadr: Ints
+    jnt_limited: NDArray[np.bool_]
+    jnt_range: Array
+    actuator_jntid: Ints
+    actuator_ctrlrange: Array
+    actuator_forcerange: Array
+    actuator_kp: Array
+    actuator_kv: Array
+    dof_armature: Array
+    dof_damping: Array
+    dof_frictionloss: Array
+    body_parentid: Ints
+    jnt_bodyid: Ints
+    geom_bodyid: Ints
+    site_bodyid: Ints
+    site_pos: Array
+    site_quat: Array
+    keyframes: tuple[Keyframe, ...]
+
+    if TYPE_CHECKING:
+        _quaternions: list[tuple[int, int]]  # (joint id, address in qpos) of each
+
+    def __init__(self, **facts: Any) -> None:
+        missing = Model.__annotations__.keys() - facts.keys()
+        if missing:
+            raise TypeError(f"a backend must give its Model: {', '.join(sorted(missing))}")
+        for name, value in facts.items():
+            constant = read_only(value) if isinstance(value, np.ndarray) else value
+            object.__setattr__(self, name, constant)
+        # Once: NumPy swallows a Ctrl-C that falls into a comparison with an enum.
+        object.__setattr__(self, "_quaternions", _quaternions(self.jnt_type, self.jnt_qposadr))
+
+    def __setattr__(self, name: str, value: object) -> NoReturn:
+        raise ReadOnlyError(
+            f"a Model never changes: use model.replace({name}=…) where that is an option, "
+            "or the engine's own model.raw"
+        )
+
+    def __setstate__(self, facts: dict[str, Any]) -> None:
+        Model.__init__(self, **facts)  # a pickle forgets which arrays are read-only
+
+    def __repr__(self) -> str:
+        return (
+            f"<Model {self.path.stem} on {self.backend} {self.engine_version}: "
+            f"nq={self.nq} nv={self.nv} nu={self.nu}, {self.timestep:g} s a step>"
+        )
+
+    def body_id(self, name: str) -> int:
+        """Id of a body."""
+        return index_of("body", name, self.body_names)
+
+    def joint_id(self, name: str) -> int:
+        """Id of a joint; its address in qpos is `jnt_qposadr[id]`."""
+        return index_of("joint", name, self.joint_names)
+
+    def site_id(self, name: str) -> int:
+        """Id of a site."""
+        return index_of("site", name, self.site_names)
+
+    def geom_id(self, name: str) -> int:
+        """Id of a geom."""
+        return index_of("geom", name, self.geom_names)
+
+    def actuator_id(self, name: str) -> int:
+        """Id of an actuator, its place in ctrl."""
+        return index_of("actuator", name, self.actuator_names)
+
+    def key_id(self, key: int | str) -> int:
+        """Number of a keyframe, given by number or name.
+
+        Raises:
+            UnknownNameError: There is no such keyframe.
+        """
+        names = [frame.name for frame in self.keyframes]
+        if isinstance(key, str):
+            return index_of("keyframe", key, names)
+        number = whole_number(key)
+        if number is None or not 0 <= number < len(names):
+            raise unknown_name("keyframe", key, (f"{k} ({n})" for k, n in enumerate(names)))
+        return number
+
+    def replace(self, **options: Any) -> Model:
+        """Another Model that differs in the named options; this one stays as it is.
+
+        Args:
+            **options: Some of
+                actuation, contacts, limits: bool, on or off;
+                gravity: (3,) [m/s²];
+                timestep: > 0 [s]; substeps: engine steps within it, at least 1;
+                armature, damping, frictionloss: ≥ 0, (nv,) or one number for every
+                hinge and slide joint;
+                integrator: a name of `capabilities.integrators`.
+
+        Raises:
+            UnsupportedError: This backend has no such option.
+            BadInputError: The value has the wrong shape, kind or size.
+        """
+        checked = {}
+        for name, value in options.items():
+            if name not in OPTIONS:
+                error = unknown_name("option", name, OPTIONS)
+                raise UnsupportedError(
+                    str(error), backend=self.backend, feature=name, reason="unknown"
+                ) from None
+            if name not in self.capabilities.options:
+                raise self._unsupported(name)
+            checked[name] = self._checked_option(name, value)
+        return self._replace(checked)
+
+    def _unsupported(self, feature: str) -> UnsupportedError:
+        """The error for what this backend cannot do; the reason is in its record."""
+        known = self.capabilities.behaviours.get(feature)
+        reason = known.note if known else "the engine has no such setting"
+        return UnsupportedError(
+            f"backend {self.backend!r} does not support {feature!r}: {reason}",
+            backend=self.backend,
+            feature=feature,
+            reason=reason,
+        )
+
+    def _check_quaternions(self, qpos: Array) -> None:
+        """Raise BadInputError for a quaternion of `qpos` (nq,) that is zero."""
+        for joint, start in self._quaternions:
+            quat = qpos[start : start + 4]
+            if quat.dot(quat) < TINY * TINY:
+                raise self._zero_quaternion(joint, start)
+
+    def _zero_quaternion(self, joint: int, start: int) -> BadInputError:
+        """The error for a quaternion of a joint that is no rotation."""
+        return BadInputError(
+            f"qpos[{start}:{start + 4}], the quaternion of joint {self.joint_names[joint]!r}, "
+            "is zero: it names no rotation; the identity is 1 0 0 0"
+        )
+
+    def _coordinate_name(self, array: str, index: int) -> str:
+        """' (elbow_flex)' for an entry of qpos, qvel, qacc or ctrl; '' if it has no name."""
+        label = ""
+        if array == "ctrl":
+            label = self.actuator_names[index]
+        elif array in ("qpos", "qvel", "qacc"):
+            starts = self.jnt_qposadr if array == "qpos" else self.jnt_dofadr
+            label = self.joint_names[int(np.searchsorted(starts, index, side="right")) - 1]
+        return f" ({label})" if label else ""
+
+    def _checked_option(self, name: str, value: Any) -> Any:
+        if name in ("actuation", "contacts", "limits"):
+            return as_switch(value, name)
+        if name == "gravity":
+            return as_vector(value, (3,), name)
+        if name == "substeps":
+            return as_count(value, name)
+        if name == "integrator":
+            if value not in self.capabilities.integrators:
+                raise unknown_name("integrator", value, self.capabilities.integrators)
+            return value
+        if name == "timestep":
+            seconds = as_scalar(value, name)
+            if seconds <= 0:
+                raise BadInputError(f"timestep must be above 0 s; got {seconds}")
+            return seconds
+        return self._per_dof(name, value)
+
+    def _per_dof(self, name: str, value: Any) -> Array:
+        each = as_vector(value, (self.nv,) if np.ndim(value) else (), name)
+        if (each < 0).any():
+            raise BadInputError(f"{name} must not be negative; got {value!r}")
+        if each.ndim:
+            return each
+        # One number is meant for the joints of the robot, not for a free body.
+        array = np.array(getattr(self, f"dof_{name}"))
+        scalar = np.isin(self.jnt_type, (JointType.SLIDE, JointType.HINGE))
+        array[self.jnt_dofadr[scalar]] = each
+        return array
+
+    @abstractmethod
+    def _make_data(self) -> Data: ...
+
+    @abstractmethod
+    def _replace(self, options: dict[str, Any]) -> Model:
+        """Another Model; `options` are checked: bools, floats, (3,) and (nv,) arrays."""
+
+
+def _quaternions(types: Ints, addresses: Ints) -> list[tuple[int, int]]:
+    offsets = {int(JointType.FREE): 3, int(JointType.BALL): 0}
+    return [
+        (joint, address + offsets[kind])
+        for joint, (kind, address) in enumerate(
+            zip(types.tolist(), addresses.tolist(), strict=True)
+        )
+        if kind in offsets
+    ]

@@ -1,0 +1,191 @@
+"""The experiments through their functions: what the pages and the JSON are made of."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.experiments import (
+    _common,
+    fingertip,
+    forward,
+    gravity,
+    hold,
+    replay,
+    speed,
+    state,
+)
+from statemachine.models import models_dir
+
+from .conftest import need_engine
+
+
+def test_provenance_covers_included_files(tmp_path: Path) -> None:
+    home = models_dir() / "so101"
+    made = _common.provenance(sm.load("so101/scene_box"))
+    files = ("scene_box", "scene", "so101")
+    content = b"".join((home / f"{name}.xml").read_bytes() for name in files)
+    assert made.model_sha256 == hashlib.sha256(content).hexdigest()
+    assert made.model_file == "so101/scene_box.xml"
+
+
+def test_milestones() -> None:
+    assert _common.milestones(4.0) == [0, 1, 2, 3, 4]
+    assert _common.milestones(0.5) == [0, 0.5]
+    assert _common.milestones(60) == [0, 1, 2, 3, 4, 10, 20, 30, 50, 60]
+
+
+def test_forces_sum_with_the_bias_on_the_other_side() -> None:
+    forces = _common.Forces(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
+    assert forces.total == 2 + 3 + 4 + 5 + 6 + 7 - 1
+    assert _common.Forces(1.0, None, 0, 0, 0, 0, 0).total is None
+
+
+def test_gravity_is_read_at_the_moment_of_the_end() -> None:
+    model = sm.load("so101/scene")
+    found = gravity.run(model, seconds=1.0)
+    with sm.make_data(model) as data:
+        sm.step(model, data, 200)
+        sm.forward(model, data)
+        assert found.servos_on.forces.actuator == data.qfrc_actuator[1]
+        assert found.servos_on.qpos.tolist() == data.qpos.tolist()
+    touch = found.servos_off.touches["fixed_stud_1 (gripper) on floor"]
+    limp = model.replace(actuation=False)
+    with sm.make_data(limp) as data:
+        while data.time < touch - 1e-9:
+            sm.forward(limp, data)
+            assert len(data.contacts) == 0
+            sm.step(limp, data)
+        sm.forward(limp, data)
+        assert len(data.contacts) > 0
+
+
+def test_hold_tracks_the_worst_joint_and_the_speed() -> None:
+    found = hold.run(sm.load("so101/scene"), seconds=0.2)
+    gaps = np.abs(found.qpos - found.goal)
+    assert np.array_equal(found.error, gaps.max(axis=1))
+    assert np.abs(found.speed).max() > 1.0
+    step = (found.qpos[-1] - found.qpos[-2]) / 0.005
+    assert np.abs(found.speed - step).max() < 1e-9
+
+
+def test_replay_compares_what_it_says() -> None:
+    model = sm.load("so101/scene_box")
+    found = replay.run(model, steps=30, break_with="late-ctrl")
+    with sm.make_data(model) as one, sm.make_data(model) as two:
+        for data in (one, two):
+            sm.reset(model, data, keyframe=0)
+            data.time = 0.0
+        one.ctrl = found.ctrl
+        for k in range(30):
+            sm.step(model, one)
+            sm.step(model, two)
+            two.ctrl = found.ctrl
+            gap = one.qpos - two.qpos
+            assert found.difference[k + 1] == np.abs(gap).max()
+            assert found.apart is not None
+            assert found.apart[k + 1] == np.linalg.norm(gap[6:9])
+        assert one.time == pytest.approx(0.15)
+    assert found.identical is False
+    assert replay.run(model, steps=5).close is True
+
+
+def test_speed_runs_every_step_it_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    counted: list[int] = []
+    monkeypatch.setattr(speed, "step", lambda _model, _data, n=1: counted.append(n))
+    found = speed.run(sm.load("so101"), steps=47)
+    assert sum(counted) == 2 * 47
+    assert counted.count(1) >= 47
+    assert found.simulated == pytest.approx(47 * 0.005)
+
+
+def test_forward_compares_bits() -> None:
+    found = forward.run(sm.load("so101"), value=1e-12)
+    assert (1, 3) not in found.equal
+    assert found.equal == ((1, 2),)
+
+
+def test_state_of_every_type_of_joint(tmp_path: Path) -> None:
+    file = tmp_path / "m.xml"
+    file.write_text(
+        "<mujoco><worldbody><body><freejoint name='f'/><geom size='1'/>"
+        "<body><joint name='b' type='ball'/><geom size='1'/></body>"
+        "<body><joint name='s' type='slide'/><geom size='1'/></body></body></worldbody></mujoco>"
+    )
+    joints = {joint.name: joint for joint in state.run(sm.load(file)).joints}
+    assert (joints["b"].qpos_start, joints["b"].qpos_stop) == (7, 11)
+    assert (joints["b"].qvel_start, joints["b"].qvel_stop) == (6, 9)
+    assert joints["s"].type == "slide"
+
+
+class TestCertificate:
+    @pytest.fixture(autouse=True)
+    def _witness(self) -> None:
+        need_engine("pinocchio")
+
+    def test_poses_are_drawn_within_the_limits_by_the_seed(self) -> None:
+        model = sm.load("so101")
+        names = list(model.joint_names)
+        one, again, other = (fingertip._random_qpos(model, names, 50, seed) for seed in (1, 1, 2))
+        assert np.array_equal(one, again)
+        assert not np.array_equal(one, other)
+        assert not one[0].any()
+        low, high = model.jnt_range.T
+        assert ((one >= low) & (one <= high)).all()
+        assert (np.ptp(one[1:], axis=0) > 0.5 * (high - low)).all()
+
+    def test_its_tolerance_is_what_the_project_promises(self) -> None:
+        found = fingertip.run(sm.load("so101"), poses=20)
+        assert found.tolerance == 1e-12
+        assert found.agrees
+
+    @pytest.mark.parametrize("what", ["position", "rotation"])
+    def test_one_bad_pose_among_many_is_enough(
+        self, monkeypatch: pytest.MonkeyPatch, what: str
+    ) -> None:
+        right = fingertip._engine_poses
+
+        def wrong(*arguments: object) -> fingertip.Pose:
+            pos, mat = right(*arguments)  # pyright: ignore[reportArgumentType]
+            (pos if what == "position" else mat)[7] += 1e-9
+            return fingertip.Pose(pos, mat)
+
+        monkeypatch.setattr(fingertip, "_engine_poses", wrong)
+        found = fingertip.run(sm.load("so101"), poses=20)
+        assert found.frames is not None
+        assert found.frames.same
+        assert not found.agrees
+
+    @pytest.mark.parametrize("change", ["distance", "angle"])
+    def test_a_frame_that_is_slightly_another_is_refused(self, tmp_path: Path, change: str) -> None:
+        text = (models_dir() / "so101" / "so101.xml").read_text()
+        text = "\n".join(line for line in text.splitlines() if "mesh" not in line)
+        old, new = {
+            "distance": ('pos="0.012 -0.000218', 'pos="0.01201 -0.000218'),
+            "angle": (
+                'quat="0.7071067811865475 0 0.7071067811865475',
+                'quat="0.70711 0 0.7071',
+            ),
+        }[change]
+        assert old in text
+        file = tmp_path / "other.xml"
+        file.write_text(text.replace(old, new))
+        found = fingertip.run(sm.load("so101"), poses=5, witness=file)
+        assert found.frames is not None
+        assert not found.frames.same
+        assert found.position_worst is None
+
+    def test_a_free_robot_has_a_certificate_too(self, tmp_path: Path) -> None:
+        file = tmp_path / "m.xml"
+        inertial = "<inertial mass='1' pos='0 0 0' diaginertia='1 1 1'/>"
+        file.write_text(
+            f"<mujoco><worldbody><body name='r' pos='0 0 1'>{inertial}<freejoint name='f'/>"
+            f"<body name='b' pos='1 0 0'>{inertial}<joint name='w' type='ball'/>"
+            "<site name='tip' pos='0.1 0.2 0.3'/></body></body></worldbody></mujoco>"
+        )
+        found = fingertip.run(sm.load(file), poses=50, site="tip")
+        assert found.agrees

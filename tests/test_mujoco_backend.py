@@ -1,0 +1,329 @@
+"""What is particular to the MuJoCo backend: other models than the arm, options, states."""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.backends import mujoco_backend
+from statemachine.errors import (
+    BadInputError,
+    ClosedDataError,
+    DivergedError,
+    EngineWarning,
+    ForeignStateError,
+    UnknownNameError,
+)
+
+GEOM = "<geom size='0.1' mass='1'/>"
+
+
+def _load(folder: Path, body: str, rest: str = "", name: str = "m.xml") -> sm.Model:
+    file = folder / name
+    file.write_text(f"<mujoco><worldbody>{body}</worldbody>{rest}</mujoco>")
+    return sm.load(file)
+
+
+def _flags(model: sm.Model) -> int:
+    return model.raw.opt.disableflags
+
+
+def test_options_go_off_and_on_again() -> None:
+    model = sm.load("so101/scene")
+    for option, flag in (("actuation", "ACTUATION"), ("contacts", "CONTACT"), ("limits", "LIMIT")):
+        bit = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}"))
+        off = model.replace(**{option: False})
+        on = off.replace(**{option: True})
+        assert (bool(_flags(off) & bit), bool(_flags(on) & bit)) == (True, False)
+        assert _flags(on) == _flags(model)
+        assert model.replace(**{option: True}).raw is not model.raw
+
+
+def test_substeps_and_timestep_compose_in_any_order() -> None:
+    model = sm.load("so101")
+    one = model.replace(substeps=5).replace(timestep=0.01)
+    two = model.replace(timestep=0.01).replace(substeps=5)
+    for each in (one, two, model.replace(timestep=0.01, substeps=5)):
+        assert (each.timestep, each.substeps) == (0.01, 5)
+        assert each.raw.opt.timestep == pytest.approx(0.002)
+        with sm.make_data(each) as data:
+            sm.step(each, data, 3)
+            assert data.time == pytest.approx(0.03)
+    assert one.replace(gravity=[0, 0, 0]).substeps == 5
+
+
+def test_too_many_substeps_in_one_call_are_refused() -> None:
+    model = sm.load("so101").replace(substeps=1000)
+    with sm.make_data(model) as data:
+        with pytest.raises(BadInputError, match="too large"):
+            sm.step(model, data, 2**31 - 1)
+        assert data.time == 0.0
+
+
+def test_one_number_is_for_the_joints_and_not_for_a_free_body() -> None:
+    model = sm.load("so101/scene_box")
+    for option in ("armature", "damping", "frictionloss"):
+        changed = getattr(model.replace(**{option: 0.7}), f"dof_{option}")
+        assert changed.tolist() == [0.7] * 6 + [0.0] * 6
+        each = np.arange(12) / 10
+        assert np.array_equal(getattr(model.replace(**{option: each}), f"dof_{option}"), each)
+
+
+def test_inverse_weights_follow_the_armature() -> None:
+    model = sm.load("so101")
+    heavy = model.replace(armature=10.0)
+    assert heavy.raw.dof_invweight0[0] < model.raw.dof_invweight0[0] / 5
+    assert heavy.raw.dof_M0[0] > 10.0
+
+
+def test_a_replaced_model_is_what_a_file_would_have_given(tmp_path: Path) -> None:
+    body = f"<body><joint name='j' type='slide' axis='0 0 1' armature='{{}}'/>{GEOM}</body>"
+    light = _load(tmp_path, body.format("0"), name="a.xml").replace(armature=2.0)
+    heavy = _load(tmp_path, body.format("2"), name="b.xml")
+    ends = []
+    for model in (light, heavy):
+        with sm.make_data(model) as data:
+            sm.step(model, data, 50)
+            ends.append(data.qpos.copy())
+    assert np.array_equal(*ends)
+
+
+@pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
+@pytest.mark.parametrize("jacobian", ["dense", "sparse"])
+@pytest.mark.parametrize("solver", ["Newton", "CG", "PGS"])
+def test_parts_of_the_constraint_force_add_up(
+    tmp_path: Path, cone: str, jacobian: str, solver: str
+) -> None:
+    model = _load(
+        tmp_path,
+        "<geom type='plane' size='1 1 1'/>"
+        f"<body pos='0 0 0.09'><freejoint/>{GEOM}</body>"
+        f"<body pos='1 0 0.5'><joint name='a' axis='0 1 0' frictionloss='0.3' range='-1 1'/>"
+        f"<geom size='0.05' pos='0.3 0 0' mass='1'/>"
+        f"<body pos='0.3 0 0'><joint name='b' axis='0 1 0'/>"
+        "<geom size='0.05' pos='0.3 0 0'/></body>"
+        "</body>",
+        f"<option cone='{cone}' jacobian='{jacobian}' solver='{solver}'/>"
+        "<compiler angle='radian' autolimits='true'/>"
+        "<tendon><fixed name='t' frictionloss='0.2' range='-0.05 0.05' limited='true'>"
+        "<joint joint='a' coef='1'/><joint joint='b' coef='1'/></fixed></tendon>"
+        "<equality><joint joint1='b' polycoef='0.1 0 0 0 0'/></equality>",
+    )
+    with sm.make_data(model) as data:
+        sm.step(model, data, 60)
+        sm.forward(model, data)
+        parts = {
+            n: getattr(data, f"qfrc_{n}") for n in ("contact", "friction", "limit", "equality")
+        }
+        assert all(np.abs(part).max() > 1e-3 for part in parts.values()), parts
+        assert np.abs(sum(parts.values()) - data.qfrc_constraint).max() < 1e-9
+
+
+def test_contact_forces_are_the_engines(tmp_path: Path) -> None:
+    model = sm.load("so101/scene_box")
+    with sm.make_data(model) as data:
+        sm.reset(model, data, keyframe=0)
+        sm.step(model, data, 10)
+        contacts, wrench = data.contacts, np.zeros(6)
+        assert len(contacts) == data.raw.ncon > 0
+        assert contacts.torque.any()
+        for k in range(len(contacts)):
+            mujoco.mj_contactForce(model.raw, data.raw, k, wrench)
+            assert np.array_equal(contacts.force[k], wrench[:3])
+            assert np.array_equal(contacts.torque[k], wrench[3:])
+        for array in dataclasses.asdict(contacts).values():
+            assert not array.flags.writeable or array.base is None
+        with pytest.raises(ValueError, match="read-only"):
+            contacts.dist[0] = 0
+
+
+def test_a_zero_quaternion_of_a_ball_joint_is_refused(tmp_path: Path) -> None:
+    model = _load(tmp_path, f"<body><joint name='b' type='ball'/>{GEOM}</body>")
+    with sm.make_data(model) as data:
+        data.qpos[:] = (0.5, -0.5, 0.5, -0.5)  # adds up to zero, and is a rotation
+        sm.step(model, data)
+        data.qpos[:] = -0.0
+        with pytest.raises(BadInputError, match="joint 'b'"):
+            sm.step(model, data)
+        with pytest.raises(BadInputError, match="joint 'b'"):
+            data.qpos = np.zeros(4)
+
+
+def test_bad_entries_are_called_by_their_joint() -> None:
+    model = sm.load("so101/scene_box")
+    with sm.make_data(model) as data:
+        for name, index, joint in (("qpos", 12, "box"), ("qvel", 6, "box"), ("qvel", 5, "gripper")):
+            sm.reset(model, data)
+            getattr(data, name)[index] = np.nan
+            with pytest.raises(BadInputError, match=rf"{name}\[{index}\] \({joint}\)"):
+                sm.forward(model, data)
+            with pytest.raises(DivergedError, match=rf"\({joint}\)"):
+                sm.step(model, data)
+
+
+def test_booleans_and_huge_numbers_are_no_command() -> None:
+    model = sm.load("so101")
+    with sm.make_data(model) as data:
+        for value in ([True] * 6, [2e10] * 6, np.array([1, 2, 3, 4, 5, 6], dtype=object)):
+            with pytest.raises(BadInputError):
+                data.ctrl = value
+        data.ctrl = [1, 2, 3, 4, 5, 6]
+        with pytest.raises(UnknownNameError):
+            model.geom_id("")
+
+
+def test_a_diverged_data_refuses_writes_but_tells_its_time() -> None:
+    model = sm.load("so101")
+    with sm.make_data(model) as data:
+        data.qvel[0] = np.nan
+        with pytest.raises(DivergedError):
+            sm.step(model, data)
+        for name, value in (("time", 1.0), ("ctrl", np.zeros(6)), ("qpos", np.zeros(6))):
+            with pytest.raises(DivergedError):
+                setattr(data, name, value)
+        assert data.time > 0
+        assert "qvel[0]" in repr(data)
+        sm.reset(model, data)
+        assert data.time == 0.0
+        data.time = 1.0
+
+
+def test_closing_gives_the_memory_back_and_keeps_the_last_values() -> None:
+    model = sm.load("so101")
+    data = sm.make_data(model)
+    view = data.qpos
+    data.qpos[1] = 0.25
+    data.close()
+    data.close()
+    assert data.qpos[1] == 0.25
+    assert data.qpos.base is None
+    for array in (view, data.qpos):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1.0
+    with pytest.raises(ClosedDataError):
+        sm.reset(model, data)
+
+
+def test_states_of_models_that_differ_in_names_only_are_told_apart(tmp_path: Path) -> None:
+    text = "<body><joint name='{}' type='{}' axis='0 0 1'/>" + GEOM + "</body>"
+    models = [
+        _load(tmp_path, text.format(name, kind), actuator, f"{name}{kind}{len(actuator)}.xml")
+        for name, kind, actuator in (
+            ("a", "hinge", ""),
+            ("b", "hinge", ""),
+            ("a", "slide", ""),
+            ("a", "hinge", "<actuator><motor name='x' joint='a'/></actuator>"),
+            ("a", "hinge", "<actuator><motor name='yy' joint='a'/></actuator>"),
+        )
+    ]
+    states = []
+    for model in models:
+        with sm.make_data(model) as data:
+            states.append(sm.get_state(model, data))
+    assert len({state.fingerprint for state in states}) == len(models)
+    with sm.make_data(models[0]) as data, pytest.raises(ForeignStateError):
+        sm.set_state(models[0], data, states[1])
+    assert states[0]["ctrl"].shape == (0,)
+
+
+def test_hidden_parts_of_a_state_must_be_numbers() -> None:
+    model = sm.load("so101")
+    with sm.make_data(model) as data:
+        data.raw.xfrc_applied[1, 0] = np.nan
+        with pytest.raises(BadInputError, match="state"):
+            sm.get_state(model, data)
+
+
+def test_activations_and_mocap_bodies_are_part_of_the_state(tmp_path: Path) -> None:
+    model = _load(
+        tmp_path,
+        f"<body><joint name='j'/>{GEOM}</body><body mocap='true'>{GEOM}</body>",
+        "<actuator><general joint='j' dyntype='integrator' gainprm='1'/></actuator>",
+    )
+    with sm.make_data(model) as data, sm.make_data(model) as other:
+        data.ctrl[:] = 1.0
+        sm.step(model, data, 20)
+        data.raw.mocap_pos[0] = (1, 2, 3)
+        sm.set_state(model, other, sm.get_state(model, data))
+        assert other.raw.act[0] == data.raw.act[0] != 0
+        assert other.raw.mocap_pos[0].tolist() == [1, 2, 3]
+        for each in (data, other):
+            sm.step(model, each, 20)
+        assert np.array_equal(data.qpos, other.qpos)
+
+
+def test_an_actuator_on_a_tendon_drives_no_joint(tmp_path: Path) -> None:
+    model = _load(
+        tmp_path,
+        f"<body><joint name='j'/>{GEOM}</body>",
+        "<tendon><fixed name='t'><joint joint='j' coef='1'/></fixed></tendon>"
+        "<actuator><position tendon='t' kp='3'/><position joint='j' kp='0'/></actuator>",
+    )
+    assert model.actuator_jntid.tolist() == [-1, 0]
+    assert model.actuator_kp[0] == 3
+    assert np.isnan(model.actuator_kp[1])
+
+
+def test_warnings_of_compiling_come_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    right = mujoco_backend.compile_file
+
+    def noisy(path: object) -> object:
+        mujoco_backend._on_warning("the mesh looks odd")
+        return right(path)  # pyright: ignore[reportArgumentType]
+
+    monkeypatch.setattr(mujoco_backend, "compile_file", noisy)
+    with pytest.warns(EngineWarning, match="looks odd"):
+        sm.load("so101")
+
+
+def test_warnings_of_other_threads_are_left_to_them() -> None:
+    model = sm.load("so101")
+    ready, done = threading.Event(), threading.Event()
+
+    def other() -> None:
+        mujoco_backend._on_warning("from elsewhere")
+        ready.set()
+        done.wait(10)
+
+    thread = threading.Thread(target=other)
+    thread.start()
+    ready.wait(10)
+    with sm.make_data(model) as data:
+        sm.step(model, data)  # raises nothing, warns of nothing
+        assert mujoco_backend._ALARMS
+        done.set()
+        thread.join()
+        with pytest.warns(EngineWarning, match="from elsewhere"):
+            sm.step(model, data)  # of a thread that is gone
+    assert not mujoco_backend._ALARMS
+
+
+def test_the_record_of_a_model_with_rk4_says_what_it_breaks(tmp_path: Path) -> None:
+    model = _load(tmp_path, f"<body><joint name='j'/>{GEOM}</body>", "<option integrator='RK4'/>")
+    told = model.capabilities.behaviours["stale after a step"]
+    assert told.support == "unsupported"
+    with pytest.raises(UnknownNameError, match="implicitfast"):
+        model.replace(integrator="rk4")
+    better = model.replace(integrator="implicitfast")
+    assert better.capabilities.behaviours["stale after a step"].support == "native"
+
+
+def test_memory_is_flat_over_many_data() -> None:
+    import resource
+
+    model = sm.load("so101/scene_box")
+
+    def cycle(times: int) -> int:
+        for _ in range(times):
+            with sm.make_data(model) as data:
+                sm.step(model, data)
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+    before = cycle(300)
+    assert cycle(2000) - before < 20_000  # kilobytes
