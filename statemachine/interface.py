@@ -184,7 +184,10 @@ class Data(ABC):
         return self._home
 
     def close(self) -> None:
-        """Give back what the engine holds. Idempotent; every later use is an error."""
+        """Give back what the engine holds. Idempotent.
+
+        The last qpos, qvel and ctrl stay readable; every other use is an error.
+        """
         if self._trouble == "closed":
             return
         self._give_up("closed")

@@ -70,24 +70,23 @@ _COMPONENTS = {
 }
 _NATIVE = Behaviour("native", "the engine's own")
 _NOTES = {
-    "stale after a step": Behaviour(
-        "unsupported", "with RK4 the derived values are those of its fourth stage"
-    ),
     "forces by part": Behaviour("native", "rows of the constraint solver, by their type"),
     "exact restore": Behaviour("native", "mjSTATE_INTEGRATION, warm start included"),
     "no automatic reset": Behaviour("native", "the engine's flag mjDSBL_AUTORESET"),
 }
+_WITH_RK4 = Behaviour("unsupported", "with RK4 derived values are those of its fourth stage")
+_WITH_RESET = Behaviour(
+    "unsupported", "the engine's default: it resets, and the divergence is raised after"
+)
 
 
 def _capabilities(raw: mujoco.MjModel) -> Capabilities:
     """The record of one compiled model: two of its own settings show in it."""
     behaviours = {name: _NOTES.get(name, _NATIVE) for name in BEHAVIOURS}
-    if raw.opt.integrator != int(mujoco.mjtIntegrator.mjINT_RK4):
-        behaviours["stale after a step"] = _NATIVE
+    if raw.opt.integrator == int(mujoco.mjtIntegrator.mjINT_RK4):
+        behaviours["stale after a step"] = _WITH_RK4
     if not raw.opt.disableflags & int(_DISABLE.mjDSBL_AUTORESET):
-        behaviours["no automatic reset"] = Behaviour(
-            "unsupported", "the engine's default: it resets, and the divergence is raised after"
-        )
+        behaviours["no automatic reset"] = _WITH_RESET
     return Capabilities(
         options=OPTIONS,
         integrators=tuple(_INTEGRATORS),
