@@ -15,8 +15,8 @@ from .errors import MissingEngineError, StateMachineError
 from .lessons import LESSONS, Lesson, module
 
 PROGRAM = "statemachine"
-# Exit codes: the result says no; bad input; an engine is missing.
-SAYS_NO, BAD_INPUT, MISSING = 1, 2, 3
+# Exit codes: the result says no; bad input; an engine is missing; nowhere to write.
+SAYS_NO, BAD_INPUT, MISSING, NO_OUTPUT = 1, 2, 3, 74
 
 
 class _Parser(argparse.ArgumentParser):
@@ -50,16 +50,19 @@ def _after(flag: str) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code: 0 well, 1 the result says no, 2 bad input."""
+    if sys.stdout is None:  # closed by the caller, as by >&-
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a console without Unicode must not end a lesson
             stream.reconfigure(errors="replace")
     parser = _parser()
     options = parser.parse_args(arguments)
     if getattr(options, "run", None) is None:
-        print(_overview())
-        return 0
+        options.run = _list_lessons
     try:
-        return options.run(options)
+        code = options.run(options)
+        sys.stdout.flush()
+        return code
     except MissingEngineError as error:
         return _complain(error, MISSING)
     except StateMachineError as error:
@@ -67,10 +70,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(file=sys.stderr)
         return 130
-    except BrokenPipeError:
-        # The reader of a pipe left (`| head`); nothing more can be said to it.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:  # the reader of a pipe left (`| head`)
+        _let_go_of_output()
         return 141
+    except OSError as error:
+        if error.filename is not None:  # a file of the model's
+            return _complain(error, BAD_INPUT)
+        _let_go_of_output()
+        return _complain(OSError(f"the output cannot be written: {error.strerror}"), NO_OUTPUT)
+
+
+def _let_go_of_output() -> None:
+    """Nothing more can be said there; without this, Python would try once more at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _complain(error: Exception, code: int) -> int:

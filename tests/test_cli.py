@@ -465,3 +465,24 @@ def test_ctrl_c_ends_a_long_run(tmp_path: Path) -> None:
     _, errors = run.communicate(timeout=30)
     assert run.returncode == 130
     assert "Traceback" not in errors
+
+
+@pytest.mark.parametrize("command", ["", "lesson state", "lesson state --json", "doctor --json"])
+def test_output_that_cannot_be_written(tmp_path: Path, command: str) -> None:
+    import subprocess
+    import sys
+
+    from .conftest import ROOT
+
+    if not Path("/dev/full").exists():
+        pytest.skip("no /dev/full here")
+    for redirection, codes in (("> /dev/full", {74}), (">&-", {0})):
+        done = subprocess.run(
+            ["sh", "-c", f"{sys.executable} -m statemachine {command} {redirection}"],
+            capture_output=True,
+            text=True,
+            cwd=ROOT,
+            check=False,
+        )
+        assert done.returncode in codes, done.stderr
+        assert len(done.stderr.splitlines()) == (1 if 74 in codes else 0), done.stderr
