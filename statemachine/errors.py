@@ -70,6 +70,10 @@ class DivergedError(StateMachineError, ArithmeticError):
     index: int
 
 
+class EngineError(StateMachineError, RuntimeError):
+    """An engine gave up in the middle of a step; the Data is of no use any more."""
+
+
 class UnsupportedError(StateMachineError, NotImplementedError):
     """A backend cannot do what was asked, and says so."""
 

@@ -23,6 +23,7 @@ from .records import INPUTS, Array, Contacts, State, read_only
 
 __all__ = ["OPTIONS", "Data", "Model"]
 
+_NOBODY = object()  # not None, which a caller might hand over as a Model
 # By name, so that type checkers take the inputs for the descriptors below.
 _SLOTS = ("_home", "_model", "_trouble", "_alarms", "_advance", *INPUTS)
 
@@ -60,12 +61,12 @@ class Data(ABC):
     M·qacc + qfrc_bias = qfrc_actuator + qfrc_passive + qfrc_constraint.
     """
 
-    # `_model` is the owner while the Data is usable and None while it refuses, so
+    # `_model` is the owner while the Data is usable and nobody while it refuses, so
     # that a verb needs one comparison; `_home` is the owner for good.
     __slots__ = _SLOTS
 
     _home: Model
-    _model: Model | None
+    _model: object
     _trouble: str
     _alarms: list[Any]  # truthy when the engine has something to say
     _advance: Callable[..., None]  # the engine's own step: (nstep=1)
@@ -244,7 +245,7 @@ class Data(ABC):
 
     def _give_up(self, why: str) -> None:
         """Refuse everything but `reset` and `set_state` from now on."""
-        object.__setattr__(self, "_model", None)
+        object.__setattr__(self, "_model", _NOBODY)
         object.__setattr__(self, "_trouble", why)
 
     def _recover(self) -> None:
@@ -253,6 +254,9 @@ class Data(ABC):
 
     def _attend(self) -> None:  # noqa: B027  (optional hook)
         """Look into a non-empty `_alarms`; raise what concerns this Data."""
+
+    def _failed(self, error: Exception) -> None:  # noqa: B027  (optional hook)
+        """Raise what `error`, out of `_advance`, means for this Data, if it means more."""
 
     @abstractmethod
     def _recompute(self) -> None: ...

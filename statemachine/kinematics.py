@@ -47,7 +47,8 @@ class Kinematics:
     Args:
         model: An MJCF or URDF file, or the name of one of our models.
         joint_names: The joints in the order in which a qpos lists them; by default
-            the order of the file, which is MuJoCo's.
+            the order of an MJCF, which is MuJoCo's; of a URDF, Pinocchio's own, which
+            is alphabetical along each chain.
 
     Attributes:
         joint_names: That order.

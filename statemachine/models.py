@@ -48,7 +48,11 @@ def resolve(name: str | os.PathLike[str], menagerie: str | os.PathLike[str] | No
     text = os.fspath(name)
     if "\0" in text or not text.strip():
         raise ModelFileError(f"{text!r} is neither the name of a model nor a path")
-    path = Path(text).expanduser()
+    try:
+        path = Path(text).expanduser()
+        path.is_file()
+    except (OSError, RuntimeError) as error:  # too long a name, no such user, no permission
+        raise ModelFileError(f"{text[:80]!r} cannot be a model file: {error}") from None
     if path.suffix.lower() in SUFFIXES:
         if path.is_file():
             return path.absolute()

@@ -44,6 +44,7 @@ def step(model: Model, data: Data, nstep: int = 1) -> None:
             `reset` and `set_state`. (A ctrl that is infinite lies beyond its range
             like any other and may be clamped to it.)
         DivergedError: A coordinate stopped being finite, now or earlier.
+        EngineError: The engine gave up.
         ClosedDataError: `data` is closed.
     """
     try:
@@ -53,10 +54,14 @@ def step(model: Model, data: Data, nstep: int = 1) -> None:
     if not ready:
         _admit(model, data)
     advance = data._advance  # as an attribute, which CPython reads faster than a method
-    if nstep is _ONE:  # by identity, which True and 1.0 do not pass
-        advance()
-    else:
-        advance(as_count(nstep, "nstep"))
+    try:
+        if nstep is _ONE:  # by identity, which True and 1.0 do not pass
+            advance()
+        else:
+            advance(as_count(nstep, "nstep"))
+    except Exception as error:
+        data._failed(error)
+        raise
     if data._alarms:
         data._attend()
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine.errors import BadInputError
 from statemachine.experiments import (
     _common,
     fingertip,
@@ -178,6 +179,15 @@ class TestCertificate:
         assert found.frames is not None
         assert not found.frames.same
         assert found.position_worst is None
+
+    def test_a_witness_without_a_joint_that_moves_the_tip_is_refused(self, tmp_path: Path) -> None:
+        text = (models_dir() / "so101" / "so101.xml").read_text()
+        lines = text.splitlines()
+        kept = [ln for ln in lines if "mesh" not in ln and 'joint name="wrist_roll"' not in ln]
+        file = tmp_path / "other.xml"
+        file.write_text("\n".join(ln for ln in kept if 'joint="wrist_roll"' not in ln))
+        with pytest.raises(BadInputError, match="wrist_roll"):
+            fingertip.run(sm.load("so101"), poses=5, witness=file)
 
     def test_a_free_robot_has_a_certificate_too(self, tmp_path: Path) -> None:
         file = tmp_path / "m.xml"

@@ -102,7 +102,7 @@ def test_a_divergence_belongs_to_its_own_data() -> None:
 def test_other_warnings_come_up_as_python_warnings() -> None:
     model = sm.load("so101")
     with sm.make_data(model) as data:
-        mujoco_backend._on_warning("something that is no divergence")
+        mujoco_backend._HANDLER("something that is no divergence")
         with pytest.warns(EngineWarning, match="no divergence"):
             sm.step(model, data)
         with warnings.catch_warnings():

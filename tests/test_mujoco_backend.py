@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -16,10 +18,13 @@ from statemachine.errors import (
     BadInputError,
     ClosedDataError,
     DivergedError,
+    EngineError,
     EngineWarning,
     ForeignStateError,
     UnknownNameError,
 )
+
+from .conftest import ROOT
 
 GEOM = "<geom size='0.1' mass='1'/>"
 
@@ -274,7 +279,7 @@ def test_warnings_of_compiling_come_up(tmp_path: Path, monkeypatch: pytest.Monke
     right = mujoco_backend.compile_file
 
     def noisy(path: object) -> object:
-        mujoco_backend._on_warning("the mesh looks odd")
+        mujoco_backend._HANDLER("the mesh looks odd")
         return right(path)  # pyright: ignore[reportArgumentType]
 
     monkeypatch.setattr(mujoco_backend, "compile_file", noisy)
@@ -282,26 +287,102 @@ def test_warnings_of_compiling_come_up(tmp_path: Path, monkeypatch: pytest.Monke
         sm.load("so101")
 
 
-def test_warnings_of_other_threads_are_left_to_them() -> None:
+def test_a_divergence_of_another_thread_is_left_to_it() -> None:
     model = sm.load("so101")
-    ready, done = threading.Event(), threading.Event()
-
-    def other() -> None:
-        mujoco_backend._on_warning("from elsewhere")
-        ready.set()
-        done.wait(10)
-
-    thread = threading.Thread(target=other)
+    done = threading.Event()
+    text = "Nan, Inf or huge value in QPOS at DOF 2. The simulation is unstable. Time = 0.0000."
+    thread = threading.Thread(target=done.wait, args=(10,))
     thread.start()
-    ready.wait(10)
-    with sm.make_data(model) as data:
-        sm.step(model, data)  # raises nothing, warns of nothing
-        assert mujoco_backend._ALARMS
+    try:
+        with sm.make_data(model) as data:
+            mujoco_backend._HANDLER(text)
+            sm.step(model, data)  # raises nothing, warns of nothing
+            assert [text] == mujoco_backend._ALARMS
+            done.set()
+            thread.join()
+            with pytest.warns(EngineWarning, match="QPOS at DOF 2"):
+                sm.step(model, data)  # nobody is left to whom it could belong
+    finally:
         done.set()
-        thread.join()
-        with pytest.warns(EngineWarning, match="from elsewhere"):
-            sm.step(model, data)  # of a thread that is gone
     assert not mujoco_backend._ALARMS
+
+
+def test_ctrl_c_in_a_bulk_step_that_diverges_does_not_end_the_process() -> None:
+    code = """
+import os, signal, threading, statemachine as sm
+model = sm.load("so101")
+data = sm.make_data(model)
+data.qvel[0] = 9e9
+threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+try:
+    sm.step(model, data, 300_000)
+except (KeyboardInterrupt, sm.errors.DivergedError) as error:
+    print("caught", type(error).__name__)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert "caught" in done.stdout, done.stderr
+    assert done.returncode in (0, 1, 130, -2)
+
+
+def test_what_raw_shows_stays_writable() -> None:
+    model = sm.load("so101")
+    with sm.make_data(model) as data:
+        sm.forward(model, data)
+        data.raw.qacc[:] = 0.0
+        mujoco.mj_inverse(model.raw, data.raw)
+        assert not data.qacc.flags.writeable
+        assert data.qacc.tolist() == [0.0] * 6
+
+
+def test_nobody_is_not_taken_for_a_model() -> None:
+    model = sm.load("so101")
+    with sm.make_data(model) as data:
+        data.qvel[0] = np.nan
+        with pytest.raises(DivergedError):
+            sm.step(model, data)
+        with pytest.raises(TypeError):
+            sm.step(None, data)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(TypeError):
+        sm.step(None, data)  # pyright: ignore[reportArgumentType]
+
+
+def test_an_engine_that_gives_up_is_an_error_of_ours(tmp_path: Path) -> None:
+    balls = "".join(
+        f"<body pos='{0.01 * k} 0 {0.1 + 0.02 * k}'><freejoint/>"
+        "<geom type='box' size='.1 .1 .1'/></body>"
+        for k in range(20)
+    )
+    model = _load(tmp_path, f"<geom type='plane' size='1 1 1'/>{balls}", "<size memory='20K'/>")
+    with sm.make_data(model) as data:
+        with pytest.raises((EngineError, DivergedError)):
+            sm.step(model, data, 100)
+        with pytest.raises(DivergedError):
+            sm.step(model, data)
+
+
+def test_an_option_overrules_a_flag_of_the_file(tmp_path: Path) -> None:
+    body = f"<body><joint name='j' type='slide' axis='0 0 1'/>{GEOM}</body>"
+    flags = "<option><flag gravity='disable' frictionloss='disable'/></option>"
+    model = _load(tmp_path, body, flags)
+    falling = model.replace(gravity=[0, 0, -5])
+    held = falling.replace(frictionloss=100.0)
+    ends = []
+    for each in (model, falling, held):
+        with sm.make_data(each) as data:
+            sm.step(each, data, 100)
+            ends.append(float(data.qpos[0]))
+    assert ends[0] == 0.0
+    assert ends[1] < -0.05
+    assert abs(ends[2]) < 0.01
+
+
+def test_a_model_whose_bodies_sleep_promises_no_exact_restore(tmp_path: Path) -> None:
+    model = _load(
+        tmp_path, f"<body><freejoint/>{GEOM}</body>", "<option><flag sleep='enable'/></option>"
+    )
+    assert not model.capabilities.exact_restore
 
 
 def test_the_record_of_a_model_with_rk4_says_what_it_breaks(tmp_path: Path) -> None:

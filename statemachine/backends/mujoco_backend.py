@@ -21,8 +21,8 @@ from typing import Any, Literal, cast
 import mujoco
 import numpy as np
 
-from ..checks import TINY, check_finite
-from ..errors import BadInputError, DivergedError, EngineWarning, ModelError
+from ..checks import HUGE, TINY, check_finite
+from ..errors import BadInputError, DivergedError, EngineError, EngineWarning, ModelError
 from ..interface import OPTIONS, Data, Model
 from ..records import (
     BEHAVIOURS,
@@ -42,6 +42,13 @@ _SWITCHES = {  # option of `replace` -> the flag that turns it off
     "actuation": _DISABLE.mjDSBL_ACTUATION,
     "contacts": _DISABLE.mjDSBL_CONTACT,
     "limits": _DISABLE.mjDSBL_LIMIT,
+}
+_HINDRANCES = {  # option -> flags of a file that would leave it without effect
+    "gravity": (_DISABLE.mjDSBL_GRAVITY,),
+    "damping": (_DISABLE.mjDSBL_DAMPER,),
+    "frictionloss": (_DISABLE.mjDSBL_FRICTIONLOSS, _DISABLE.mjDSBL_CONSTRAINT),
+    "contacts": (_DISABLE.mjDSBL_CONSTRAINT,),
+    "limits": (_DISABLE.mjDSBL_CONSTRAINT,),
 }
 # Not RK4: after its step the derived values are neither of the state before nor after.
 _INTEGRATORS = {
@@ -75,6 +82,7 @@ _NOTES = {
     "no automatic reset": Behaviour("native", "the engine's flag mjDSBL_AUTORESET"),
 }
 _WITH_RK4 = Behaviour("unsupported", "with RK4 derived values are those of its fourth stage")
+_WITH_SLEEP = Behaviour("unsupported", "the counters of sleeping bodies are in no State")
 _WITH_RESET = Behaviour(
     "unsupported", "the engine's default: it resets, and the divergence is raised after"
 )
@@ -87,39 +95,40 @@ def _capabilities(raw: mujoco.MjModel) -> Capabilities:
         behaviours["stale after a step"] = _WITH_RK4
     if not raw.opt.disableflags & int(_DISABLE.mjDSBL_AUTORESET):
         behaviours["no automatic reset"] = _WITH_RESET
+    asleep = bool(raw.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP))
+    if asleep:
+        behaviours["exact restore"] = _WITH_SLEEP
     return Capabilities(
         options=OPTIONS,
         integrators=tuple(_INTEGRATORS),
         behaviours=behaviours,
         shared_model=True,
-        exact_restore=True,
+        exact_restore=not asleep,
     )
 
 
-# (thread, text) of every warning that MuJoCo gave and nobody has looked at yet. The
-# handler is the process's, so a Data trusts its own counters for what is its own.
-_ALARMS: list[tuple[int, str]] = []
+# The text of every warning that MuJoCo gave and nobody has looked at yet. The handler is
+# the process's, so a Data trusts its own counters for what is its own. It is a function
+# in C: a Ctrl-C inside one in Python would have to cross MuJoCo, and end the process.
+_ALARMS: list[str] = []
+_HANDLER = _ALARMS.append
 _BAD = re.compile(r"value in (\w+) at \w+ (\d+).*Time = ([-+.\deE]+\d)")
-
-
-def _on_warning(text: str) -> None:
-    _ALARMS.append((threading.get_ident(), text))
 
 
 def _listen() -> None:
     # Another library may have put its own handler in since; without ours, a
     # divergence would pass in silence and write a log file.
-    if mujoco.get_mju_user_warning() is not _on_warning:
-        mujoco.set_mju_user_warning(_on_warning)
+    if mujoco.get_mju_user_warning() is not _HANDLER:
+        mujoco.set_mju_user_warning(_HANDLER)
 
 
 def _drain() -> list[str]:
-    """The warnings of this thread, taken off the list, and of threads that are gone."""
-    others = {thread.ident for thread in threading.enumerate()} - {threading.get_ident()}
-    mine = [entry for entry in _ALARMS if entry[0] not in others]
-    for entry in mine:
-        _ALARMS.remove(entry)
-    return [text for _, text in mine]
+    """What may be said now: nothing of a divergence that another thread still has to meet."""
+    alone = threading.active_count() == 1
+    taken = [text for text in list(_ALARMS) if alone or not _BAD.search(text)]
+    for text in taken:
+        _ALARMS.remove(text)
+    return taken
 
 
 def _pass_on(texts: list[str]) -> None:
@@ -176,6 +185,8 @@ class MujocoModel(Model):
     def _replace(self, options: dict[str, Any]) -> MujocoModel:
         raw = copy.copy(self.raw)
         for name, value in options.items():
+            for flag in _HINDRANCES.get(name, ()):  # else the option would be without effect
+                raw.opt.disableflags &= ~int(flag)
             if name in _SWITCHES:
                 flag = int(_SWITCHES[name])
                 raw.opt.disableflags = (raw.opt.disableflags & ~flag) | (0 if value else flag)
@@ -187,6 +198,8 @@ class MujocoModel(Model):
                 getattr(raw, f"dof_{name}")[:] = value
         substeps = options.get("substeps", self.substeps)
         raw.opt.timestep = options.get("timestep", self.timestep) / substeps
+        if raw.opt.timestep <= 0:
+            raise BadInputError(f"a timestep of {self.timestep} s cannot have {substeps} substeps")
         if "armature" in options:
             mujoco.mj_setConst(raw, mujoco.MjData(raw))  # inverse weights follow from it
         return MujocoModel(raw, self.path, substeps)
@@ -204,7 +217,8 @@ class MujocoData(Data):
     def __init__(self, model: MujocoModel) -> None:
         _listen()
         raw = mujoco.MjData(model.raw)
-        views = {name: getattr(raw, name) for name in (*POSES, "qacc", *FORCES)}
+        # Views of their own, so that what raw shows stays writable.
+        views = {name: getattr(raw, name).view() for name in (*POSES, "qacc", *FORCES)}
         for view in views.values():
             view.setflags(write=False)
         for name, value in (("_raw", raw), ("_views", views), ("_layout", _layout(model))):
@@ -291,7 +305,7 @@ class MujocoData(Data):
         return self._constraint_part("equality")
 
     def _view(self, name: str) -> Array:
-        if self._model is None:
+        if self._trouble:
             self._refuse_if_troubled()
         return self._views[name]
 
@@ -344,23 +358,19 @@ class MujocoData(Data):
         self._views.clear()
 
     def _attend(self) -> None:
-        texts = _drain()
         raised = {name for name in _FATAL if self.raw.warning[int(_FATAL[name])].number}
         if not raised:
-            _pass_on(texts)  # of another Data, or nothing that makes this one useless
+            _pass_on(_drain())  # of another Data, or nothing that makes this one useless
             return
-        bad = [match for match in map(_BAD.search, texts) if match and match[1] in raised]
-        quantity, index, time = sorted(raised)[0], -1, self.raw.time
-        if bad:
-            quantity, index, time = bad[0][1], int(bad[0][2]), float(bad[0][3])
-        quantity = quantity.lower()
-        entry = f"{quantity}[{index}]{self._home._coordinate_name(quantity, index)}"
+        quantity, index, time = self._first_bad(raised)
+        entry = quantity
+        if index >= 0:
+            entry += f"[{index}]{self._home._coordinate_name(quantity, index)}"
         if quantity == "ctrl":
-            value = float(self.ctrl[index])
             self._give_up(f"it was stepped with a bad {entry}")
             raise BadInputError(
-                f"{entry} was {value} at time {time:g} s, which is no command: MuJoCo stepped "
-                "as if ctrl were zero. This Data now takes only reset and set_state",
+                f"{entry} was no number at time {time:g} s: MuJoCo stepped as if ctrl were zero. "
+                "This Data now takes only reset and set_state",
                 quantity=quantity,
                 index=index,
                 time=time,
@@ -373,6 +383,39 @@ class MujocoData(Data):
             index=index,
             time=time,
         )
+
+    def _first_bad(self, raised: set[str]) -> tuple[str, int, float]:
+        """Quantity, index and time of this Data's first alarm, which is taken off the list."""
+        for text in list(_ALARMS):
+            match = _BAD.search(text)
+            if match is None or match[1] not in raised:
+                continue
+            quantity, index = match[1].lower(), int(match[2])
+            if quantity != "qacc":  # the text may be that of a Data in another thread
+                value = getattr(self, quantity)[index]
+                if abs(value) <= HUGE:
+                    continue
+            _ALARMS.remove(text)
+            self._forget_others(raised)
+            return quantity, index, float(match[3])
+        return sorted(raised)[0].lower(), -1, float(self.raw.time)
+
+    def _forget_others(self, raised: set[str]) -> None:
+        """Take off what the same divergence set off after its first alarm."""
+        if threading.active_count() == 1:
+            _ALARMS.clear()
+            return
+        for name in raised:
+            same = (text for text in list(_ALARMS) if f" {name} " in text)
+            text = next(same, None)
+            if text is not None and name != "CTRL":
+                _ALARMS.remove(text)
+
+    def _failed(self, error: Exception) -> None:
+        if isinstance(error, mujoco.FatalError):
+            reason = " ".join(str(error).split())
+            self._give_up(f"MuJoCo gave up: {reason}")
+            raise EngineError(f"MuJoCo gave up: {reason}") from error
 
 
 _FATAL = {

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import platform
-import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -55,13 +55,23 @@ def provenance(model: Model, seed: int | None = None, **others: str) -> Provenan
 
 
 def _with_includes(path: Path) -> Iterator[bytes]:
-    """A model's file, then those it includes, theirs and so on."""
-    content = path.read_bytes()
-    yield content
-    for name in re.findall(rb"""<include\s[^>]*file\s*=\s*["']([^"']+)["']""", content):
-        included = path.parent / name.decode()
-        if included.is_file() and included != path:
-            yield from _with_includes(included)
+    """A model's file, then those it includes, theirs and so on, each once.
+
+    MuJoCo looks an included file up beside the one that was loaded.
+    """
+    waiting, seen = [path], set()
+    while waiting:
+        file = waiting.pop(0)
+        if file in seen or not file.is_file():
+            continue
+        seen.add(file)
+        content = file.read_bytes()
+        yield content
+        try:
+            includes = ElementTree.fromstring(content).iter("include")
+        except ElementTree.ParseError:  # a binary model
+            continue
+        waiting += [path.parent / name for i in includes if (name := i.get("file"))]
 
 
 @dataclass(frozen=True)
@@ -176,12 +186,12 @@ def steps_in(model: Model, seconds: float) -> int:
     """Number of timesteps in a time, at least one."""
     if not np.isfinite(seconds) or seconds <= 0:
         raise BadInputError(f"seconds must be above 0; got {seconds}")
-    steps = max(1, round(seconds / model.timestep))
+    steps = seconds / model.timestep
     if steps > _STEPS_MOST:
         raise BadInputError(
-            f"{seconds:g} s are {steps:,} steps, and a run has at most {_STEPS_MOST:,}"
+            f"{seconds:g} s are {steps:.3g} steps, and a run has at most {_STEPS_MOST:,}"
         )
-    return steps
+    return max(1, round(steps))
 
 
 def milestones(seconds: float) -> list[float]:

@@ -19,8 +19,9 @@ from ..kinematics import Kind, Kinematics, Pose
 from ..records import Array, JointType
 from ..rotations import angle_between, matrix_from_quat
 from ..verbs import forward, make_data
-from ._common import Progress, Provenance, provenance, silent
+from ._common import Progress, Provenance, carried_by, provenance, silent
 
+_MOST = 1_000_000
 TOLERANCE = 1e-12  # metres, and entries of the rotation matrix
 _SAME_FRAME = 1e-9  # metres and radians; files write frames with fewer digits than poses
 
@@ -108,6 +109,8 @@ def run(
             has joints that the witness's file has not.
     """
     count = as_count(poses, "poses")
+    if count > _MOST:
+        raise BadInputError(f"poses must be at most {_MOST:,}; got {count:,}")
     if count < 2:
         raise BadInputError("poses must be at least 2: one cannot tell a frame from a joint")
     if seed < 0:
@@ -121,6 +124,12 @@ def run(
     if sorted(shared) != sorted(known.joint_names):
         lacking = sorted(set(known.joint_names) - set(shared))
         raise BadInputError(f"{model.path.name} lacks joints of the witness: {', '.join(lacking)}")
+    body = int(model.site_bodyid[tip])
+    for joint, other in enumerate(model.joint_names):
+        if other not in shared and body in carried_by(model, [int(model.jnt_bodyid[joint])]):
+            raise BadInputError(
+                f"{known.path.name} lacks the joint {other!r}, which moves {site!r}"
+            )
     kinematics = Kinematics(known.path, joint_names=shared)
     name, kind = _find_frame(kinematics, witness_frame or site)
     configurations = _random_qpos(model, shared, count, seed)

@@ -11,6 +11,7 @@ from ..verbs import make_data, reset, step
 from ._common import Progress, Provenance, provenance, silent
 
 _CHUNKS = 20
+_CHUNK_MOST = 20_000  # steps; between chunks the progress moves and Ctrl-C is heard
 
 
 @dataclass(frozen=True)
@@ -52,8 +53,8 @@ def run(model: Model, steps: int = 20_000, progress: Progress = silent) -> Speed
         BadInputError: `steps` is no whole number.
     """
     total = as_count(steps, "steps")
-    chunks = [total // _CHUNKS + (k < total % _CHUNKS) for k in range(_CHUNKS)]
-    chunks = [chunk for chunk in chunks if chunk]
+    size = max(1, min(total // _CHUNKS, _CHUNK_MOST))
+    chunks = [size] * (total // size) + [total % size] * bool(total % size)
     walls = []
     for turn, bulk in enumerate((True, False)):
         with make_data(model) as data:
