@@ -126,9 +126,16 @@ def _drain() -> list[str]:
     """What may be said now: nothing of a divergence that another thread still has to meet."""
     alone = threading.active_count() == 1
     taken = [text for text in list(_ALARMS) if alone or not _BAD.search(text)]
-    for text in taken:
+    return [text for text in taken if _take(text)]
+
+
+def _take(text: str) -> bool:
+    """Take a text off the list; another thread may have been quicker."""
+    try:
         _ALARMS.remove(text)
-    return taken
+    except ValueError:
+        return False
+    return True
 
 
 def _pass_on(texts: list[str]) -> None:
@@ -385,31 +392,26 @@ class MujocoData(Data):
         )
 
     def _first_bad(self, raised: set[str]) -> tuple[str, int, float]:
-        """Quantity, index and time of this Data's first alarm, which is taken off the list."""
-        for text in list(_ALARMS):
-            match = _BAD.search(text)
-            if match is None or match[1] not in raised:
-                continue
-            quantity, index = match[1].lower(), int(match[2])
-            if quantity != "qacc":  # the text may be that of a Data in another thread
-                value = getattr(self, quantity)[index]
-                if abs(value) <= HUGE:
-                    continue
-            _ALARMS.remove(text)
-            self._forget_others(raised)
-            return quantity, index, float(match[3])
-        return sorted(raised)[0].lower(), -1, float(self.raw.time)
+        """Quantity, index and time of this Data's first alarm; all of its own are taken off."""
+        own = []
+        for name in raised:  # MuJoCo gives one text for each, the first time
+            matches = [m for text in list(_ALARMS) if (m := _BAD.search(text)) and m[1] == name]
+            if len(matches) > 1:  # one may be that of a Data in another thread
+                matches.sort(key=self._is_fine)
+            own += matches[:1]
+        order = list(_ALARMS)
+        own.sort(key=lambda m: order.index(m.string) if m.string in order else len(order))
+        for match in own:
+            _take(match.string)
+        if not own:
+            return sorted(raised)[0].lower(), -1, float(self.raw.time)
+        return own[0][1].lower(), int(own[0][2]), float(own[0][3])
 
-    def _forget_others(self, raised: set[str]) -> None:
-        """Take off what the same divergence set off after its first alarm."""
-        if threading.active_count() == 1:
-            _ALARMS.clear()
-            return
-        for name in raised:
-            same = (text for text in list(_ALARMS) if f" {name} " in text)
-            text = next(same, None)
-            if text is not None and name != "CTRL":
-                _ALARMS.remove(text)
+    def _is_fine(self, match: re.Match[str]) -> bool:
+        """Whether the entry that an alarm names is in order here."""
+        array = self.raw.qacc if match[1] == "QACC" else getattr(self, match[1].lower())
+        index = int(match[2])
+        return index >= len(array) or bool(abs(array[index]) <= HUGE)
 
     def _failed(self, error: Exception) -> None:
         if isinstance(error, mujoco.FatalError):
