@@ -21,7 +21,7 @@ from .errors import BadInputError, ModelError, unknown_name
 from .models import resolve
 from .records import Array
 from .rotations import matrix_from_quat, xyzw_from_wxyz
-from .witness_file import read, sites_by_fromto
+from .witness_file import read
 
 Kind = Literal["site", "body"]
 
@@ -65,10 +65,9 @@ class Kinematics:
         self._pin: Any = require("pinocchio")
         self.path: Path = resolve(model)
         self.version: str = self._pin.__version__
-        self._model, in_file = read(self._pin, self.path)
+        self._model, in_file, self._misplaced = read(self._pin, self.path)
         self._data: Any = self._model.createData()
         self.joint_names: tuple[str, ...] = tuple(in_file if joint_names is None else joint_names)
-        self._oblique = sites_by_fromto(self.path)
         self._segments = _segments(self._model, in_file, self.joint_names, self.path)
         self.nq: int = sum(segment.nq for segment in self._segments)
         self.nv: int = sum(segment.nv for segment in self._segments)
@@ -164,7 +163,7 @@ class Kinematics:
         wanted = {"site": types.OP_FRAME, "body": types.BODY}
         if kind not in wanted:
             raise unknown_name("kind of frame", kind, wanted)
-        if kind == "site" and name in self._oblique:
+        if kind == "site" and name in self._misplaced:
             raise ModelError(
                 f"site {name!r} of {self.path.name} is placed by fromto, which Pinocchio's "
                 "parser does not read"

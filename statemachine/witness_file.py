@@ -20,13 +20,14 @@ _PLACES = {"pos", "quat", "euler", "axisangle", "xyaxes", "zaxis", "fromto"}
 _PASSED_OVER = ("frame", "replicate", "composite", "flexcomp", "attach")
 
 
-def read(pin: Any, path: Path) -> tuple[Any, list[str]]:
-    """Pinocchio's model of a file, and the names of its joints in the file's order."""
+def read(pin: Any, path: Path) -> tuple[Any, list[str], set[str]]:
+    """Pinocchio's model of a file, its joints in order, and the sites that it misplaces."""
     try:
         root = ElementTree.parse(path).getroot()
     except (ElementTree.ParseError, OSError, UnicodeDecodeError) as error:
         raise ModelError(f"{path} is not an XML file: {error}") from error
     in_file: list[str] = []
+    misplaced = {site.get("name", "") for site in root.iter("site") if site.get("fromto")}
     try:
         if root.tag == "robot":
             model = pin.buildModelFromUrdf(str(path))
@@ -49,7 +50,7 @@ def read(pin: Any, path: Path) -> tuple[Any, list[str]]:
         for i, joint in enumerate(model.joints):
             if joint.shortname().endswith("FreeFlyer"):
                 model.jointPlacements[i] = pin.SE3.Identity()
-    return model, in_file or list(model.names)[1:]
+    return model, in_file or list(model.names)[1:], misplaced
 
 
 def _build_mjcf(pin: Any, root: ElementTree.Element, path: Path) -> Any:
@@ -117,12 +118,6 @@ def _still_body(parent: ElementTree.Element, name: str) -> ElementTree.Element:
     body = ElementTree.SubElement(parent, "body", name=name)
     ElementTree.SubElement(body, "inertial", mass="1", pos="0 0 0", diaginertia="1 1 1")
     return body
-
-
-def sites_by_fromto(path: Path) -> set[str]:
-    """Names of the sites whose place Pinocchio would not know."""
-    sites = ElementTree.parse(path).getroot().iter("site")
-    return {site.get("name", "") for site in sites if site.get("fromto")}
 
 
 def _mjcf_joints(root: ElementTree.Element) -> list[str]:

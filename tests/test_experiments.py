@@ -74,6 +74,14 @@ def test_hold_tracks_the_worst_joint_and_the_speed() -> None:
     assert np.abs(found.speed - step).max() < 1e-9
 
 
+def test_hold_that_ends_at_the_first_touch_says_so() -> None:
+    whole = hold.run(sm.load("so101/scene"), seconds=0.5)
+    assert whole.first_contact is not None
+    found = hold.run(sm.load("so101/scene"), seconds=whole.first_contact)
+    assert found.touching
+    assert found.first_contact == pytest.approx(whole.first_contact)
+
+
 def test_replay_compares_what_it_says() -> None:
     model = sm.load("so101/scene_box")
     found = replay.run(model, steps=30, break_with="late-ctrl")

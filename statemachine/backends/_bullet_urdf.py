@@ -58,11 +58,6 @@ def tree(raw: mujoco.MjModel, root: int) -> list[int]:
     return [b for b in range(1, raw.nbody) if raw.body_rootid[b] == root]
 
 
-def is_free(raw: mujoco.MjModel, root: int) -> bool:
-    """Whether a tree moves freely in the world."""
-    return bool(raw.body_jntnum[root]) and not _has_axis(raw, root)
-
-
 def check(raw: mujoco.MjModel, backend: str) -> None:
     """Raise UnsupportedError for what URDF cannot say of a robot."""
 

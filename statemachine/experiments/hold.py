@@ -117,6 +117,9 @@ def run(
             poses.append(data.qpos[addresses[:, 0]])
             if k % 100 == 0:
                 progress(k / total)
+        at_end = touching(model, data.contacts, robot)
+        if first is None and at_end:
+            first = data.time
         return Hold(
             target=goal,
             goal=np.clip(goal, *model.actuator_ctrlrange.T),
@@ -125,7 +128,7 @@ def run(
             lag=np.array(lags),
             previous=previous,
             first_contact=first,
-            touching=touching(model, data.contacts, robot),
+            touching=at_end,
             speed=data.qvel[addresses[:, 1]].copy(),
             without_contacts=None if first is None else _freely(model, goal, total, addresses),
             joints=tuple(names),
