@@ -110,74 +110,75 @@ class Data(ABC):
         """The engine's own object, for what this interface does not offer."""
 
     @property
-    @abstractmethod
     def xpos(self) -> Array:
         """(nbody, 3) body origins in world axes [m]."""
+        return self._derive("xpos")
 
     @property
-    @abstractmethod
     def xquat(self) -> Array:
         """(nbody, 4) body orientations, wxyz."""
+        return self._derive("xquat")
 
     @property
-    @abstractmethod
     def site_xpos(self) -> Array:
         """(nsite, 3) site positions in world axes [m]."""
+        return self._derive("site_xpos")
 
     @property
-    @abstractmethod
     def site_xmat(self) -> Array:
         """(nsite, 9) site rotation matrices, row by row."""
+        return self._derive("site_xmat")
 
     @property
-    @abstractmethod
     def contacts(self) -> Contacts:
         """The contacts; see `Contacts`."""
+        self._refuse_if_troubled()
+        return self._find_contacts()
 
     @property
-    @abstractmethod
     def qacc(self) -> Array:
         """(nv,) accelerations [rad/s² or m/s²]."""
+        return self._derive("qacc")
 
     @property
-    @abstractmethod
     def qfrc_bias(self) -> Array:
         """(nv,) gravity, centrifugal and Coriolis [N·m or N]; on the left-hand side."""
+        return self._derive("qfrc_bias")
 
     @property
-    @abstractmethod
     def qfrc_actuator(self) -> Array:
         """(nv,) what the actuators exert [N·m or N]."""
+        return self._derive("qfrc_actuator")
 
     @property
-    @abstractmethod
     def qfrc_passive(self) -> Array:
         """(nv,) springs and viscous damping [N·m or N]."""
+        return self._derive("qfrc_passive")
 
     @property
-    @abstractmethod
     def qfrc_constraint(self) -> Array:
         """(nv,) contact, dry friction and limits together [N·m or N]."""
+        return self._derive("qfrc_constraint")
 
     @property
-    @abstractmethod
     def qfrc_contact(self) -> Array:
         """(nv,) the part of qfrc_constraint that contacts exert."""
+        return self._derive("qfrc_contact")
 
     @property
-    @abstractmethod
     def qfrc_friction(self) -> Array:
         """(nv,) the part that dry friction in the joints exerts."""
+        return self._derive("qfrc_friction")
 
     @property
-    @abstractmethod
     def qfrc_limit(self) -> Array:
         """(nv,) the part that joint limits exert."""
+        return self._derive("qfrc_limit")
 
     @property
-    @abstractmethod
     def qfrc_equality(self) -> Array:
         """(nv,) the part that equality constraints exert."""
+        return self._derive("qfrc_equality")
 
     @property
     def model(self) -> Model:
@@ -257,6 +258,13 @@ class Data(ABC):
 
     def _failed(self, error: Exception) -> None:  # noqa: B027  (optional hook)
         """Raise what `error`, out of `_advance`, means for this Data, if it means more."""
+
+    @abstractmethod
+    def _derive(self, name: str) -> Array:
+        """A read-only array of `records.DERIVED`; raises while the Data refuses."""
+
+    @abstractmethod
+    def _find_contacts(self) -> Contacts: ...
 
     @abstractmethod
     def _recompute(self) -> None: ...

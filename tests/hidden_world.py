@@ -19,7 +19,7 @@ from statemachine.backends.mujoco_backend import MujocoModel
 from statemachine.checks import check_entries
 from statemachine.errors import DivergedError
 from statemachine.interface import Data, Model
-from statemachine.records import DERIVED, INPUTS, State
+from statemachine.records import DERIVED, INPUTS, Contacts, State
 
 
 class HiddenModel(Model):
@@ -35,7 +35,7 @@ class HiddenModel(Model):
     inner: MujocoModel
 
     def _make_data(self) -> HiddenData:
-        return HiddenData(self)  # pyright: ignore[reportAbstractUsage]
+        return HiddenData(self)
 
     def _replace(self, options: dict[str, Any]) -> HiddenModel:
         return HiddenModel(self.inner._replace(options))
@@ -69,9 +69,12 @@ class HiddenData(Data):
             self._refuse_if_troubled()
         return self._world.time
 
-    def _shown(self, name: str) -> Any:
+    def _derive(self, name: str) -> Any:
         self._refuse_if_troubled()
         return self._derived[name]
+
+    def _find_contacts(self) -> Contacts:
+        return self._derived["contacts"]
 
     def _push(self) -> None:
         for name in INPUTS:
@@ -138,15 +141,6 @@ class HiddenData(Data):
     def _close(self) -> None:
         self._world.close()
         object.__setattr__(self, "_world", None)
-
-
-def _property(name: str) -> Any:
-    return property(lambda self: self._shown(name))
-
-
-for _name in (*DERIVED, "contacts"):
-    setattr(HiddenData, _name, _property(_name))
-HiddenData.__abstractmethods__ = frozenset()
 
 
 def load(path: str | os.PathLike[str], defaults: str = "model") -> HiddenModel:

@@ -15,38 +15,36 @@ import numpy as np
 import pytest
 
 from statemachine import backends, conformance
-from statemachine.backends import mujoco_backend
+from statemachine.backends import _mjcf, mujoco_backend
 from statemachine.backends.mujoco_backend import MujocoData, MujocoModel
 from statemachine.interface import Model
-from statemachine.records import State
+from statemachine.records import DERIVED, State
 
 Patch = Callable[[pytest.MonkeyPatch], None]
 
 
 def replaced(owner: type, name: str) -> Callable[[Callable[..., Any]], Patch]:
-    """A fault that puts another method or property in the place of one."""
+    """A fault that puts another method, or a derived value, in the place of one."""
+    hook = "_derive" if name in DERIVED else "_find_contacts" if name == "contacts" else name
 
     def decorate(function: Callable[..., Any]) -> Patch:
         def apply(monkeypatch: pytest.MonkeyPatch) -> None:
-            old = owner.__dict__[name]
-            if isinstance(old, property):
-                assert old.fget is not None
-                get = old.fget
-                new: Any = property(lambda self: function(self, lambda: get(self)))
-            else:
-                new = _bound(function, old)
-            monkeypatch.setattr(owner, name, new)
+            old = owner.__dict__[hook]
+
+            def method(self: Any, *arguments: Any) -> Any:
+                if hook == "_derive":
+                    return (
+                        function(self, lambda: old(self, name))
+                        if arguments == (name,)
+                        else old(self, *arguments)
+                    )
+                return function(self, lambda *a: old(self, *(a or arguments)), *arguments)
+
+            monkeypatch.setattr(owner, hook, method)
 
         return apply
 
     return decorate
-
-
-def _bound(function: Callable[..., Any], old: Callable[..., Any]) -> Callable[..., Any]:
-    def method(self: Any, *arguments: Any) -> Any:
-        return function(self, lambda *a: old(self, *(a or arguments)), *arguments)
-
-    return method
 
 
 @replaced(MujocoData, "xquat")
@@ -238,7 +236,7 @@ def options_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def replace_in_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mujoco_backend.copy, "copy", lambda raw: raw)
+    monkeypatch.setattr(_mjcf.copy, "copy", lambda raw: raw)
 
 
 def fresh_arrays_each_time(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import BadInputError, ModelError
 from ..records import Array, Keyframe
+
+_DISABLE = mujoco.mjtDisableBit
+SWITCHES = {  # option of `replace` -> the flag that turns it off
+    "actuation": _DISABLE.mjDSBL_ACTUATION,
+    "contacts": _DISABLE.mjDSBL_CONTACT,
+    "limits": _DISABLE.mjDSBL_LIMIT,
+}
+_HINDRANCES = {  # option -> flags of a file that would leave it without effect
+    "gravity": (_DISABLE.mjDSBL_GRAVITY,),
+    "damping": (_DISABLE.mjDSBL_DAMPER,),
+    "frictionloss": (_DISABLE.mjDSBL_FRICTIONLOSS, _DISABLE.mjDSBL_CONSTRAINT),
+    "contacts": (_DISABLE.mjDSBL_CONSTRAINT,),
+    "limits": (_DISABLE.mjDSBL_CONSTRAINT,),
+}
 
 
 def compile_file(path: str | os.PathLike[str]) -> mujoco.MjModel:
@@ -26,6 +41,36 @@ def compile_file(path: str | os.PathLike[str]) -> mujoco.MjModel:
     except (ValueError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split())
         raise ModelError(f"MuJoCo cannot read {text}: {reason}") from error
+
+
+def edited(raw: mujoco.MjModel, options: dict[str, Any]) -> mujoco.MjModel:
+    """A copy with checked options of `Model.replace`; timestep and integrator apart."""
+    raw = copy.copy(raw)
+    for name, value in options.items():
+        for flag in _HINDRANCES.get(name, ()):  # else the option would be without effect
+            raw.opt.disableflags &= ~int(flag)
+        if name in SWITCHES:
+            flag = int(SWITCHES[name])
+            raw.opt.disableflags = (raw.opt.disableflags & ~flag) | (0 if value else flag)
+        elif name == "gravity":
+            raw.opt.gravity[:] = value
+        elif name in ("armature", "damping", "frictionloss"):
+            getattr(raw, f"dof_{name}")[:] = value
+    if "armature" in options:
+        mujoco.mj_setConst(raw, mujoco.MjData(raw))  # inverse weights follow from it
+    return raw
+
+
+def step_length(timestep: float, substeps: int, options: dict[str, Any]) -> float:
+    """What one engine step takes [s] after `replace`.
+
+    Raises:
+        BadInputError: So many substeps leave nothing of a timestep.
+    """
+    whole = options.get("timestep", timestep)
+    if whole / substeps <= 0:
+        raise BadInputError(f"a timestep of {whole} s cannot have {substeps} substeps")
+    return whole / substeps
 
 
 def facts(m: mujoco.MjModel) -> dict[str, Any]:

@@ -6,7 +6,6 @@ its own buffers, seen read-only.
 
 from __future__ import annotations
 
-import copy
 import functools
 import hashlib
 import math
@@ -35,21 +34,9 @@ from ..records import (
     Contacts,
     State,
 )
-from ._mjcf import compile_file, facts
+from ._mjcf import compile_file, edited, facts, step_length
 
 _DISABLE = mujoco.mjtDisableBit
-_SWITCHES = {  # option of `replace` -> the flag that turns it off
-    "actuation": _DISABLE.mjDSBL_ACTUATION,
-    "contacts": _DISABLE.mjDSBL_CONTACT,
-    "limits": _DISABLE.mjDSBL_LIMIT,
-}
-_HINDRANCES = {  # option -> flags of a file that would leave it without effect
-    "gravity": (_DISABLE.mjDSBL_GRAVITY,),
-    "damping": (_DISABLE.mjDSBL_DAMPER,),
-    "frictionloss": (_DISABLE.mjDSBL_FRICTIONLOSS, _DISABLE.mjDSBL_CONSTRAINT),
-    "contacts": (_DISABLE.mjDSBL_CONSTRAINT,),
-    "limits": (_DISABLE.mjDSBL_CONSTRAINT,),
-}
 # Not RK4: after its step the derived values are neither of the state before nor after.
 _INTEGRATORS = {
     "euler": mujoco.mjtIntegrator.mjINT_EULER,
@@ -58,14 +45,14 @@ _INTEGRATORS = {
 }
 _CONSTRAINT = mujoco.mjtConstraint
 _PARTS = {
-    "contact": (
+    "qfrc_contact": (
         _CONSTRAINT.mjCNSTR_CONTACT_FRICTIONLESS,
         _CONSTRAINT.mjCNSTR_CONTACT_PYRAMIDAL,
         _CONSTRAINT.mjCNSTR_CONTACT_ELLIPTIC,
     ),
-    "friction": (_CONSTRAINT.mjCNSTR_FRICTION_DOF, _CONSTRAINT.mjCNSTR_FRICTION_TENDON),
-    "limit": (_CONSTRAINT.mjCNSTR_LIMIT_JOINT, _CONSTRAINT.mjCNSTR_LIMIT_TENDON),
-    "equality": (_CONSTRAINT.mjCNSTR_EQUALITY,),
+    "qfrc_friction": (_CONSTRAINT.mjCNSTR_FRICTION_DOF, _CONSTRAINT.mjCNSTR_FRICTION_TENDON),
+    "qfrc_limit": (_CONSTRAINT.mjCNSTR_LIMIT_JOINT, _CONSTRAINT.mjCNSTR_LIMIT_TENDON),
+    "qfrc_equality": (_CONSTRAINT.mjCNSTR_EQUALITY,),
 }
 # Every single component of the integration state, in the engine's own order.
 _COMPONENTS = {
@@ -190,25 +177,11 @@ class MujocoModel(Model):
         return MujocoData(self)
 
     def _replace(self, options: dict[str, Any]) -> MujocoModel:
-        raw = copy.copy(self.raw)
-        for name, value in options.items():
-            for flag in _HINDRANCES.get(name, ()):  # else the option would be without effect
-                raw.opt.disableflags &= ~int(flag)
-            if name in _SWITCHES:
-                flag = int(_SWITCHES[name])
-                raw.opt.disableflags = (raw.opt.disableflags & ~flag) | (0 if value else flag)
-            elif name == "gravity":
-                raw.opt.gravity[:] = value
-            elif name == "integrator":
-                raw.opt.integrator = int(_INTEGRATORS[value])
-            elif name in ("armature", "damping", "frictionloss"):
-                getattr(raw, f"dof_{name}")[:] = value
+        raw = edited(self.raw, options)
+        if "integrator" in options:
+            raw.opt.integrator = int(_INTEGRATORS[options["integrator"]])
         substeps = options.get("substeps", self.substeps)
-        raw.opt.timestep = options.get("timestep", self.timestep) / substeps
-        if raw.opt.timestep <= 0:
-            raise BadInputError(f"a timestep of {self.timestep} s cannot have {substeps} substeps")
-        if "armature" in options:
-            mujoco.mj_setConst(raw, mujoco.MjData(raw))  # inverse weights follow from it
+        raw.opt.timestep = step_length(self.timestep, substeps, options)
         return MujocoModel(raw, self.path, substeps)
 
 
@@ -234,42 +207,6 @@ class MujocoData(Data):
         super().__init__(model, _transition(model, raw), _ALARMS, inputs)
 
     @property
-    def xpos(self) -> Array:
-        return self._view("xpos")
-
-    @property
-    def xquat(self) -> Array:
-        return self._view("xquat")
-
-    @property
-    def site_xpos(self) -> Array:
-        return self._view("site_xpos")
-
-    @property
-    def site_xmat(self) -> Array:
-        return self._view("site_xmat")
-
-    @property
-    def qacc(self) -> Array:
-        return self._view("qacc")
-
-    @property
-    def qfrc_bias(self) -> Array:
-        return self._view("qfrc_bias")
-
-    @property
-    def qfrc_actuator(self) -> Array:
-        return self._view("qfrc_actuator")
-
-    @property
-    def qfrc_passive(self) -> Array:
-        return self._view("qfrc_passive")
-
-    @property
-    def qfrc_constraint(self) -> Array:
-        return self._view("qfrc_constraint")
-
-    @property
     def raw(self) -> mujoco.MjData:
         if self._raw is None:
             self._refuse_if_troubled()
@@ -279,9 +216,7 @@ class MujocoData(Data):
     def time(self) -> float:
         return self.raw.time
 
-    @property
-    def contacts(self) -> Contacts:
-        self._refuse_if_troubled()
+    def _find_contacts(self) -> Contacts:
         found, count = self.raw.contact, self.raw.ncon
         force = np.zeros((count, 6))
         for i in range(count):
@@ -295,29 +230,13 @@ class MujocoData(Data):
             torque=force[:, 3:],
         )
 
-    @property
-    def qfrc_contact(self) -> Array:
-        return self._constraint_part("contact")
-
-    @property
-    def qfrc_friction(self) -> Array:
-        return self._constraint_part("friction")
-
-    @property
-    def qfrc_limit(self) -> Array:
-        return self._constraint_part("limit")
-
-    @property
-    def qfrc_equality(self) -> Array:
-        return self._constraint_part("equality")
-
-    def _view(self, name: str) -> Array:
+    def _derive(self, name: str) -> Array:
         if self._trouble:
             self._refuse_if_troubled()
-        return self._views[name]
+        view = self._views.get(name)
+        return self._constraint_part(name) if view is None else view
 
     def _constraint_part(self, part: str) -> Array:
-        self._refuse_if_troubled()
         model, data = self._home.raw, self.raw
         total = np.zeros(model.nv)
         if data.nefc:
