@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from types import ModuleType
 
 from .errors import MissingEngineError, unknown_name
+from .silence import silence
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,8 @@ def require(name: str) -> ModuleType:
     if engine is None:
         raise unknown_name("engine", name, ENGINES)
     try:
-        module = importlib.import_module(engine.module)
+        with silence():  # PyBullet prints when it is imported
+            module = importlib.import_module(engine.module)
     except ModuleNotFoundError as error:
         if error.name != engine.module:
             raise _broken(engine, error) from error

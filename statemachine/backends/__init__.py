@@ -31,6 +31,7 @@ class Backend:
 
 _BACKENDS: dict[str, Backend] = {
     "mujoco": Backend("statemachine.backends.mujoco_backend:load", engine="mujoco"),
+    "pybullet": Backend("statemachine.backends.pybullet_backend:load", engine="pybullet"),
 }
 
 

@@ -17,35 +17,41 @@ from xml.sax.saxutils import quoteattr
 import mujoco
 import numpy as np
 
-from ..errors import UnsupportedError
 from ..records import Array, JointType
 from ..rotations import matrix_from_quat
 
 _BOX, _SPHERE = int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_SPHERE)
 _CAPSULE, _CYLINDER = int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER)
-_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+_MESH, _PLANE = int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_PLANE)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Dialect:
     """What the reader of a URDF wants of it.
 
     Attributes:
         capsules: Write <capsule>, which PyBullet reads and the format does not know;
             else a cylinder and two spheres, which are the same solid.
-        looks: Write <visual> elements, with meshes relative to `folder`.
-        upright_root: Write the root's inertia in axes parallel to its frame. PyBullet's
-            inverse dynamics takes gravity in the principal axes of a fixed root, which
-            is gravity in another direction.
-        padding: J [kg m²]; J·(½·1.0001·1 + ½·a·aᵀ) is added to the inertia of every
-            jointed link with joint axis a.
+        looks: Write <visual> elements.
+        folder: Write the names of meshes relative to it; absolute without it.
+        solids: Write <collision> elements.
+        dynamics: Write the ranges, damping and dry friction of the joints. PyBullet keeps
+            a damping that it has read, whatever changeDynamics says later.
+        anchored: Fix the root to a massless link "world", at its place. PyBullet's
+            inverse dynamics takes gravity in the principal axes of a fixed base, which
+            is gravity in another direction unless the base has no mass.
+        padding: (nv,) J of each degree of freedom. The link that a hinge with axis a
+            carries gets J·(½·1.0001·1 + ½·a·aᵀ) [kg m²] more inertia about its centre
+            of mass, the link that a slide carries J [kg] more mass.
     """
 
     capsules: bool = False
     looks: bool = True
     folder: Path | None = None
-    upright_root: bool = False
-    padding: float = 0.0
+    solids: bool = True
+    dynamics: bool = True
+    anchored: bool = False
+    padding: Array | None = None
 
 
 def roots(raw: mujoco.MjModel) -> list[int]:
@@ -54,32 +60,15 @@ def roots(raw: mujoco.MjModel) -> list[int]:
 
 
 def tree(raw: mujoco.MjModel, root: int) -> list[int]:
-    """The bodies of a tree, parents first."""
-    return [b for b in range(1, raw.nbody) if raw.body_rootid[b] == root]
+    """The bodies of a tree, parents first; the world is a tree of its own."""
+    return [b for b in range(raw.nbody) if raw.body_rootid[b] == root]
 
 
-def check(raw: mujoco.MjModel, backend: str) -> None:
-    """Raise UnsupportedError for what URDF cannot say of a robot."""
-
-    def refuse(feature: str, reason: str) -> None:
-        raise UnsupportedError(
-            f"backend {backend!r} does not support {feature!r}: {reason}",
-            backend=backend,
-            feature=feature,
-            reason=reason,
-        )
-
-    for j in range(raw.njnt):
-        name = raw.joint(j).name or f"number {j}"
-        if raw.jnt_type[j] == int(JointType.BALL):
-            refuse("ball joint", f"joint {name} has no counterpart in URDF")
-        if raw.qpos0[raw.jnt_qposadr[j]] and raw.jnt_type[j] != int(JointType.FREE):
-            refuse("joint ref", f"the zero of joint {name} is not that of the file's pose")
-    for b in range(1, raw.nbody):
-        if raw.body_jntnum[b] > 1:
-            refuse("several joints in one body", f"body {raw.body(b).name} has several")
-        if raw.body_mocapid[b] >= 0:
-            refuse("mocap body", f"body {raw.body(b).name} is one")
+def axes(raw: mujoco.MjModel, body: int) -> list[int]:
+    """The joints of a body that URDF writes, its hinges and slides, in order."""
+    start = int(raw.body_jntadr[body])
+    joints = range(start, start + int(raw.body_jntnum[body]))
+    return [j for j in joints if raw.jnt_type[j] in (int(JointType.HINGE), int(JointType.SLIDE))]
 
 
 def write(raw: mujoco.MjModel, root: int, dialect: Dialect = Dialect()) -> str:
@@ -88,20 +77,21 @@ def write(raw: mujoco.MjModel, root: int, dialect: Dialect = Dialect()) -> str:
     Args:
         raw: The compiled model.
         root: The body at the root of the tree; a joint of its own is left out if it
-            is free, and stands between a massless link "world" and it otherwise.
+            is free, and stands between a massless link "world" and it otherwise. 0 for
+            the geoms of the world itself; planes, which URDF does not know, are left out.
         dialect: What the reader wants.
     """
     name = raw.names[: raw.names.index(b"\0")].decode() or "robot"
     lines = ['<?xml version="1.0"?>', f"<robot name={quoteattr(name)}>"]
-    jointed_root = _has_axis(raw, root)
-    if jointed_root:
-        lines.append('  <link name="world"/>')
+    on_world = bool(axes(raw, root)) or dialect.anchored
+    if on_world:
+        lines.append(_bare_link("world", 0.0, np.zeros((3, 3))))
     for body in tree(raw, root):
-        lines += _link(raw, body, dialect, upright=body == root and dialect.upright_root)
-        if body != root or jointed_root:
-            lines += _joint(raw, body, root)
+        lines += _link(raw, body, dialect)
+        if body != root or on_world:
+            lines += _joints(raw, body, root, dialect)
     for site in range(raw.nsite):
-        if raw.body_rootid[raw.site_bodyid[site]] == root and raw.site_bodyid[site]:
+        if raw.body_rootid[raw.site_bodyid[site]] == root and root:
             lines += _tip(raw, site)
     return "\n".join([*lines, "</robot>", ""])
 
@@ -118,45 +108,43 @@ def tip_name(raw: mujoco.MjModel, site: int) -> str:
     return f"{name}_site" if name in taken else name
 
 
-def joint_name(raw: mujoco.MjModel, body: int) -> str:
-    """Name of the joint that carries a body."""
-    if raw.body_jntnum[body]:
-        joint = int(raw.body_jntadr[body])
-        return raw.joint(joint).name or f"joint_{joint}"
-    return f"{link_name(raw, body)}_fixed"
+def joint_name(raw: mujoco.MjModel, joint: int) -> str:
+    """Name of a joint."""
+    return raw.joint(joint).name or f"joint_{joint}"
 
 
 def _anchor(raw: mujoco.MjModel, body: int) -> Array:
-    """Where a body's joint is, in the body's frame: the origin of its link."""
-    return raw.jnt_pos[raw.body_jntadr[body]] if _has_axis(raw, body) else np.zeros(3)
+    """Where a body's last joint is, in the body's frame: the origin of its link."""
+    joints = axes(raw, body)
+    return raw.jnt_pos[joints[-1]] if joints else np.zeros(3)
 
 
-def _has_axis(raw: mujoco.MjModel, body: int) -> bool:
-    """Whether a body has a joint that URDF writes: a hinge or a slide."""
-    return bool(raw.body_jntnum[body]) and raw.jnt_type[raw.body_jntadr[body]] in (
-        int(JointType.HINGE),
-        int(JointType.SLIDE),
-    )
+def _padding(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> tuple[float, Array]:
+    """Mass and inertia (3, 3), in the body's axes, on top of what the joint carries."""
+    if dialect.padding is None:
+        return 0.0, np.zeros((3, 3))
+    size, axis = float(dialect.padding[raw.jnt_dofadr[joint]]), raw.jnt_axis[joint]
+    if raw.jnt_type[joint] == int(JointType.SLIDE):
+        return size, np.zeros((3, 3))
+    return 0.0, size * (0.50005 * np.eye(3) + 0.5 * np.outer(axis, axis))
 
 
-def _link(raw: mujoco.MjModel, body: int, dialect: Dialect, upright: bool) -> Iterator[str]:
-    anchor = _anchor(raw, body)
-    axes = matrix_from_quat(raw.body_iquat[body])
-    inertia = np.diag(raw.body_inertia[body])
-    if dialect.padding and _has_axis(raw, body):
-        axis = axes.T @ raw.jnt_axis[raw.body_jntadr[body]]
-        inertia = inertia + dialect.padding * (0.50005 * np.eye(3) + 0.5 * np.outer(axis, axis))
-    if upright:
-        inertia, axes = axes @ inertia @ axes.T, np.eye(3)
+def _link(raw: mujoco.MjModel, body: int, dialect: Dialect) -> Iterator[str]:
+    anchor, joints = _anchor(raw, body), axes(raw, body)
+    frame = matrix_from_quat(raw.body_iquat[body])
+    mass, inertia = float(raw.body_mass[body]), np.diag(raw.body_inertia[body])
+    if joints:
+        extra, around = _padding(raw, joints[-1], dialect)
+        mass, inertia = mass + extra, inertia + frame.T @ around @ frame
     yield f"  <link name={quoteattr(link_name(raw, body))}>"
     yield "    <inertial>"
-    yield f"      {_origin(raw.body_ipos[body] - anchor, axes)}"
-    yield f'      <mass value="{_number(raw.body_mass[body])}"/>'
+    yield f"      {_origin(raw.body_ipos[body] - anchor, frame)}"
+    yield f'      <mass value="{_number(mass)}"/>'
     yield f"      {_inertia(inertia)}"
     yield "    </inertial>"
     for geom in range(raw.body_geomadr[body], raw.body_geomadr[body] + raw.body_geomnum[body]):
         touches = raw.geom_contype[geom] or raw.geom_conaffinity[geom]
-        if touches or dialect.looks:
+        if dialect.solids if touches else dialect.looks:
             yield from _geom(raw, geom, anchor, "collision" if touches else "visual", dialect)
     yield "  </link>"
 
@@ -190,6 +178,8 @@ def _geom(
         scale = _numbers(raw.mesh_scale[mesh])
         file = quoteattr(_mesh_file(raw, mesh, dialect.folder))
         solids.append((pos, f'<mesh filename={file} scale="{scale}"/>'))
+    elif kind != _PLANE:  # which URDF does not know
+        raise ValueError(f"geom {geom} has no counterpart in URDF")
     name = raw.geom(geom).name
     label = f" name={quoteattr(name)}" if name else ""
     for where, solid in solids:
@@ -205,30 +195,54 @@ def _mesh_file(raw: mujoco.MjModel, mesh: int, folder: Path | None) -> str:
     return os.path.relpath(name, folder) if folder and os.path.isabs(name) else name
 
 
-def _joint(raw: mujoco.MjModel, body: int, root: int) -> Iterator[str]:
-    parent = int(raw.body_parentid[body])
-    parent_name = "world" if body == root else link_name(raw, parent)
-    parent_anchor = np.zeros(3) if body == root else _anchor(raw, parent)
-    mat = matrix_from_quat(raw.body_quat[body])
-    pos = raw.body_pos[body] + mat @ _anchor(raw, body) - parent_anchor
-    kind, extra = "fixed", []
-    if raw.body_jntnum[body]:
-        joint = int(raw.body_jntadr[body])
-        slide, limited = raw.jnt_type[joint] == int(JointType.SLIDE), raw.jnt_limited[joint]
+def _joints(raw: mujoco.MjModel, body: int, root: int, dialect: Dialect) -> Iterator[str]:
+    """The joints between a body and its parent, with massless links between them."""
+    upper = int(raw.body_parentid[body])
+    parent = "world" if body == root else link_name(raw, upper)
+    turn = matrix_from_quat(raw.body_quat[body])
+    place = raw.body_pos[body] - (np.zeros(3) if body == root else _anchor(raw, upper))
+    joints = axes(raw, body)
+    if not joints:
+        name = f"{link_name(raw, body)}_fixed"
+        yield from _joint(name, "fixed", parent, link_name(raw, body), _origin(place, turn), [])
+        return
+    place = place + turn @ raw.jnt_pos[joints[0]]
+    for joint in joints:
+        child = link_name(raw, body)
+        if joint != joints[-1]:
+            child = f"{joint_name(raw, joint)}_link"
+            yield _bare_link(child, *_padding(raw, joint, dialect))
+        slide = raw.jnt_type[joint] == int(JointType.SLIDE)
+        limited = bool(raw.jnt_limited[joint]) and dialect.dynamics
         kind = "prismatic" if slide else "revolute" if limited else "continuous"
-        low, high = raw.jnt_range[joint] if limited else (-1e9, 1e9)
+        # A slide must have a range; PyBullet takes one that is the wrong way round for none.
+        low, high = (
+            raw.jnt_range[joint] if limited else (-1e9, 1e9) if dialect.dynamics else (1, -1)
+        )
         bounds = "" if kind == "continuous" else f'lower="{_number(low)}" upper="{_number(high)}" '
         dof = int(raw.jnt_dofadr[joint])
         damping, friction = raw.dof_damping[dof], raw.dof_frictionloss[dof]
         extra = [
             f'    <axis xyz="{_numbers(raw.jnt_axis[joint])}"/>',
             f'    <limit {bounds}effort="{_number(_effort(raw, joint))}" velocity="100.0"/>',
-            f'    <dynamics damping="{_number(damping)}" friction="{_number(friction)}"/>',
         ]
-    yield f'  <joint name={quoteattr(joint_name(raw, body))} type="{kind}">'
-    yield f"    {_origin(pos, mat)}"
-    yield f"    <parent link={quoteattr(parent_name)}/>"
-    yield f"    <child link={quoteattr(link_name(raw, body))}/>"
+        if dialect.dynamics:
+            numbers = f'damping="{_number(damping)}" friction="{_number(friction)}"'
+            extra.append(f"    <dynamics {numbers}/>")
+        where = _origin(place, turn)
+        yield from _joint(joint_name(raw, joint), kind, parent, child, where, extra)
+        if joint != joints[-1]:
+            parent, turn = child, np.eye(3)
+            place = raw.jnt_pos[joint + 1] - raw.jnt_pos[joint]
+
+
+def _joint(
+    name: str, kind: str, parent: str, child: str, origin: str, extra: list[str]
+) -> Iterator[str]:
+    yield f'  <joint name={quoteattr(name)} type="{kind}">'
+    yield f"    {origin}"
+    yield f"    <parent link={quoteattr(parent)}/>"
+    yield f"    <child link={quoteattr(child)}/>"
     yield from extra
     yield "  </joint>"
 
@@ -246,14 +260,15 @@ def _effort(raw: mujoco.MjModel, joint: int) -> float:
 def _tip(raw: mujoco.MjModel, site: int) -> Iterator[str]:
     body, name = int(raw.site_bodyid[site]), tip_name(raw, site)
     mat = matrix_from_quat(raw.site_quat[site])
-    yield f"  <link name={quoteattr(name)}>"
-    yield f'    <inertial><mass value="0.0"/>{_inertia(np.zeros((3, 3)))}</inertial>'
-    yield "  </link>"
-    yield f'  <joint name={quoteattr(name + "_fixed")} type="fixed">'
-    yield f"    {_origin(raw.site_pos[site] - _anchor(raw, body), mat)}"
-    yield f"    <parent link={quoteattr(link_name(raw, body))}/>"
-    yield f"    <child link={quoteattr(name)}/>"
-    yield "  </joint>"
+    yield _bare_link(name, 0.0, np.zeros((3, 3)))
+    where = _origin(raw.site_pos[site] - _anchor(raw, body), mat)
+    yield from _joint(f"{name}_fixed", "fixed", link_name(raw, body), name, where, [])
+
+
+def _bare_link(name: str, mass: float, inertia: Array) -> str:
+    """A link without geoms, whose centre of mass is its frame."""
+    inside = f'<inertial><mass value="{_number(mass)}"/>{_inertia(inertia)}</inertial>'
+    return f"  <link name={quoteattr(name)}>\n    {inside}\n  </link>"
 
 
 def _inertia(tensor: Array) -> str:

@@ -1,0 +1,453 @@
+"""The state machine of one Data on PyBullet: arrays outside, a hidden world inside.
+
+What is written into the arrays reaches the engine with the next step; what the engine
+does reaches the arrays at its end. Whatever is derived is computed when it is read, from
+copies of the moment that it belongs to.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import mujoco
+import numpy as np
+
+from ..checks import HUGE, check_entries
+from ..errors import BadInputError, DivergedError
+from ..records import DERIVED, POSES, Array, Contacts
+from ..rotations import matrix_from_quat
+from ._bullet_contacts import contacts
+from ._bullet_servo import Arm, Law
+from ._bullet_world import Tree, World, gravity, pb
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """All that what is derived at one moment depends on; whole arrays of the model."""
+
+    qpos: Array
+    qvel: Array
+    ctrl: Array
+    contact: Array
+    friction: Array
+
+
+class Shared:
+    """What the Data of one Model share: the description, and worlds that have no state.
+
+    Attributes:
+        raw: The compiled model.
+        kind: "stepped" for the emulated contract, "engine" for PyBullet as it comes.
+        lock: Held while one of the shared worlds is used.
+    """
+
+    def __init__(self, raw: mujoco.MjModel, kind: Literal["stepped", "engine"]) -> None:
+        self.raw = raw
+        self.kind: Literal["stepped", "engine"] = kind
+        self.lock = threading.RLock()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Shared, (self.raw, self.kind)
+
+    @cached_property
+    def ghost(self) -> World:
+        """The true arm in a client that is never stepped: kinematics and dynamics."""
+        return World(self.raw, "ghost")
+
+    @cached_property
+    def still(self) -> tuple[Array, Array, Array, Array]:
+        """xpos, xquat, site_xpos and site_xmat of what never moves."""
+        data = mujoco.MjData(self.raw)
+        mujoco.mj_kinematics(self.raw, data)
+        return data.xpos, data.xquat, data.site_xpos, data.site_xmat
+
+    def poses(self, qpos: Array) -> dict[str, Array]:
+        """xpos, xquat, site_xpos and site_xmat, by the engine's own forward kinematics.
+
+        Centres of mass and their axes are what PyBullet reports in double precision; a
+        site is the centre of mass of a link of its own.
+        """
+        raw = self.raw
+        xpos, xquat, site_xpos, site_xmat = (array.copy() for array in self.still)
+        with self.lock:
+            ghost = self.ghost
+            for tree in ghost.trees:
+                _pose_links(ghost, tree, qpos, raw, xpos, xquat, site_xpos, site_xmat)
+        for joint in np.flatnonzero(raw.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)):
+            body, start = int(raw.jnt_bodyid[joint]), int(raw.jnt_qposadr[joint])
+            xpos[body] = qpos[start : start + 3]
+            xquat[body] = qpos[start + 3 : start + 7] / np.linalg.norm(qpos[start + 3 : start + 7])
+            turn = matrix_from_quat(xquat[body])
+            for site in np.flatnonzero(raw.site_bodyid == body):
+                site_xpos[site] = xpos[body] + turn @ raw.site_pos[site]
+                site_xmat[site] = (turn @ matrix_from_quat(raw.site_quat[site])).ravel()
+        return dict(zip(POSES, (xpos, xquat, site_xpos, site_xmat), strict=True))
+
+
+def _pose_links(
+    ghost: World,
+    tree: Tree,
+    qpos: Array,
+    raw: mujoco.MjModel,
+    xpos: Array,
+    xquat: Array,
+    site_xpos: Array,
+    site_xmat: Array,
+) -> None:
+    for index, q in zip(tree.joints, qpos[tree.qadr].tolist(), strict=True):
+        pb.resetJointState(tree.body, index, q, physicsClientId=ghost.client)
+    for body, link in tree.links.items():
+        where, (x, y, z, w) = pb.getLinkState(
+            tree.body, link, computeForwardKinematics=1, physicsClientId=ghost.client
+        )[:2]
+        mujoco.mju_negQuat(inverse := np.empty(4), raw.body_iquat[body])
+        mujoco.mju_mulQuat(xquat[body], np.array([w, x, y, z]), inverse)
+        xpos[body] = where - matrix_from_quat(xquat[body]) @ raw.body_ipos[body]
+    for site, link in tree.tips.items():
+        where, (x, y, z, w) = pb.getLinkState(
+            tree.body, link, computeForwardKinematics=1, physicsClientId=ghost.client
+        )[:2]
+        site_xpos[site] = where
+        site_xmat[site] = matrix_from_quat((w, x, y, z)).ravel()
+
+
+class Motors:
+    """One tree of joints as PyBullet's users drive it: POSITION_CONTROL to ctrl."""
+
+    def __init__(self, world: World, tree: Tree, raw: mujoco.MjModel) -> None:
+        self._world, self.tree = world, tree
+        joints = raw.dof_jntid[tree.dofs].tolist()
+        off = raw.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+        driven = [] if off else list(range(raw.nu))
+        pairs = [
+            (joints.index(raw.actuator_trnid[a, 0]), a)
+            for a in driven
+            if raw.actuator_trnid[a, 0] in joints
+        ]
+        self._driven = [tree.joints[place] for place, _ in pairs]
+        self._ids = [a for _, a in pairs]
+
+    def place(self, qpos: Array, qvel: Array, contact: Array, friction: Array) -> None:
+        """Start from a state, whole arrays of the model."""
+        self.q, self.speed = qpos[self.tree.qadr].tolist(), qvel[self.tree.dofs]
+        self.torque = np.zeros(len(self.tree.dofs))
+
+    def read(self) -> None:
+        """Take over what the engine made of the last step."""
+        states = pb.getJointStates(self.tree.body, self.tree.joints, self._world.client)
+        self.q, self.speed = [s[0] for s in states], np.array([s[1] for s in states])
+        self.torque = np.array([s[3] for s in states])
+
+    def forces(self) -> dict[str, Array]:
+        """What the engine tells: its bias, and the torque of its motors in the last step."""
+        return {"qfrc_bias": self._bias, "qfrc_actuator": self.torque}
+
+    def drive(self, ctrl: Array, settled: bool = False) -> None:
+        """Command the motors, as a PyBullet user would; without actuation, nothing is said."""
+        self._bias = np.array(
+            pb.calculateInverseDynamics(
+                self.tree.body,
+                self.q,
+                self.speed.tolist(),
+                [0.0] * len(self.q),
+                physicsClientId=self._world.client,
+            )
+        )
+        if self._driven:
+            pb.setJointMotorControlArray(
+                self.tree.body,
+                self._driven,
+                pb.POSITION_CONTROL,
+                targetPositions=ctrl[self._ids].tolist(),
+                physicsClientId=self._world.client,
+            )
+
+
+class Mirror:
+    """A machine that takes one step from the present of any Data of a Model, for `forward`.
+
+    So forward takes no time, perturbs nothing, and says the same of equal states.
+    """
+
+    def __init__(self, shared: Shared) -> None:
+        self._shared = shared
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Mirror, (self._shared,)
+
+    @cached_property
+    def _machine(self) -> Machine:
+        return Machine(self._shared, None, lambda _: None, lambda _name, _index: "", 1)
+
+    def look(self, moment: Moment) -> dict[str, Any]:
+        """Contacts and forces of a moment."""
+        with self._shared.lock:
+            return self._machine.look(moment)
+
+
+class Machine:
+    """The state of one Data, and the step that advances it.
+
+    Attributes:
+        qpos, qvel, ctrl: The Data's arrays.
+        time: Simulated time [s].
+    """
+
+    def __init__(
+        self,
+        shared: Shared,
+        mirror: Mirror | None,
+        check_qpos: Callable[[Array], None],
+        label: Callable[[str, int], str],
+        substeps: int,
+    ) -> None:
+        raw = shared.raw
+        self._shared, self._mirror = shared, mirror
+        self._check_qpos, self._label = check_qpos, label
+        self._substeps = substeps
+        self._timestep = float(raw.opt.timestep)
+        self.qpos, self.qvel, self.ctrl = raw.qpos0.copy(), np.zeros(raw.nv), np.zeros(raw.nu)
+        self._none = np.zeros(raw.nv)
+        self._open()
+        self.restart(0.0, self.qpos, self.qvel, self.ctrl)
+
+    def _open(self) -> None:
+        raw, shared = self._shared.raw, self._shared
+        self._used = False
+        self.world = world = World(raw, shared.kind)
+        trees = [tree for tree in world.trees if tree.joints]
+        self._free = [tree for tree in world.trees if tree.free]
+        self._arms: list[Any]
+        if shared.kind == "engine":
+            self._arms = [Motors(world, tree, raw) for tree in trees]
+        else:
+            self._arms = [Arm(world, tree, shared.ghost, Law(raw, tree)) for tree in trees]
+
+    def close(self) -> None:
+        """Give the world back."""
+        self.world.close()
+
+    def restart(
+        self,
+        time: float,
+        qpos: Array,
+        qvel: Array,
+        ctrl: Array,
+        contact: Array | None = None,
+        friction: Array | None = None,
+    ) -> None:
+        """Take a state whole; nothing of before has any part in what follows."""
+        if self._used and self._shared.kind == "engine":
+            self.world.close()  # only one that is loaded anew starts alike
+            self._open()
+        self.time, self.qpos[:], self.qvel[:], self.ctrl[:] = time, qpos, qvel, ctrl
+        self._place(contact, friction)
+        self._checked = b""
+        self._moment: Moment | None = None
+        self._lives = False
+        self._derived: dict[str, Any] = {}
+
+    def _place(self, contact: Array | None = None, friction: Array | None = None) -> None:
+        place = self.world.put if self._shared.kind == "engine" else self.world.place
+        place(self.qpos, self.qvel)
+        contact = self._none if contact is None else contact
+        friction = self._none if friction is None else friction
+        for arm in self._arms:
+            arm.place(self.qpos, self.qvel, contact, friction)
+        self._known = self.qpos.tobytes(), self.qvel.tobytes()
+
+    def run(self, nstep: int = 1) -> None:
+        """Advance by `nstep` timesteps; all of it or, if anything is raised, nothing."""
+        steps = nstep * self._substeps
+        if steps >= 2**31:
+            raise BadInputError(f"nstep {nstep} × {self._substeps} substeps is too large")
+        if (now := self.ctrl.tobytes()) != self._checked:
+            check_entries(self.ctrl, "ctrl", self._label)
+            self._checked = now
+        if self._known != (self.qpos.tobytes(), self.qvel.tobytes()):
+            check_entries(self.qpos, "qpos", self._label)
+            check_entries(self.qvel, "qvel", self._label)
+            self._check_qpos(self.qpos)
+            self._place()
+        self._used = True
+        try:
+            time = self._several(steps - 1, self.time)
+            before = self._read() if steps > 1 else (self.qpos.copy(), self.qvel.copy())
+            moment = self._now(*before)
+            time = self._several(1, time)
+            qpos, qvel = self._read()
+            if not (qpos.dot(qpos) < HUGE * HUGE and qvel.dot(qvel) < HUGE * HUGE):
+                self._diverge(time)
+        except BaseException:
+            self._known = b"", b""  # the engine is elsewhere: start from the arrays again
+            self._lives = False
+            raise
+        self.qpos[:], self.qvel[:], self.time = qpos, qvel, time
+        self._known = qpos.tobytes(), qvel.tobytes()
+        self._moment, self._lives, self._derived, self._after = moment, True, {}, qvel
+
+    def _several(self, steps: int, time: float) -> float:
+        """Take engine steps; returns the time after them."""
+        for _ in range(steps):
+            self._once()
+            time += self._timestep
+            for arm in self._arms:
+                arm.read()
+                if not arm.speed.dot(arm.speed) < HUGE * HUGE:
+                    self._diverge(time)
+        return time
+
+    def _once(self, settled: bool = False) -> None:
+        for arm in self._arms:
+            arm.drive(self.ctrl, settled)
+        pb.stepSimulation(self.world.client)
+
+    def _read(self) -> tuple[Array, Array]:
+        """Where the engine is: new arrays qpos and qvel."""
+        qpos, qvel = self.qpos.copy(), self.qvel.copy()
+        for arm in self._arms:
+            qpos[arm.tree.qadr], qvel[arm.tree.dofs] = arm.q, arm.speed
+        for tree in self._free:
+            start, dof = tree.qadr[0], tree.dofs[0]
+            qpos[start : start + 7], qvel[dof : dof + 6] = self.world.read_free(tree.body)
+        return qpos, qvel
+
+    def _diverge(self, time: float) -> None:
+        qpos, qvel = self._read()
+        for name, array in (("qpos", qpos), ("qvel", qvel)):
+            bad = np.flatnonzero(~(np.abs(array) <= HUGE))
+            if len(bad):
+                index = int(bad[0])
+                raise DivergedError(
+                    f"{name}[{index}]{self._label(name, index)} became NaN, infinite or huge at "
+                    f"time {time:g} s. This Data now takes only reset and set_state",
+                    quantity=name,
+                    index=index,
+                    time=time,
+                )
+
+    def _now(self, qpos: Array, qvel: Array) -> Moment:
+        if self._shared.kind == "engine":
+            return Moment(qpos, qvel, self.ctrl.copy(), self._none, self._none)
+        return Moment(qpos, qvel, self.ctrl.copy(), self._all("contact"), self._all("friction"))
+
+    def _all(self, name: str) -> Array:
+        """A quantity of the arms as an array (nv,)."""
+        total = self._none.copy()
+        for arm in self._arms:
+            total[arm.tree.dofs] = getattr(arm, name)
+        return total
+
+    @property
+    def present(self) -> Moment:
+        """All that decides the future but the time."""
+        if self._known == (self.qpos.tobytes(), self.qvel.tobytes()):
+            return self._now(self.qpos.copy(), self.qvel.copy())
+        # Written since: what was observed belongs to another state.
+        return Moment(self.qpos.copy(), self.qvel.copy(), self.ctrl.copy(), self._none, self._none)
+
+    def forward(self) -> None:
+        """Let everything derived belong to the present."""
+        self._moment, self._lives, self._derived = self.present, False, {}
+
+    def derive(self, name: str) -> Any:
+        """An array of `records.DERIVED`, or "contacts"; computed at the first reading."""
+        if name not in self._derived:
+            self._derived |= self._compute(name)
+            for value in self._derived.values():
+                if isinstance(value, np.ndarray):
+                    value.setflags(write=False)
+        return self._derived[name]
+
+    def _compute(self, name: str) -> dict[str, Any]:
+        moment, raw = self._moment, self._shared.raw
+        if moment is None:
+            return _zeros(raw)
+        if name in POSES:
+            return self._shared.poses(moment.qpos)
+        if self._lives:
+            return {"contacts": self._contacts()} if name == "contacts" else self._forces()
+        if self._mirror is None:
+            raise AssertionError("a mirror looks into no mirror")
+        return self._mirror.look(moment)
+
+    def look(self, moment: Moment) -> dict[str, Any]:
+        """What one step from a moment shows, contacts and forces; a mirror's only use."""
+        self.restart(0.0, moment.qpos, moment.qvel, moment.ctrl, moment.contact, moment.friction)
+        self._used = self._lives = True
+        self._moment = moment
+        self._once(settled=True)
+        for arm in self._arms:
+            arm.read()
+        _, self._after = self._read()
+        return {"contacts": self.derive("contacts"), **self._forces()}
+
+    def _contacts(self) -> Contacts:
+        """Of the world's last step, in which it found them before it moved."""
+        return contacts(self._shared.raw, self.world, self.derive("xpos"), self.derive("xquat"))
+
+    def _forces(self) -> dict[str, Array]:
+        """Accelerations and forces of the world's last step."""
+        raw, moment = self._shared.raw, self._moment
+        assert moment is not None  # there was a step
+        names = [name for name in DERIVED if name not in POSES]
+        found = {name: np.zeros(raw.nv) for name in names}
+        for arm in self._arms:
+            for name, values in arm.forces().items():
+                found[name][arm.tree.dofs] = values
+        touched = set(raw.geom_bodyid[self.derive("contacts").geom].ravel().tolist())
+        for tree in self._free:
+            dof = int(tree.dofs[0])
+            own, turn = slice(dof, dof + 6), matrix_from_quat(self.derive("xquat")[tree.root])
+            inertia, bias = _free_dynamics(raw, tree.root, turn, moment.qvel[own])
+            found["qfrc_bias"][own] = bias
+            if tree.root in touched:  # what it did beyond falling, contact did
+                rate = (self._after[own] - moment.qvel[own]) / self._timestep
+                found["qfrc_contact"][own] = inertia @ rate + bias
+            found["qacc"][own] = np.linalg.solve(inertia, found["qfrc_contact"][own] - bias)
+        parts = ("contact", "friction", "limit")
+        found["qfrc_constraint"] = sum((found[f"qfrc_{part}"] for part in parts), self._none)
+        return found
+
+
+def _free_dynamics(raw: mujoco.MjModel, body: int, turn: Array, qvel: Array) -> tuple[Array, Array]:
+    """Mass matrix (6, 6) and bias (6,) of a free body, in MuJoCo's coordinates.
+
+    Newton's and Euler's equations about the centre of mass, whose velocity is J·qvel.
+    """
+    mass, centre = float(raw.body_mass[body]), raw.body_ipos[body]
+    axes = matrix_from_quat(raw.body_iquat[body])
+    inertia: Array = axes @ np.diag(raw.body_inertia[body]) @ axes.T
+    spin = qvel[3:]
+    cross = np.cross(np.eye(3), centre)  # cross @ w = w × centre … of rows
+    jacobian = np.hstack([np.eye(3), turn @ cross.T])
+    total: Array = mass * jacobian.T @ jacobian
+    total[3:, 3:] += inertia
+    whirl = turn @ np.cross(spin, np.cross(spin, centre))
+    bias: Array = jacobian.T @ (mass * (whirl - gravity(raw)))
+    bias[3:] += np.cross(spin, inertia @ spin)
+    return total, bias
+
+
+def _zeros(raw: mujoco.MjModel) -> dict[str, Any]:
+    shapes = {
+        "xpos": (raw.nbody, 3),
+        "xquat": (raw.nbody, 4),
+        "site_xpos": (raw.nsite, 3),
+        "site_xmat": (raw.nsite, 9),
+    }
+    found: dict[str, Any] = {name: np.zeros(shapes.get(name, (raw.nv,))) for name in DERIVED}
+    none = np.zeros(0)
+    found["contacts"] = Contacts(
+        geom=np.zeros((0, 2), dtype=np.int64),
+        dist=none,
+        pos=np.zeros((0, 3)),
+        frame=np.zeros((0, 3, 3)),
+        force=np.zeros((0, 3)),
+        torque=np.zeros((0, 3)),
+    )
+    return found

@@ -1,0 +1,130 @@
+"""What of a compiled MJCF has no counterpart on PyBullet: refused by name, at load."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from ..errors import UnsupportedError
+from ..records import JointType
+from ._bullet_urdf import axes, tree
+
+_FREE, _BALL = int(JointType.FREE), int(JointType.BALL)
+_SOLIDS = [
+    int(kind)
+    for kind in (
+        mujoco.mjtGeom.mjGEOM_BOX,
+        mujoco.mjtGeom.mjGEOM_SPHERE,
+        mujoco.mjtGeom.mjGEOM_CAPSULE,
+        mujoco.mjtGeom.mjGEOM_CYLINDER,
+        mujoco.mjtGeom.mjGEOM_MESH,
+        mujoco.mjtGeom.mjGEOM_PLANE,
+    )
+]
+
+
+def check(raw: mujoco.MjModel, backend: str) -> None:
+    """Raise UnsupportedError, naming all that PyBullet cannot be told of a model."""
+    found = [*_parts(raw), *_joints(raw), *_bodies(raw), *_geoms(raw), *_actuators(raw)]
+    if not found:
+        return
+    feature, reason = found[0]
+    listed = "; ".join(f"{what}: {why}" for what, why in found)
+    raise UnsupportedError(
+        f"backend {backend!r} does not support what this model has: {listed}",
+        backend=backend,
+        feature=feature,
+        reason=reason,
+    )
+
+
+Found = Iterator[tuple[str, str]]
+
+
+def _parts(raw: mujoco.MjModel) -> Found:
+    """Whole kinds of elements, and settings of the model."""
+    for feature, count in (
+        ("equality constraint", raw.neq),
+        ("tendon", raw.ntendon),
+        ("flex", raw.nflex),
+        ("explicit contact pair", raw.npair),
+        ("plugin", raw.nplugin),
+        ("gravity compensation", raw.ngravcomp),
+    ):
+        if count:
+            yield feature, f"the model has {count}"
+    if raw.opt.density or raw.opt.viscosity:
+        yield "fluid", "density or viscosity is not zero"
+
+
+def _joints(raw: mujoco.MjModel) -> Found:
+    for j in range(raw.njnt):
+        name, kind, dof = _name(raw, "joint", j), raw.jnt_type[j], raw.jnt_dofadr[j]
+        if kind == _BALL:
+            yield "ball joint", f"joint {name} has no counterpart in URDF"
+        elif kind == _FREE:
+            own = slice(dof, dof + 6)
+            for what in ("armature", "damping", "frictionloss"):
+                if getattr(raw, f"dof_{what}")[own].any():
+                    yield f"{what} of a free joint", f"joint {name} has it"
+        elif raw.qpos0[raw.jnt_qposadr[j]]:
+            yield "joint ref", f"the zero of joint {name} is not that of the file's pose"
+        for what, values in (
+            ("nonlinear spring", raw.jnt_stiffnesspoly[j]),
+            ("nonlinear damping", raw.dof_dampingpoly[dof]),
+            ("joint actuatorfrcrange", raw.jnt_actfrclimited[j]),
+            ("joint margin", raw.jnt_margin[j] * raw.jnt_limited[j]),
+        ):
+            if np.any(values):
+                yield what, f"joint {name} has it"
+
+
+def _bodies(raw: mujoco.MjModel) -> Found:
+    for b in range(1, raw.nbody):
+        name = _name(raw, "body", b)
+        if raw.body_mocapid[b] >= 0:
+            yield "mocap body", f"body {name} is one"
+        if not raw.body_parentid[b] and raw.body_jntnum[b] and not axes(raw, b):
+            rest = len(tree(raw, b)) - 1
+            if rest:
+                yield "free body of several bodies", f"{name} carries {rest} more"
+
+
+def _geoms(raw: mujoco.MjModel) -> Found:
+    for g in range(raw.ngeom):
+        if not (raw.geom_contype[g] or raw.geom_conaffinity[g]):
+            continue
+        name, kind = _name(raw, "geom", g), int(raw.geom_type[g])
+        if kind not in _SOLIDS:
+            yield "shape of a geom", f"geom {name} is a {mujoco.mjtGeom(kind).name[7:].lower()}"
+        elif kind == _SOLIDS[-1] and raw.geom_bodyid[g]:
+            yield "plane on a body", f"geom {name} is not the world's own"
+        if raw.geom_margin[g]:
+            yield "contact margin", f"geom {name} has one"
+
+
+def _actuators(raw: mujoco.MjModel) -> Found:
+    gain, bias = mujoco.mjtGain, mujoco.mjtBias
+    for a in range(raw.nu):
+        name, joint = _name(raw, "actuator", a), int(raw.actuator_trnid[a, 0])
+        if raw.actuator_trntype[a] != int(mujoco.mjtTrn.mjTRN_JOINT):
+            yield "actuator transmission", f"actuator {name} does not drive a joint"
+        elif raw.jnt_type[joint] in (_FREE, _BALL):
+            yield "actuator of a free joint", f"actuator {name} is one"
+        if (
+            raw.actuator_dyntype[a] != int(mujoco.mjtDyn.mjDYN_NONE)
+            or raw.actuator_history[a].any()
+        ):
+            yield "actuator dynamics", f"actuator {name} has a state of its own"
+        affine = raw.actuator_biastype[a] in (int(bias.mjBIAS_NONE), int(bias.mjBIAS_AFFINE))
+        if raw.actuator_gaintype[a] != int(gain.mjGAIN_FIXED) or not affine:
+            yield "actuator gain", f"that of actuator {name} is not constant"
+        if raw.actuator_armature[a] or raw.actuator_damping[a] or raw.actuator_dampingpoly[a].any():
+            yield "actuator armature or damping", f"actuator {name} has it: give it to the joint"
+
+
+def _name(raw: mujoco.MjModel, kind: str, number: int) -> Any:
+    return getattr(raw, kind)(number).name or f"number {number}"

@@ -1,0 +1,344 @@
+"""MuJoCo's servo, armature, friction and limits on an engine that has none of them.
+
+PyBullet knows no armature, and a servo law in plain torque diverges on a light arm.
+So the law is solved here, implicitly, for the true arm; the engine's own arm is made to
+follow, and what contacts do to it is observed and put into the next solution.
+
+Let M, c be mass matrix and bias of the true arm (the "ghost"), A its armature, D its
+damping, K its springs, h the timestep, w the force of its actuators with slope -kv in
+velocity. Each step solves
+
+    (M + A + h·(D + kv)) · a = w - K·(q - q₀) - D·v - c + f + l + e
+
+for the acceleration a, where f is dry friction, l the force of the joint limits (both
+soft, as in MuJoCo's manual, chapter Computation, section Constraint model) and e the
+generalised force of contacts. The engine then gets the torque that gives its arm this
+acceleration without contacts, less e. Its arm has a share of the armature as inertia of
+its links, so that contact acts on about the true inertia. What that arm did beyond the
+torque it got, by inverse dynamics, is the e of the next step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from ..records import Array
+from ._bullet_world import Tree, World, pb
+
+_OFF = mujoco.mjtDisableBit
+_SWEEPS, _SETTLED = 200, 1e-13  # at most so many sweeps, until no force moves more [N·m]
+
+
+@dataclass(slots=True)
+class Solution:
+    """What one step was driven with; arrays (n,) in the order of the tree's joints."""
+
+    qpos: list[float]
+    qvel: list[float]
+    speed: Array
+    bias: Array
+    mass: Array
+    actuator: Array
+    passive: Array
+    friction: Array
+    limit: Array
+    torque: Array
+
+
+class Law:
+    """The constants of one tree of joints, and the solution of a step."""
+
+    def __init__(self, raw: mujoco.MjModel, tree: Tree) -> None:
+        off = {name: bool(raw.opt.disableflags & int(bit)) for name, bit in _FLAGS.items()}
+        dofs = tree.dofs
+        joints = raw.dof_jntid[dofs]
+        self.timestep = h = float(raw.opt.timestep)
+        self.armature = raw.dof_armature[dofs]
+        self.damping = raw.dof_damping[dofs] * (not off["damper"])
+        self.stiffness = raw.jnt_stiffness[joints] * (not off["spring"])
+        self.rest = raw.qpos_spring[tree.qadr]
+        self._constant = np.diag(self.armature + h * self.damping)
+        self._zeros = [0.0] * len(dofs)
+        self._take_actuators(raw, joints, off)
+
+        rub = not (off["friction"] or off["constraint"])
+        self._frictionloss = raw.dof_frictionloss[dofs] * rub
+        weight = raw.dof_invweight0[dofs]
+        floor = 0.0 if off["refsafe"] else 2 * h
+        solref, solimp = raw.dof_solref[dofs], raw.dof_solimp[dofs]
+        self._rub_b, _ = _spring(solref, solimp, floor)
+        self._rub_r = _softness(_impedance(solimp, np.zeros(len(dofs))), weight)
+
+        limited = raw.jnt_limited[joints].astype(bool) & (not (off["limit"] or off["constraint"]))
+        self._low = np.where(limited, raw.jnt_range[joints, 0], -np.inf)
+        self._high = np.where(limited, raw.jnt_range[joints, 1], np.inf)
+        self._solimp, self._weight = raw.jnt_solimp[joints], weight
+        self._stop_b, self._stop_k = _spring(raw.jnt_solref[joints], self._solimp, floor)
+
+    def _take_actuators(self, raw: mujoco.MjModel, joints: Any, off: Mapping[str, bool]) -> None:
+        """Force = clip(gain·clip(ctrl) + b₀ + b₁·length + b₂·speed); length = gear·q."""
+        driven = np.isin(raw.actuator_trnid[:, 0], joints) & (not off["actuation"])
+        for a in range(raw.nu):  # the groups that the model's file turns off
+            if raw.opt.disableactuator >> int(raw.actuator_group[a]) & 1:
+                driven[a] = False
+        self.ids = ids = np.flatnonzero(driven)
+        self._gear = np.zeros((len(joints), len(ids)))
+        for column, a in enumerate(ids):
+            row = int(np.flatnonzero(joints == raw.actuator_trnid[a, 0])[0])
+            self._gear[row, column] = raw.actuator_gear[a, 0]
+        affine = raw.actuator_biastype[ids] == int(mujoco.mjtBias.mjBIAS_AFFINE)
+        bias = raw.actuator_biasprm[ids, :3] * affine[:, None]
+        self._gain = raw.actuator_gainprm[ids, 0]
+        self._offset = bias[:, 0]
+        self._by_q, self._by_v = (bias[:, k, None] * self._gear.T for k in (1, 2))
+        self._slope = -(self._gear**2) * bias[:, 2]
+        clamped = raw.actuator_ctrllimited[ids].astype(bool) & (not off["clamp"])
+        self._ctrl_low, self._ctrl_high = _range(raw.actuator_ctrlrange[ids], clamped)
+        limited = raw.actuator_forcelimited[ids].astype(bool)
+        self._low_force, self._high_force = _range(raw.actuator_forcerange[ids], limited)
+
+    def solve(
+        self,
+        ghost: tuple[int, int],
+        q: list[float],
+        v: list[float],
+        speed: Array,
+        ctrl: Array,
+        contact: Array,
+        friction: Array,
+        settled: bool = False,
+    ) -> tuple[Solution, Array]:
+        """The forces of a step and the acceleration (n,) that they give.
+
+        Args:
+            ghost: PyBullet's body and client of the true arm.
+            q: Positions.
+            v: Velocities.
+            speed: They as an array.
+            ctrl: (nu,) commands of the whole model.
+            contact: (n,) observed in the last step.
+            friction: (n,) of the last step.
+            settled: Do not rely on the last step's friction.
+        """
+        body, client = ghost
+        place = np.array(q)
+        mass = np.array(pb.calculateMassMatrix(body, q, physicsClientId=client))
+        bias = np.array(
+            pb.calculateInverseDynamics(body, q, v, self._zeros, physicsClientId=client)
+        )
+        goal = np.minimum(np.maximum(ctrl[self.ids], self._ctrl_low), self._ctrl_high)
+        wanted = self._gain * goal + self._offset + self._by_q @ place + self._by_v @ speed
+        force = np.minimum(np.maximum(wanted, self._low_force), self._high_force)
+        actuator = self._gear @ force
+        passive = -self.damping * speed - self.stiffness * (place - self.rest)
+        slope = self.timestep * (self._slope @ (force == wanted))
+        inverse = np.linalg.inv(mass + self._constant + np.diag(slope))
+        smooth = inverse @ (actuator + passive - bias + contact)
+        weight = inverse.diagonal()
+        limit = self._zeros
+        gap = np.minimum(place - self._low, self._high - place)
+        if settled or gap.min(initial=0.0) < 0:
+            friction, limit, acceleration = self._sweep(
+                inverse, smooth, speed, friction, place, gap
+            )
+        else:
+            acceleration = smooth + inverse @ friction
+            rest = acceleration + self._rub_b * speed + self._rub_r * friction
+            moved = friction - rest / (weight + self._rub_r)
+            moved = np.minimum(np.maximum(moved, -self._frictionloss), self._frictionloss)
+            acceleration = smooth + inverse @ moved
+            friction = moved
+        solution = Solution(
+            q, v, speed, bias, mass, actuator, passive, friction, np.array(limit), acceleration
+        )
+        return solution, acceleration
+
+    def _sweep(
+        self,
+        inverse: Array,
+        smooth: Array,
+        speed: Array,
+        friction: Array,
+        place: Array,
+        gap: Array,
+    ) -> tuple[Array, Array, Array]:
+        """Friction, limit force and acceleration, by projected Gauss-Seidel."""
+        side = np.where(place - self._low < self._high - place, 1.0, -1.0)
+        strength = _impedance(self._solimp, gap)
+        stop_r = _softness(strength, self._weight)
+        aim = -self._stop_b * side * speed - self._stop_k * strength * gap
+        rows = [  # (joint, sign, R, reference, smallest force, largest force)
+            *zip(
+                range(len(speed)),
+                np.ones(len(speed)),
+                self._rub_r.tolist(),
+                (-self._rub_b * speed).tolist(),
+                (-self._frictionloss).tolist(),
+                self._frictionloss.tolist(),
+                strict=True,
+            ),
+            *(
+                (i, side[i], stop_r[i], aim[i], 0.0, np.inf)
+                for i in np.flatnonzero(gap < 0).tolist()
+            ),
+        ]
+        forces = [*friction.tolist(), *[0.0] * (len(rows) - len(speed))]
+        acceleration = (smooth + inverse @ friction).tolist()
+        columns = inverse.T.tolist()
+        for _ in range(_SWEEPS):
+            change = 0.0
+            for k, (i, sign, soft, goal, least, most) in enumerate(rows):
+                rest = sign * acceleration[i] + soft * forces[k] - goal
+                new = min(max(forces[k] - rest / (columns[i][i] + soft), least), most)
+                moved = new - forces[k]
+                forces[k] = new
+                if moved:
+                    change = max(change, abs(moved))
+                    acceleration = [
+                        a + sign * moved * c for a, c in zip(acceleration, columns[i], strict=True)
+                    ]
+            if change < _SETTLED:
+                break
+        limit = np.zeros(len(speed))
+        for (i, sign, *_), force in zip(rows[len(speed) :], forces[len(speed) :], strict=True):
+            limit[i] = sign * force
+        return np.array(forces[: len(speed)]), limit, np.array(acceleration)
+
+
+class Arm:
+    """One tree of joints in a stepped world, driven by its law.
+
+    Attributes:
+        q, v: Positions and velocities, as the engine has them; `speed` is v as an array.
+        last: What the last step was driven with.
+    """
+
+    def __init__(self, world: World, tree: Tree, ghost: World, law: Law) -> None:
+        twin = next(other for other in ghost.trees if other.root == tree.root)
+        self._ghost = (twin.body, ghost.client)
+        self._client, self._body = world.client, tree.body
+        self.tree, self.law = tree, law
+        self.last: Solution | None = None
+        self._contact: Array | None = np.zeros(len(tree.dofs))
+        self._friction = self._contact
+
+    def place(self, qpos: Array, qvel: Array, contact: Array, friction: Array) -> None:
+        """Start from a state, whole arrays of the model."""
+        self.q, self.v = qpos[self.tree.qadr].tolist(), qvel[self.tree.dofs].tolist()
+        self.speed = qvel[self.tree.dofs]
+        self._contact, self._friction = contact[self.tree.dofs], friction[self.tree.dofs]
+        self.last = None
+
+    def read(self) -> None:
+        """Take over what the engine made of the last step."""
+        states = pb.getJointStates(self._body, self.tree.joints, self._client)
+        self.q, self.v = [s[0] for s in states], [s[1] for s in states]
+        self.speed = np.array(self.v)
+        self._contact = None
+
+    @property
+    def contact(self) -> Array:
+        """(n,) the generalised force of contacts during the last step [N·m or N]."""
+        if self._contact is None:
+            last = self.last
+            assert last is not None  # it was read after a step
+            rate = ((self.speed - last.speed) / self.law.timestep).tolist()
+            needed = pb.calculateInverseDynamics(
+                self._body, last.qpos, last.qvel, rate, physicsClientId=self._client
+            )
+            self._contact = np.array(needed) - last.torque
+        return self._contact
+
+    @property
+    def friction(self) -> Array:
+        """(n,) the dry friction of the last step [N·m or N]."""
+        return self._friction
+
+    def forces(self) -> dict[str, Array]:
+        """Accelerations and forces of the last step, by their names in the contract."""
+        last, contact = self.last, self.contact
+        assert last is not None  # it was read after a step
+        total = last.actuator + last.passive + last.friction + last.limit + contact
+        inertia = last.mass + np.diag(self.law.armature)
+        acceleration: Array = np.linalg.inv(inertia) @ (total - last.bias)
+        return {
+            "qacc": acceleration,
+            "qfrc_bias": last.bias,
+            "qfrc_actuator": last.actuator,
+            "qfrc_passive": last.passive,
+            "qfrc_friction": last.friction,
+            "qfrc_limit": last.limit,
+            "qfrc_contact": contact,
+        }
+
+    def drive(self, ctrl: Array, settled: bool = False) -> None:
+        """Give the engine the torque of the next step."""
+        contact = self.contact
+        self.last, acceleration = self.law.solve(
+            self._ghost, self.q, self.v, self.speed, ctrl, contact, self._friction, settled
+        )
+        self._friction = self.last.friction
+        needed = pb.calculateInverseDynamics(
+            self._body, self.q, self.v, acceleration.tolist(), physicsClientId=self._client
+        )
+        self.last.torque = torque = np.array(needed) - contact
+        pb.setJointMotorControlArray(
+            self._body,
+            self.tree.joints,
+            pb.TORQUE_CONTROL,
+            forces=torque.tolist(),
+            physicsClientId=self._client,
+        )
+
+
+_FLAGS = {
+    "damper": _OFF.mjDSBL_DAMPER,
+    "spring": _OFF.mjDSBL_SPRING,
+    "friction": _OFF.mjDSBL_FRICTIONLOSS,
+    "limit": _OFF.mjDSBL_LIMIT,
+    "constraint": _OFF.mjDSBL_CONSTRAINT,
+    "actuation": _OFF.mjDSBL_ACTUATION,
+    "clamp": _OFF.mjDSBL_CLAMPCTRL,
+    "refsafe": _OFF.mjDSBL_REFSAFE,
+}
+
+
+def _range(ranges: Array, limited: Any) -> tuple[Array, Array]:
+    low, high = np.where(limited[:, None], ranges, [-np.inf, np.inf]).T
+    return low, high
+
+
+def _impedance(solimp: Array, distance: Array) -> Array:
+    """d(r) of rows of solimp (n, 5) [MuJoCo's manual, chapter Modeling, Solver parameters]."""
+    low, high, width, middle, power = np.clip(
+        solimp.T,
+        [[1e-4], [1e-4], [1e-15], [1e-4], [1.0]],
+        [[0.9999], [0.9999], [9e9], [0.9999], [9e9]],
+    )
+    x = np.minimum(np.abs(distance) / width, 1.0)
+    rising = x**power / middle ** (power - 1)
+    falling = 1 - (1 - x) ** power / (1 - middle) ** (power - 1)
+    return low + np.where(x <= middle, rising, falling) * (high - low)
+
+
+def _softness(impedance: Array, inverse_weight: Array) -> Array:
+    """R, by which a constraint yields to its own force."""
+    return np.maximum((1 - impedance) / impedance * inverse_weight, 1e-15)
+
+
+def _spring(solref: Array, solimp: Array, shortest: float) -> tuple[Array, Array]:
+    """Damping b and stiffness k of the reference acceleration, of solref (n, 2)."""
+    time, ratio = solref.T
+    most = np.clip(solimp[:, 1], 1e-4, 0.9999)
+    given = time <= 0  # then they are stiffness and damping, negated
+    time = np.where(given, 1.0, np.maximum(time, shortest))
+    damping = np.where(given, -ratio / most, 2 / (most * time))
+    stiffness = np.where(
+        given, -solref[:, 0] / most**2, 1 / (most * time * np.where(given, 1, ratio)) ** 2
+    )
+    return damping, stiffness

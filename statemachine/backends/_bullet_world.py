@@ -1,0 +1,400 @@
+"""One hidden world of PyBullet: a DIRECT client, and the bodies of a model in it.
+
+The engine's conventions end here: quaternions (x, y, z, w), poses and velocities of a
+body's inertial frame, joints by the index of their link.
+"""
+
+from __future__ import annotations
+
+import gc
+import math
+import os
+import tempfile
+import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Literal
+
+import mujoco
+import numpy as np
+
+from ..engines import require
+from ..errors import EngineError, ModelError
+from ..records import Array
+from ..rotations import matrix_from_quat, xyzw_from_wxyz
+from ..silence import silence
+from . import _bullet_urdf as urdf
+
+pb: Any = require("pybullet")
+
+_PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
+_AWAY = 1000.0  # [m] between bodies that a reset has set apart
+_TILT = 5e-4  # half the angle [rad] by which it tilts a free body to find its contacts
+_REST = math.sqrt(1 - 2 * _TILT**2)
+FREE_JOINT = int(mujoco.mjtJoint.mjJNT_FREE)
+# What hinges get of their armature as inertia of the stepped arm; see _bullet_servo.
+_SHARE = 3 / 28
+
+
+class Tree:
+    """One tree of bodies in one world.
+
+    Attributes:
+        root: MuJoCo's id of its root.
+        body: PyBullet's id of it.
+        free: Whether it floats; its joint is then the root's free joint.
+        joints: PyBullet's indices of its joints, in order of their degrees of freedom.
+        qadr, dofs: Where each joint is in qpos and in qvel; of a free one, the first.
+        links: PyBullet's index of each body's link; -1 is the base.
+        tips: PyBullet's index of each site's link.
+    """
+
+    def __init__(self, raw: mujoco.MjModel, root: int, body: int, client: int) -> None:
+        self.root, self.body = root, body
+        self.free = _floats(raw, root)
+        infos = [pb.getJointInfo(body, i, client) for i in range(pb.getNumJoints(body, client))]
+        indices = {info[12].decode(): info[0] for info in infos}
+        bodies = urdf.tree(raw, root)
+        self.links = {b: indices.get(urdf.link_name(raw, b), -1) for b in bodies}
+        sites = [
+            s for s in range(raw.nsite) if root and raw.body_rootid[raw.site_bodyid[s]] == root
+        ]
+        self.tips = {s: indices[urdf.tip_name(raw, s)] for s in sites}
+        by_name = {urdf.joint_name(raw, j): j for b in bodies for j in urdf.axes(raw, b)}
+        moving = [(info[0], by_name[info[1].decode()]) for info in infos if info[3] >= 0]
+        ids = [joint for _, joint in moving] or [int(raw.body_jntadr[root])] * self.free
+        self.joints = [index for index, _ in moving]
+        self.qadr, self.dofs = raw.jnt_qposadr[ids].astype(int), raw.jnt_dofadr[ids].astype(int)
+
+
+class World:
+    """A client of PyBullet's and what is in it.
+
+    Attributes:
+        client: What PyBullet's functions want as `physicsClientId`.
+        trees: The trees of the model, the world's own geoms first.
+    """
+
+    def __init__(self, raw: mujoco.MjModel, kind: Literal["stepped", "ghost", "engine"]) -> None:
+        """Make a world.
+
+        Args:
+            raw: The compiled model; its gravity and timestep are taken too.
+            kind: "stepped" for the emulated contract; "ghost" for the true inertias of
+                what has joints, never to be stepped; "engine" for PyBullet as it comes.
+
+        Raises:
+            EngineError: The process has no room for another client.
+            ModelError: PyBullet cannot read what was written for it.
+        """
+        self._raw = raw
+        self.client = _connect()
+        self._end = weakref.finalize(self, _disconnect, self.client)
+        pb.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self.client)
+        pb.setGravity(*gravity(raw).tolist(), self.client)
+        self.trees: list[Tree] = []
+        self._planes: dict[int, int] = {}  # PyBullet's body of each plane of the world
+        for root in (0, *urdf.roots(raw)):
+            jointed = any(urdf.axes(raw, b) for b in urdf.tree(raw, root))
+            if jointed or kind != "ghost":
+                self._load(root, kind)
+        if kind == "ghost":
+            return
+        if kind == "stepped":
+            pb.setPhysicsEngineParameter(
+                deterministicOverlappingPairs=1, physicsClientId=self.client
+            )
+            pb.setTimeStep(raw.opt.timestep, self.client)
+        elif raw.opt.timestep != ENGINE_TIMESTEP:
+            pb.setTimeStep(raw.opt.timestep, self.client)
+        self._add_planes()
+        if kind == "stepped":
+            self._take_friction()
+            self._filter()
+        self._homes = [
+            (body, pb.getBasePositionAndOrientation(body, self.client))
+            for body in (*(tree.body for tree in self.trees), *self._planes.values())
+        ]
+        self._frames = {  # of free bodies: the inertial frame in the body's own
+            tree.body: pb.getDynamicsInfo(tree.body, -1, self.client)[3:5]
+            for tree in self.trees
+            if tree.free
+        }
+
+    def close(self) -> None:
+        """Give the client back."""
+        self._end()
+
+    def _load(self, root: int, kind: str) -> None:
+        raw = self._raw
+        text = described(raw, root, kind)
+        if not root and "<collision" not in text:
+            return
+        free = _floats(raw, root)
+        flags = pb.URDF_USE_INERTIA_FROM_FILE | pb.URDF_USE_SELF_COLLISION
+        with _as_file(text) as name, silence() as said:
+            try:
+                body = pb.loadURDF(
+                    name,
+                    useFixedBase=not free,
+                    flags=0 if kind == "engine" else flags,
+                    physicsClientId=self.client,
+                )
+            except pb.error as error:
+                body = -1
+                said.append(str(error))
+        if body < 0:
+            raise ModelError(f"PyBullet cannot read the URDF of this model: {'; '.join(said)}")
+        tree = Tree(raw, root, body, self.client)
+        self.trees.append(tree)
+        if kind == "engine":
+            return
+        for link in range(-1, pb.getNumJoints(body, self.client)):
+            pb.changeDynamics(
+                body,
+                link,
+                linearDamping=0,
+                angularDamping=0,
+                maxJointVelocity=_FAST,
+                physicsClientId=self.client,
+            )
+        for index in tree.joints:  # each comes with a motor that holds it
+            pb.setJointMotorControl2(
+                body, index, pb.VELOCITY_CONTROL, force=0, physicsClientId=self.client
+            )
+
+    def _add_planes(self) -> None:
+        raw = self._raw
+        if raw.opt.disableflags & _NO_CONTACT:
+            return
+        for geom in self._touching(0):
+            if raw.geom_type[geom] == _PLANE:
+                shape = pb.createCollisionShape(pb.GEOM_PLANE, physicsClientId=self.client)
+                self._planes[geom] = pb.createMultiBody(
+                    0,
+                    shape,
+                    basePosition=raw.geom_pos[geom].tolist(),
+                    baseOrientation=xyzw_from_wxyz(raw.geom_quat[geom]).tolist(),
+                    physicsClientId=self.client,
+                )
+
+    def _touching(self, body: int) -> list[int]:
+        """Geoms of a body that can touch something."""
+        raw, start = self._raw, int(self._raw.body_geomadr[body])
+        geoms = range(start, start + int(raw.body_geomnum[body]))
+        return [g for g in geoms if raw.geom_contype[g] or raw.geom_conaffinity[g]]
+
+    def solids(self) -> Iterator[tuple[int, int, int, list[int]]]:
+        """(PyBullet's body and link, MuJoCo's body and geoms) of all that can touch."""
+        for geom, body in self._planes.items():
+            yield body, -1, 0, [geom]
+        for tree in self.trees:
+            for b, link in tree.links.items():
+                geoms = [g for g in self._touching(b) if self._raw.geom_type[g] != _PLANE]
+                if geoms:
+                    yield tree.body, link, b, geoms
+
+    def _take_friction(self) -> None:
+        """Friction of links; PyBullet multiplies those of a pair, MuJoCo takes the larger."""
+        raw = self._raw
+        for body, link, _, geoms in self.solids():
+            slide, spin, roll = raw.geom_friction[geoms].T
+            condim = raw.geom_condim[geoms]
+            pb.changeDynamics(
+                body,
+                link,
+                lateralFriction=float(np.sqrt((slide * (condim > 1)).max())),
+                spinningFriction=float((spin * (condim > 3)).max()),
+                rollingFriction=float((roll * (condim > 4)).max()),
+                physicsClientId=self.client,
+            )
+
+    def _filter(self) -> None:
+        """Let touch what MuJoCo lets touch."""
+        solids = list(self.solids())
+        for i, (body_a, link_a, b_a, geoms_a) in enumerate(solids):
+            for body_b, link_b, b_b, geoms_b in solids[i + 1 :]:
+                pair = (body_a, body_b, link_a, link_b)
+                touch = self._meet(b_a, b_b) and self._match(geoms_a, geoms_b)
+                pb.setCollisionFilterPair(*pair, int(touch), physicsClientId=self.client)
+
+    def _match(self, geoms_a: list[int], geoms_b: list[int]) -> bool:
+        raw = self._raw
+        return any(
+            raw.geom_contype[a] & raw.geom_conaffinity[b]
+            or raw.geom_contype[b] & raw.geom_conaffinity[a]
+            for a in geoms_a
+            for b in geoms_b
+        )
+
+    def _meet(self, a: int, b: int) -> bool:
+        """MuJoCo's rules for bodies: not within one rigid piece, nor parent and child."""
+        raw = self._raw
+        one, two = int(raw.body_weldid[a]), int(raw.body_weldid[b])
+        if one == two or ((min(a, b) << 16) + max(a, b)) in raw.exclude_signature:
+            return False
+        if raw.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT):
+            return True
+        up_one, up_two = (int(raw.body_weldid[raw.body_parentid[x]]) for x in (one, two))
+        return not ((up_one == two and two) or (up_two == one and one))
+
+    def place(self, qpos: Array, qvel: Array) -> None:
+        """Set the state so that what follows depends on nothing that was before.
+
+        PyBullet remembers contacts and which boxes overlap. Everything is taken far
+        apart and brought back, which leaves it nothing to remember. It finds one point
+        of a contact at a time, and would let a box at rest start on one corner: free
+        bodies are tilted a little each way, so that it finds all of them.
+        """
+        for i, (body, (_, quat)) in enumerate(self._homes, start=1):
+            pb.resetBasePositionAndOrientation(body, (0, 0, _AWAY * i), quat, self.client)
+        pb.performCollisionDetection(self.client)
+        for body, (pos, quat) in self._homes:
+            if body not in self._frames:
+                pb.resetBasePositionAndOrientation(body, pos, quat, self.client)
+        self.put(qpos, qvel)
+        if not self._frames:
+            return
+        poses = {body: pb.getBasePositionAndOrientation(body, self.client) for body in self._frames}
+        for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1)):
+            for body, (pos, quat) in poses.items():
+                tilted = _times((x * _TILT, y * _TILT, 0.0, _REST), quat)
+                pb.resetBasePositionAndOrientation(body, pos, tilted, self.client)
+            pb.performCollisionDetection(self.client)
+        for tree in self.trees:
+            if tree.free:
+                self._put_free(tree, qpos, qvel)
+
+    def put(self, qpos: Array, qvel: Array) -> None:
+        """Set the state, and nothing else."""
+        for tree in self.trees:
+            if tree.free:
+                self._put_free(tree, qpos, qvel)
+                continue
+            for index, q, v in zip(
+                tree.joints, qpos[tree.qadr].tolist(), qvel[tree.dofs].tolist(), strict=True
+            ):
+                pb.resetJointState(tree.body, index, q, v, physicsClientId=self.client)
+
+    def _put_free(self, tree: Tree, qpos: Array, qvel: Array) -> None:
+        body, start, dof = tree.body, int(tree.qadr[0]), int(tree.dofs[0])
+        qpos, qvel = qpos[start : start + 7], qvel[dof : dof + 6]
+        centre, axes = self._frames[body]
+        quat = qpos[3:] / np.linalg.norm(qpos[3:])
+        turn = matrix_from_quat(quat)
+        arm, spin = turn @ centre, turn @ qvel[3:]
+        pose = _times(xyzw_from_wxyz(quat).tolist(), axes)
+        where, speed = qpos[:3] + arm, qvel[:3] + np.cross(spin, arm)
+        pb.resetBasePositionAndOrientation(body, where.tolist(), pose, self.client)
+        pb.resetBaseVelocity(body, speed.tolist(), spin.tolist(), self.client)
+
+    def read_free(self, body: int) -> tuple[list[float], list[float]]:
+        """Qpos (7,) and qvel (6,) of a free body, in MuJoCo's conventions."""
+        centre, (ax, ay, az, aw) = self._frames[body]
+        (px, py, pz), pose = pb.getBasePositionAndOrientation(body, self.client)
+        (vx, vy, vz), (wx, wy, wz) = pb.getBaseVelocity(body, self.client)
+        quat = x, y, z, w = _times(pose, (-ax, -ay, -az, aw))
+        # r: from the body's origin to its centre of mass, in world axes.
+        rx, ry, rz = _turned(quat, centre)
+        inverse = (-x, -y, -z, w)
+        return (
+            [px - rx, py - ry, pz - rz, w, x, y, z],
+            [
+                vx - (wy * rz - wz * ry),
+                vy - (wz * rx - wx * rz),
+                vz - (wx * ry - wy * rx),
+                *_turned(inverse, (wx, wy, wz)),
+            ],
+        )
+
+    def contact_points(self) -> list[Any]:
+        """PyBullet's contact points of the last collision detection."""
+        return pb.getContactPoints(physicsClientId=self.client)
+
+
+ENGINE_TIMESTEP = 1 / 240
+_FAST = 1e9  # [rad/s] PyBullet clamps joint speeds at 100 unless told otherwise
+_NO_CONTACT = int(mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+
+
+def described(raw: mujoco.MjModel, root: int, kind: str) -> str:
+    """URDF of a tree of bodies as a world of that kind reads it."""
+    dialect = urdf.Dialect(
+        capsules=True,
+        looks=False,
+        solids=kind != "ghost" and not raw.opt.disableflags & _NO_CONTACT,
+        dynamics=kind == "engine",
+        anchored=bool(root) and not _floats(raw, root),
+        padding=_SHARE * raw.dof_armature if kind == "stepped" else None,
+    )
+    return urdf.write(raw, root, dialect)
+
+
+def _floats(raw: mujoco.MjModel, root: int) -> bool:
+    return bool(raw.body_jntnum[root]) and not urdf.axes(raw, root)
+
+
+def gravity(raw: mujoco.MjModel) -> Array:
+    """Gravity (3,) [m/s²], zero where the model's file turns it off."""
+    off = raw.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+    return np.zeros(3) if off else np.array(raw.opt.gravity)
+
+
+def _connect() -> int:
+    client = pb.connect(pb.DIRECT)
+    if client < 0:
+        gc.collect()  # Data that nobody closed may hold the places
+        client = pb.connect(pb.DIRECT)
+    if client < 0:
+        raise EngineError("PyBullet holds 1024 worlds in one process at most: close some Data")
+    return client
+
+
+def _disconnect(client: int) -> None:
+    try:
+        pb.disconnect(client)
+    except (pb.error, TypeError):  # the user has, or the module is gone at exit
+        return
+
+
+@contextmanager
+def _as_file(text: str) -> Iterator[str]:
+    """A name under which PyBullet can read a text; nothing is left when the process dies."""
+    if hasattr(os, "memfd_create"):
+        with open(os.memfd_create("urdf"), "wb") as file:
+            file.write(text.encode())
+            file.flush()
+            yield f"/proc/self/fd/{file.fileno()}"
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model.urdf"
+        path.write_text(text)
+        yield str(path)
+
+
+Quat = tuple[float, float, float, float]
+
+
+def _times(a: Any, b: Any) -> Quat:
+    """Product of two quaternions, (x, y, z, w)."""
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
+def _turned(quat: Any, vector: Any) -> tuple[float, float, float]:
+    """A vector turned by a unit quaternion (x, y, z, w)."""
+    x, y, z, w = quat
+    vx, vy, vz = vector
+    tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
+    return (
+        vx + w * tx + y * tz - z * ty,
+        vy + w * ty + z * tx - x * tz,
+        vz + w * tz + x * ty - y * tx,
+    )
