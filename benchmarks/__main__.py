@@ -102,6 +102,49 @@ def kinematics(name: str, rounds: int) -> list[Ratio]:
     )
 
 
+def emulation(name: str, rounds: int) -> list[Ratio]:
+    """A step of the emulated arm on PyBullet against the engine's own idiom in that world.
+
+    Both hold the same pose. Nothing derived is read, and then poses and contacts are.
+    """
+    import pybullet
+
+    model = sm.load(name, backend="pybullet")
+    target = [0.0, -0.3, 0.6, 0.3, 0.0, 0.6]
+    ours, read, theirs = (sm.make_data(model) for _ in range(3))
+    for data in (ours, read, theirs):
+        data.ctrl[:] = target
+        sm.step(model, data, 400)
+    world = theirs.raw
+    (arm,) = (tree for tree in world.trees if tree.joints)
+
+    def engine() -> None:
+        for _ in range(STEPS // 10):
+            pybullet.setJointMotorControlArray(
+                arm.body,
+                arm.joints,
+                pybullet.POSITION_CONTROL,
+                targetPositions=target,
+                physicsClientId=world.client,
+            )
+            pybullet.stepSimulation(world.client)
+
+    def emulated() -> None:
+        for _ in range(STEPS // 10):
+            sm.step(model, ours)
+
+    def reading() -> None:
+        for _ in range(STEPS // 10):
+            sm.step(model, read)
+            _ = read.site_xpos
+
+    return interleaved(
+        engine,
+        {f"PyBullet, {name}": emulated, f"PyBullet, site_xpos read, {name}": reading},
+        rounds,
+    )
+
+
 # What DESIGN asks of each: at most this, measured on a quiet machine.
 BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None]] = [
     (step, "so101", 1.02),
@@ -109,6 +152,8 @@ BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None]] = [
     (bulk, "so101", 1.005),
     (control_loop, "so101", 1.0),
     (kinematics, "so101", 0.8),
+    (emulation, "so101/scene", 1.8),
+    (emulation, "so101/scene_box", 1.8),
 ]
 
 

@@ -22,6 +22,19 @@ def xyzw_from_wxyz(quat: ArrayLike) -> Array:
     return np.roll(np.asarray(quat, dtype=np.float64), -1, axis=-1)
 
 
+def times(a: ArrayLike, b: ArrayLike) -> Array:
+    """Products (..., 4) of quaternions (..., 4), wxyz: first `b`, then `a`."""
+    aw, ax, ay, az = np.moveaxis(np.asarray(a, dtype=np.float64), -1, 0)
+    bw, bx, by, bz = np.moveaxis(np.asarray(b, dtype=np.float64), -1, 0)
+    parts = (
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+    )
+    return np.stack(parts, axis=-1)
+
+
 def matrix_from_quat(quat: ArrayLike) -> Array:
     """Rotation matrices (..., 3, 3) of unit quaternions (..., 4), wxyz."""
     w, x, y, z = np.moveaxis(np.asarray(quat, dtype=np.float64), -1, 0)

@@ -19,21 +19,28 @@ import numpy as np
 from ..checks import HUGE, check_entries
 from ..errors import BadInputError, DivergedError
 from ..records import DERIVED, POSES, Array, Contacts
-from ..rotations import matrix_from_quat
+from ..rotations import matrix_from_quat, times, wxyz_from_xyzw
 from ._bullet_contacts import contacts
 from ._bullet_servo import Arm, Law
 from ._bullet_world import Tree, World, gravity, pb
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Moment:
-    """All that what is derived at one moment depends on; whole arrays of the model."""
+    """All that what is derived at one moment depends on.
+
+    Attributes:
+        qpos, qvel, ctrl: Whole arrays of the model.
+        observed: What each arm knows of the step before: contact (n,) and friction (n,).
+    """
 
     qpos: Array
     qvel: Array
     ctrl: Array
-    contact: Array
-    friction: Array
+    observed: Observed
+
+
+Observed = list[tuple[Array, Array]]
 
 
 class Shared:
@@ -49,6 +56,7 @@ class Shared:
         self.raw = raw
         self.kind: Literal["stepped", "engine"] = kind
         self.lock = threading.RLock()
+        self._still_joints = np.zeros(raw.nv)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Shared, (self.raw, self.kind)
@@ -73,14 +81,25 @@ class Shared:
         """
         raw = self.raw
         xpos, xquat, site_xpos, site_xmat = (array.copy() for array in self.still)
-        with self.lock:
-            ghost = self.ghost
-            for tree in ghost.trees:
-                _pose_links(ghost, tree, qpos, raw, xpos, xquat, site_xpos, site_xmat)
+        for tree in self.ghost.trees:
+            bodies, sites = list(tree.links), list(tree.tips)
+            with self.lock:
+                self.ghost.put(qpos, self._still_joints)
+                states = self.ghost.link_states(tree)
+            where, turned = (np.array(part) for part in zip(*states, strict=True))
+            turned = wxyz_from_xyzw(turned)
+            n = len(bodies)
+            xquat[bodies] = times(turned[:n], raw.body_iquat[bodies] * _INVERSE)
+            turns = matrix_from_quat(xquat[bodies])
+            xpos[bodies] = where[:n] - np.einsum("bij,bj->bi", turns, raw.body_ipos[bodies])
+            site_xpos[sites], site_xmat[sites] = (
+                where[n:],
+                matrix_from_quat(turned[n:]).reshape(-1, 9),
+            )
         for joint in np.flatnonzero(raw.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)):
             body, start = int(raw.jnt_bodyid[joint]), int(raw.jnt_qposadr[joint])
-            xpos[body] = qpos[start : start + 3]
-            xquat[body] = qpos[start + 3 : start + 7] / np.linalg.norm(qpos[start + 3 : start + 7])
+            quat = qpos[start + 3 : start + 7]
+            xpos[body], xquat[body] = qpos[start : start + 3], quat / np.linalg.norm(quat)
             turn = matrix_from_quat(xquat[body])
             for site in np.flatnonzero(raw.site_bodyid == body):
                 site_xpos[site] = xpos[body] + turn @ raw.site_pos[site]
@@ -88,31 +107,8 @@ class Shared:
         return dict(zip(POSES, (xpos, xquat, site_xpos, site_xmat), strict=True))
 
 
-def _pose_links(
-    ghost: World,
-    tree: Tree,
-    qpos: Array,
-    raw: mujoco.MjModel,
-    xpos: Array,
-    xquat: Array,
-    site_xpos: Array,
-    site_xmat: Array,
-) -> None:
-    for index, q in zip(tree.joints, qpos[tree.qadr].tolist(), strict=True):
-        pb.resetJointState(tree.body, index, q, physicsClientId=ghost.client)
-    for body, link in tree.links.items():
-        where, (x, y, z, w) = pb.getLinkState(
-            tree.body, link, computeForwardKinematics=1, physicsClientId=ghost.client
-        )[:2]
-        mujoco.mju_negQuat(inverse := np.empty(4), raw.body_iquat[body])
-        mujoco.mju_mulQuat(xquat[body], np.array([w, x, y, z]), inverse)
-        xpos[body] = where - matrix_from_quat(xquat[body]) @ raw.body_ipos[body]
-    for site, link in tree.tips.items():
-        where, (x, y, z, w) = pb.getLinkState(
-            tree.body, link, computeForwardKinematics=1, physicsClientId=ghost.client
-        )[:2]
-        site_xpos[site] = where
-        site_xmat[site] = matrix_from_quat((w, x, y, z)).ravel()
+_MANY = HUGE * HUGE
+_INVERSE = np.array([1.0, -1.0, -1.0, -1.0])  # of a unit quaternion
 
 
 class Motors:
@@ -128,32 +124,35 @@ class Motors:
             for a in driven
             if raw.actuator_trnid[a, 0] in joints
         ]
+        self.contact = self.friction = self.nothing = np.zeros(len(tree.dofs))
         self._driven = [tree.joints[place] for place, _ in pairs]
         self._ids = [a for _, a in pairs]
 
-    def place(self, qpos: Array, qvel: Array, contact: Array, friction: Array) -> None:
-        """Start from a state, whole arrays of the model."""
-        self.q, self.speed = qpos[self.tree.qadr].tolist(), qvel[self.tree.dofs]
-        self.torque = np.zeros(len(self.tree.dofs))
+    def place(self, qpos: Array, qvel: Array, *_: Array) -> None:
+        """Start from a state."""
+        self.angles, self.speed = qpos[self.tree.qpos], qvel[self.tree.qvel]
 
     def read(self) -> None:
         """Take over what the engine made of the last step."""
         states = pb.getJointStates(self.tree.body, self.tree.joints, self._world.client)
-        self.q, self.speed = [s[0] for s in states], np.array([s[1] for s in states])
-        self.torque = np.array([s[3] for s in states])
+        self.angles, self.speed, self.torque = np.array([(s[0], s[1], s[3]) for s in states]).T
 
     def forces(self) -> dict[str, Array]:
         """What the engine tells: its bias, and the torque of its motors in the last step."""
         return {"qfrc_bias": self._bias, "qfrc_actuator": self.torque}
 
-    def drive(self, ctrl: Array, settled: bool = False) -> None:
+    def command(self, ctrl: Array) -> None:
+        """Take a new command (nu,) of the whole model."""
+        self._targets = ctrl[self._ids].tolist()
+
+    def drive(self, settled: bool = False) -> None:
         """Command the motors, as a PyBullet user would; without actuation, nothing is said."""
         self._bias = np.array(
             pb.calculateInverseDynamics(
                 self.tree.body,
-                self.q,
+                self.angles.tolist(),
                 self.speed.tolist(),
-                [0.0] * len(self.q),
+                self.nothing.tolist(),
                 physicsClientId=self._world.client,
             )
         )
@@ -162,7 +161,7 @@ class Motors:
                 self.tree.body,
                 self._driven,
                 pb.POSITION_CONTROL,
-                targetPositions=ctrl[self._ids].tolist(),
+                targetPositions=self._targets,
                 physicsClientId=self._world.client,
             )
 
@@ -211,7 +210,6 @@ class Machine:
         self._substeps = substeps
         self._timestep = float(raw.opt.timestep)
         self.qpos, self.qvel, self.ctrl = raw.qpos0.copy(), np.zeros(raw.nv), np.zeros(raw.nu)
-        self._none = np.zeros(raw.nv)
         self._open()
         self.restart(0.0, self.qpos, self.qvel, self.ctrl)
 
@@ -226,6 +224,7 @@ class Machine:
             self._arms = [Motors(world, tree, raw) for tree in trees]
         else:
             self._arms = [Arm(world, tree, shared.ghost, Law(raw, tree)) for tree in trees]
+        self._unobserved = [(arm.nothing, arm.nothing) for arm in self._arms]
 
     def close(self) -> None:
         """Give the world back."""
@@ -237,37 +236,42 @@ class Machine:
         qpos: Array,
         qvel: Array,
         ctrl: Array,
-        contact: Array | None = None,
-        friction: Array | None = None,
+        observed: Observed | None = None,
     ) -> None:
         """Take a state whole; nothing of before has any part in what follows."""
         if self._used and self._shared.kind == "engine":
             self.world.close()  # only one that is loaded anew starts alike
             self._open()
         self.time, self.qpos[:], self.qvel[:], self.ctrl[:] = time, qpos, qvel, ctrl
-        self._place(contact, friction)
-        self._checked = b""
+        self._place(observed)
+        self._heed()
         self._moment: Moment | None = None
         self._lives = False
         self._derived: dict[str, Any] = {}
 
-    def _place(self, contact: Array | None = None, friction: Array | None = None) -> None:
+    def _place(self, observed: Observed | None = None) -> None:
         place = self.world.put if self._shared.kind == "engine" else self.world.place
         place(self.qpos, self.qvel)
-        contact = self._none if contact is None else contact
-        friction = self._none if friction is None else friction
-        for arm in self._arms:
-            arm.place(self.qpos, self.qvel, contact, friction)
+        for arm, known in zip(self._arms, observed or self._unobserved, strict=True):
+            arm.place(self.qpos, self.qvel, *known)
+        self._last_qpos, self._last_qvel = self.qpos.copy(), self.qvel.copy()
         self._known = self.qpos.tobytes(), self.qvel.tobytes()
+
+    def _heed(self) -> None:
+        """Take the command as it is now."""
+        self._ctrl = self.ctrl.copy()
+        self._commanded = self.ctrl.tobytes()
+        for arm in self._arms:
+            arm.command(self._ctrl)
 
     def run(self, nstep: int = 1) -> None:
         """Advance by `nstep` timesteps; all of it or, if anything is raised, nothing."""
         steps = nstep * self._substeps
         if steps >= 2**31:
             raise BadInputError(f"nstep {nstep} × {self._substeps} substeps is too large")
-        if (now := self.ctrl.tobytes()) != self._checked:
+        if self.ctrl.tobytes() != self._commanded:
             check_entries(self.ctrl, "ctrl", self._label)
-            self._checked = now
+            self._heed()
         if self._known != (self.qpos.tobytes(), self.qvel.tobytes()):
             check_entries(self.qpos, "qpos", self._label)
             check_entries(self.qvel, "qvel", self._label)
@@ -276,19 +280,20 @@ class Machine:
         self._used = True
         try:
             time = self._several(steps - 1, self.time)
-            before = self._read() if steps > 1 else (self.qpos.copy(), self.qvel.copy())
-            moment = self._now(*before)
+            before = self._read() if steps > 1 else (self._last_qpos, self._last_qvel)
+            moment = Moment(*before, self._ctrl, self._observed)
             time = self._several(1, time)
             qpos, qvel = self._read()
-            if not (qpos.dot(qpos) < HUGE * HUGE and qvel.dot(qvel) < HUGE * HUGE):
+            if self._free and not (qpos.dot(qpos) < _MANY and qvel.dot(qvel) < _MANY):
                 self._diverge(time)
         except BaseException:
             self._known = b"", b""  # the engine is elsewhere: start from the arrays again
             self._lives = False
             raise
         self.qpos[:], self.qvel[:], self.time = qpos, qvel, time
+        self._last_qpos, self._last_qvel = qpos, qvel
         self._known = qpos.tobytes(), qvel.tobytes()
-        self._moment, self._lives, self._derived, self._after = moment, True, {}, qvel
+        self._moment, self._lives, self._derived = moment, True, {}
 
     def _several(self, steps: int, time: float) -> float:
         """Take engine steps; returns the time after them."""
@@ -297,23 +302,22 @@ class Machine:
             time += self._timestep
             for arm in self._arms:
                 arm.read()
-                if not arm.speed.dot(arm.speed) < HUGE * HUGE:
+                if not arm.angles.dot(arm.angles) + arm.speed.dot(arm.speed) < _MANY:
                     self._diverge(time)
         return time
 
     def _once(self, settled: bool = False) -> None:
         for arm in self._arms:
-            arm.drive(self.ctrl, settled)
+            arm.drive(settled)
         pb.stepSimulation(self.world.client)
 
     def _read(self) -> tuple[Array, Array]:
         """Where the engine is: new arrays qpos and qvel."""
         qpos, qvel = self.qpos.copy(), self.qvel.copy()
         for arm in self._arms:
-            qpos[arm.tree.qadr], qvel[arm.tree.dofs] = arm.q, arm.speed
+            qpos[arm.tree.qpos], qvel[arm.tree.qvel] = arm.angles, arm.speed
         for tree in self._free:
-            start, dof = tree.qadr[0], tree.dofs[0]
-            qpos[start : start + 7], qvel[dof : dof + 6] = self.world.read_free(tree.body)
+            qpos[tree.qpos], qvel[tree.qvel] = self.world.read_free(tree.body)
         return qpos, qvel
 
     def _diverge(self, time: float) -> None:
@@ -330,25 +334,18 @@ class Machine:
                     time=time,
                 )
 
-    def _now(self, qpos: Array, qvel: Array) -> Moment:
-        if self._shared.kind == "engine":
-            return Moment(qpos, qvel, self.ctrl.copy(), self._none, self._none)
-        return Moment(qpos, qvel, self.ctrl.copy(), self._all("contact"), self._all("friction"))
-
-    def _all(self, name: str) -> Array:
-        """A quantity of the arms as an array (nv,)."""
-        total = self._none.copy()
-        for arm in self._arms:
-            total[arm.tree.dofs] = getattr(arm, name)
-        return total
+    @property
+    def _observed(self) -> Observed:
+        return [(arm.contact, arm.friction) for arm in self._arms]
 
     @property
     def present(self) -> Moment:
         """All that decides the future but the time."""
         if self._known == (self.qpos.tobytes(), self.qvel.tobytes()):
-            return self._now(self.qpos.copy(), self.qvel.copy())
-        # Written since: what was observed belongs to another state.
-        return Moment(self.qpos.copy(), self.qvel.copy(), self.ctrl.copy(), self._none, self._none)
+            observed = self._observed
+        else:  # what was observed belongs to another state
+            observed = self._unobserved
+        return Moment(self.qpos.copy(), self.qvel.copy(), self.ctrl.copy(), observed)
 
     def forward(self) -> None:
         """Let everything derived belong to the present."""
@@ -375,15 +372,26 @@ class Machine:
             raise AssertionError("a mirror looks into no mirror")
         return self._mirror.look(moment)
 
+    def gathered(self, observed: Observed) -> tuple[Array, Array]:
+        """Contact and friction of the arms as arrays (nv,)."""
+        contact, friction = np.zeros(len(self.qvel)), np.zeros(len(self.qvel))
+        for arm, known in zip(self._arms, observed, strict=True):
+            contact[arm.tree.dofs], friction[arm.tree.dofs] = known
+        return contact, friction
+
+    def parted(self, contact: Array, friction: Array) -> Observed:
+        """The other way round."""
+        return [(contact[arm.tree.dofs], friction[arm.tree.dofs]) for arm in self._arms]
+
     def look(self, moment: Moment) -> dict[str, Any]:
         """What one step from a moment shows, contacts and forces; a mirror's only use."""
-        self.restart(0.0, moment.qpos, moment.qvel, moment.ctrl, moment.contact, moment.friction)
+        self.restart(0.0, moment.qpos, moment.qvel, moment.ctrl, moment.observed)
         self._used = self._lives = True
         self._moment = moment
         self._once(settled=True)
         for arm in self._arms:
             arm.read()
-        _, self._after = self._read()
+        _, self._last_qvel = self._read()
         return {"contacts": self.derive("contacts"), **self._forces()}
 
     def _contacts(self) -> Contacts:
@@ -401,16 +409,16 @@ class Machine:
                 found[name][arm.tree.dofs] = values
         touched = set(raw.geom_bodyid[self.derive("contacts").geom].ravel().tolist())
         for tree in self._free:
-            dof = int(tree.dofs[0])
-            own, turn = slice(dof, dof + 6), matrix_from_quat(self.derive("xquat")[tree.root])
+            own, turn = tree.qvel, matrix_from_quat(self.derive("xquat")[tree.root])
             inertia, bias = _free_dynamics(raw, tree.root, turn, moment.qvel[own])
             found["qfrc_bias"][own] = bias
             if tree.root in touched:  # what it did beyond falling, contact did
-                rate = (self._after[own] - moment.qvel[own]) / self._timestep
+                rate = (self._last_qvel[own] - moment.qvel[own]) / self._timestep
                 found["qfrc_contact"][own] = inertia @ rate + bias
             found["qacc"][own] = np.linalg.solve(inertia, found["qfrc_contact"][own] - bias)
         parts = ("contact", "friction", "limit")
-        found["qfrc_constraint"] = sum((found[f"qfrc_{part}"] for part in parts), self._none)
+        for part in parts:
+            found["qfrc_constraint"] += found[f"qfrc_{part}"]
         return found
 
 
@@ -421,14 +429,15 @@ def _free_dynamics(raw: mujoco.MjModel, body: int, turn: Array, qvel: Array) -> 
     """
     mass, centre = float(raw.body_mass[body]), raw.body_ipos[body]
     axes = matrix_from_quat(raw.body_iquat[body])
-    inertia: Array = axes @ np.diag(raw.body_inertia[body]) @ axes.T
+    inertia = np.einsum("ij,j,kj->ik", axes, raw.body_inertia[body], axes)
     spin = qvel[3:]
     cross = np.cross(np.eye(3), centre)  # cross @ w = w × centre … of rows
-    jacobian = np.hstack([np.eye(3), turn @ cross.T])
-    total: Array = mass * jacobian.T @ jacobian
+    jacobian = np.zeros((3, 6))
+    jacobian[:, :3], jacobian[:, 3:] = np.eye(3), turn @ cross.T
+    total = mass * (jacobian.T @ jacobian)
     total[3:, 3:] += inertia
     whirl = turn @ np.cross(spin, np.cross(spin, centre))
-    bias: Array = jacobian.T @ (mass * (whirl - gravity(raw)))
+    bias = jacobian.T @ (mass * (whirl - gravity(raw)))
     bias[3:] += np.cross(spin, inertia @ spin)
     return total, bias
 

@@ -20,7 +20,7 @@ torque it got, by inverse dynamics, is the e of the next step.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,8 +38,8 @@ _SWEEPS, _SETTLED = 200, 1e-13  # at most so many sweeps, until no force moves m
 class Solution:
     """What one step was driven with; arrays (n,) in the order of the tree's joints."""
 
-    qpos: list[float]
-    qvel: list[float]
+    qpos: Sequence[float]
+    qvel: Sequence[float]
     speed: Array
     bias: Array
     mass: Array
@@ -59,28 +59,34 @@ class Law:
         joints = raw.dof_jntid[dofs]
         self.timestep = h = float(raw.opt.timestep)
         self.armature = raw.dof_armature[dofs]
-        self.damping = raw.dof_damping[dofs] * (not off["damper"])
-        self.stiffness = raw.jnt_stiffness[joints] * (not off["spring"])
-        self.rest = raw.qpos_spring[tree.qadr]
-        self._constant = np.diag(self.armature + h * self.damping)
-        self._zeros = [0.0] * len(dofs)
-        self._take_actuators(raw, joints, off)
+        damping = raw.dof_damping[dofs] * (not off["damper"])
+        stiffness = raw.jnt_stiffness[joints] * (not off["spring"])
+        rest = stiffness * raw.qpos_spring[tree.qpos]
+        # Linear in x, which is positions, velocities and 1.
+        passive = np.column_stack([-np.diag(stiffness), -np.diag(damping), rest])
+        self._inertia = np.diag(self.armature + h * damping)
+        self._zeros, self._nothing = [0.0] * len(dofs), np.zeros(len(dofs))
+        feedback = self._take_actuators(raw, joints, off)
 
         rub = not (off["friction"] or off["constraint"])
         self._frictionloss = raw.dof_frictionloss[dofs] * rub
+        self._least_rub = -self._frictionloss
         weight = raw.dof_invweight0[dofs]
         floor = 0.0 if off["refsafe"] else 2 * h
         solref, solimp = raw.dof_solref[dofs], raw.dof_solimp[dofs]
         self._rub_b, _ = _spring(solref, solimp, floor)
+        damped = np.zeros(passive.shape)
+        damped[:, len(dofs) : -1] = np.diag(self._rub_b)
+        self._linear = np.vstack([passive, damped, feedback])
         self._rub_r = _softness(_impedance(solimp, np.zeros(len(dofs))), weight)
 
         limited = raw.jnt_limited[joints].astype(bool) & (not (off["limit"] or off["constraint"]))
-        self._low = np.where(limited, raw.jnt_range[joints, 0], -np.inf)
-        self._high = np.where(limited, raw.jnt_range[joints, 1], np.inf)
+        self._low, self._high = _range(raw.jnt_range[joints], limited)
+        self._ranges = list(zip(self._low.tolist(), self._high.tolist(), strict=True))
         self._solimp, self._weight = raw.jnt_solimp[joints], weight
         self._stop_b, self._stop_k = _spring(raw.jnt_solref[joints], self._solimp, floor)
 
-    def _take_actuators(self, raw: mujoco.MjModel, joints: Any, off: Mapping[str, bool]) -> None:
+    def _take_actuators(self, raw: mujoco.MjModel, joints: Any, off: Mapping[str, bool]) -> Array:
         """Force = clip(gain·clip(ctrl) + b₀ + b₁·length + b₂·speed); length = gear·q."""
         driven = np.isin(raw.actuator_trnid[:, 0], joints) & (not off["actuation"])
         for a in range(raw.nu):  # the groups that the model's file turns off
@@ -94,21 +100,28 @@ class Law:
         affine = raw.actuator_biastype[ids] == int(mujoco.mjtBias.mjBIAS_AFFINE)
         bias = raw.actuator_biasprm[ids, :3] * affine[:, None]
         self._gain = raw.actuator_gainprm[ids, 0]
-        self._offset = bias[:, 0]
-        self._by_q, self._by_v = (bias[:, k, None] * self._gear.T for k in (1, 2))
-        self._slope = -(self._gear**2) * bias[:, 2]
+        feedback = [bias[:, k, None] * self._gear.T for k in (1, 2)]
+        self._slope = -self.timestep * self._gear**2 * bias[:, 2]
+        self._unsaturated = self._inertia + np.diag(self._slope.sum(axis=1))
         clamped = raw.actuator_ctrllimited[ids].astype(bool) & (not off["clamp"])
         self._ctrl_low, self._ctrl_high = _range(raw.actuator_ctrlrange[ids], clamped)
         limited = raw.actuator_forcelimited[ids].astype(bool)
         self._low_force, self._high_force = _range(raw.actuator_forcerange[ids], limited)
+        self._straight = np.array_equal(self._gear, np.eye(len(joints)))
+        return np.column_stack([*feedback, bias[:, 0]])
+
+    def aim(self, ctrl: Array) -> Array:
+        """What a command (nu,) of the whole model adds to the force of each actuator."""
+        goal = np.minimum(np.maximum(ctrl[self.ids], self._ctrl_low), self._ctrl_high)
+        return self._gain * goal
 
     def solve(
         self,
         ghost: tuple[int, int],
-        q: list[float],
-        v: list[float],
-        speed: Array,
-        ctrl: Array,
+        q: Sequence[float],
+        v: Sequence[float],
+        x: Array,
+        aim: Array,
         contact: Array,
         friction: Array,
         settled: bool = False,
@@ -119,55 +132,50 @@ class Law:
             ghost: PyBullet's body and client of the true arm.
             q: Positions.
             v: Velocities.
-            speed: They as an array.
-            ctrl: (nu,) commands of the whole model.
+            x: Both in one array (2·n + 1,), and a one.
+            aim: Of the command.
             contact: (n,) observed in the last step.
             friction: (n,) of the last step.
             settled: Do not rely on the last step's friction.
         """
         body, client = ghost
-        place = np.array(q)
-        mass = np.array(pb.calculateMassMatrix(body, q, physicsClientId=client))
-        bias = np.array(
-            pb.calculateInverseDynamics(body, q, v, self._zeros, physicsClientId=client)
-        )
-        goal = np.minimum(np.maximum(ctrl[self.ids], self._ctrl_low), self._ctrl_high)
-        wanted = self._gain * goal + self._offset + self._by_q @ place + self._by_v @ speed
+        mass = np.array(pb.calculateMassMatrix(body, q, 0, client))
+        bias = np.array(pb.calculateInverseDynamics(body, q, v, self._zeros, 0, client))
+        n = len(q)
+        speed = x[n:-1]
+        linear = self._linear @ x
+        passive, damped, wanted = linear[:n], linear[n : 2 * n], linear[2 * n :] + aim
         force = np.minimum(np.maximum(wanted, self._low_force), self._high_force)
-        actuator = self._gear @ force
-        passive = -self.damping * speed - self.stiffness * (place - self.rest)
-        slope = self.timestep * (self._slope @ (force == wanted))
-        inverse = np.linalg.inv(mass + self._constant + np.diag(slope))
-        smooth = inverse @ (actuator + passive - bias + contact)
-        weight = inverse.diagonal()
-        limit = self._zeros
-        gap = np.minimum(place - self._low, self._high - place)
-        if settled or gap.min(initial=0.0) < 0:
-            friction, limit, acceleration = self._sweep(
-                inverse, smooth, speed, friction, place, gap
-            )
+        actuator = force if self._straight else self._gear @ force
+        inertia = self._unsaturated
+        if force.tobytes() != wanted.tobytes():
+            inertia = self._inertia + np.diag(self._slope @ (force == wanted))
+        inverse = np.linalg.inv(mass + inertia)
+        others = actuator + passive - bias + contact
+        limit = self._nothing
+        for place, (low, high) in zip(q, self._ranges, strict=True):
+            if not low <= place <= high:
+                settled = True
+        if settled:
+            friction, limit, acceleration = self._sweep(inverse, others, x, friction)
         else:
-            acceleration = smooth + inverse @ friction
-            rest = acceleration + self._rub_b * speed + self._rub_r * friction
-            moved = friction - rest / (weight + self._rub_r)
-            moved = np.minimum(np.maximum(moved, -self._frictionloss), self._frictionloss)
-            acceleration = smooth + inverse @ moved
-            friction = moved
-        solution = Solution(
-            q, v, speed, bias, mass, actuator, passive, friction, np.array(limit), acceleration
+            # One sweep from the last step's friction, of all joints at once.
+            acceleration = inverse @ (others + friction)
+            rest = acceleration + damped + self._rub_r * friction
+            moved = friction - rest / (inverse.diagonal() + self._rub_r)
+            friction = np.minimum(np.maximum(moved, self._least_rub), self._frictionloss)
+            acceleration = inverse @ (others + friction)
+        return (
+            Solution(q, v, speed, bias, mass, actuator, passive, friction, limit, acceleration),
+            acceleration,
         )
-        return solution, acceleration
 
     def _sweep(
-        self,
-        inverse: Array,
-        smooth: Array,
-        speed: Array,
-        friction: Array,
-        place: Array,
-        gap: Array,
+        self, inverse: Array, others: Array, x: Array, friction: Array
     ) -> tuple[Array, Array, Array]:
         """Friction, limit force and acceleration, by projected Gauss-Seidel."""
+        place, speed = np.split(x[:-1], 2)
+        gap = np.minimum(place - self._low, self._high - place)
         side = np.where(place - self._low < self._high - place, 1.0, -1.0)
         strength = _impedance(self._solimp, gap)
         stop_r = _softness(strength, self._weight)
@@ -178,7 +186,7 @@ class Law:
                 np.ones(len(speed)),
                 self._rub_r.tolist(),
                 (-self._rub_b * speed).tolist(),
-                (-self._frictionloss).tolist(),
+                self._least_rub.tolist(),
                 self._frictionloss.tolist(),
                 strict=True,
             ),
@@ -188,7 +196,7 @@ class Law:
             ),
         ]
         forces = [*friction.tolist(), *[0.0] * (len(rows) - len(speed))]
-        acceleration = (smooth + inverse @ friction).tolist()
+        acceleration = (inverse @ (others + friction)).tolist()
         columns = inverse.T.tolist()
         for _ in range(_SWEEPS):
             change = 0.0
@@ -214,7 +222,9 @@ class Arm:
     """One tree of joints in a stepped world, driven by its law.
 
     Attributes:
-        q, v: Positions and velocities, as the engine has them; `speed` is v as an array.
+        q, v: Positions and velocities, as the engine has them; `angles` and `speed` are
+            the same as arrays.
+        friction: (n,) the dry friction of the last step [N·m or N].
         last: What the last step was driven with.
     """
 
@@ -224,21 +234,27 @@ class Arm:
         self._client, self._body = world.client, tree.body
         self.tree, self.law = tree, law
         self.last: Solution | None = None
-        self._contact: Array | None = np.zeros(len(tree.dofs))
-        self._friction = self._contact
+        self.angles = self.speed = np.zeros(len(tree.dofs))
+        self.q: Sequence[float] = []
+        self.v: Sequence[float] = []
+        self.nothing = self.friction = np.zeros(len(tree.dofs))
+        self._contact: Array | None = self.nothing
 
     def place(self, qpos: Array, qvel: Array, contact: Array, friction: Array) -> None:
-        """Start from a state, whole arrays of the model."""
-        self.q, self.v = qpos[self.tree.qadr].tolist(), qvel[self.tree.dofs].tolist()
-        self.speed = qvel[self.tree.dofs]
-        self._contact, self._friction = contact[self.tree.dofs], friction[self.tree.dofs]
+        """Start from a state; contact and friction (n,) are those of the step before it."""
+        self.q, self.v = qpos[self.tree.qpos].tolist(), qvel[self.tree.qvel].tolist()
+        self._x = np.array([*self.q, *self.v, 1.0])
+        self.angles, self.speed = self._x[: len(self.q)], self._x[len(self.q) : -1]
+        self._contact, self.friction = contact, friction
         self.last = None
 
     def read(self) -> None:
         """Take over what the engine made of the last step."""
-        states = pb.getJointStates(self._body, self.tree.joints, self._client)
-        self.q, self.v = [s[0] for s in states], [s[1] for s in states]
-        self.speed = np.array(self.v)
+        self.q, self.v, _, _ = zip(
+            *pb.getJointStates(self._body, self.tree.joints, self._client), strict=True
+        )
+        self._x = np.array([*self.q, *self.v, 1.0])
+        self.angles, self.speed = self._x[: len(self.q)], self._x[len(self.q) : -1]
         self._contact = None
 
     @property
@@ -249,15 +265,10 @@ class Arm:
             assert last is not None  # it was read after a step
             rate = ((self.speed - last.speed) / self.law.timestep).tolist()
             needed = pb.calculateInverseDynamics(
-                self._body, last.qpos, last.qvel, rate, physicsClientId=self._client
+                self._body, last.qpos, last.qvel, rate, 0, self._client
             )
             self._contact = np.array(needed) - last.torque
         return self._contact
-
-    @property
-    def friction(self) -> Array:
-        """(n,) the dry friction of the last step [N·m or N]."""
-        return self._friction
 
     def forces(self) -> dict[str, Array]:
         """Accelerations and forces of the last step, by their names in the contract."""
@@ -276,15 +287,19 @@ class Arm:
             "qfrc_contact": contact,
         }
 
-    def drive(self, ctrl: Array, settled: bool = False) -> None:
+    def command(self, ctrl: Array) -> None:
+        """Take a new command (nu,) of the whole model."""
+        self._aim = self.law.aim(ctrl)
+
+    def drive(self, settled: bool = False) -> None:
         """Give the engine the torque of the next step."""
         contact = self.contact
         self.last, acceleration = self.law.solve(
-            self._ghost, self.q, self.v, self.speed, ctrl, contact, self._friction, settled
+            self._ghost, self.q, self.v, self._x, self._aim, contact, self.friction, settled
         )
-        self._friction = self.last.friction
+        self.friction = self.last.friction
         needed = pb.calculateInverseDynamics(
-            self._body, self.q, self.v, acceleration.tolist(), physicsClientId=self._client
+            self._body, self.q, self.v, acceleration.tolist(), 0, self._client
         )
         self.last.torque = torque = np.array(needed) - contact
         pb.setJointMotorControlArray(

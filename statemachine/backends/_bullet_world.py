@@ -45,7 +45,8 @@ class Tree:
         body: PyBullet's id of it.
         free: Whether it floats; its joint is then the root's free joint.
         joints: PyBullet's indices of its joints, in order of their degrees of freedom.
-        qadr, dofs: Where each joint is in qpos and in qvel; of a free one, the first.
+        dofs: Their degrees of freedom; of a free joint, its first.
+        qpos, qvel: What of these arrays is the tree's: a slice where that is enough.
         links: PyBullet's index of each body's link; -1 is the base.
         tips: PyBullet's index of each site's link.
     """
@@ -65,7 +66,17 @@ class Tree:
         moving = [(info[0], by_name[info[1].decode()]) for info in infos if info[3] >= 0]
         ids = [joint for _, joint in moving] or [int(raw.body_jntadr[root])] * self.free
         self.joints = [index for index, _ in moving]
-        self.qadr, self.dofs = raw.jnt_qposadr[ids].astype(int), raw.jnt_dofadr[ids].astype(int)
+        self.dofs = raw.jnt_dofadr[ids].astype(int)
+        self.qpos = _index(raw.jnt_qposadr[ids].astype(int), 7 if self.free else 1)
+        self.qvel = _index(self.dofs, 6 if self.free else 1)
+
+
+def _index(places: Any, size: int) -> Any:
+    """Places of things of a size: a slice, which NumPy takes faster, or an array."""
+    if not len(places) or (np.diff(places) == size).all():
+        start = int(places[0]) if len(places) else 0
+        return slice(start, start + size * len(places))
+    return places
 
 
 class World:
@@ -272,14 +283,17 @@ class World:
             if tree.free:
                 self._put_free(tree, qpos, qvel)
                 continue
-            for index, q, v in zip(
-                tree.joints, qpos[tree.qadr].tolist(), qvel[tree.dofs].tolist(), strict=True
-            ):
-                pb.resetJointState(tree.body, index, q, v, physicsClientId=self.client)
+            if tree.joints:
+                pb.resetJointStatesMultiDof(
+                    tree.body,
+                    tree.joints,
+                    [[q] for q in qpos[tree.qpos].tolist()],
+                    [[v] for v in qvel[tree.qvel].tolist()],
+                    physicsClientId=self.client,
+                )
 
     def _put_free(self, tree: Tree, qpos: Array, qvel: Array) -> None:
-        body, start, dof = tree.body, int(tree.qadr[0]), int(tree.dofs[0])
-        qpos, qvel = qpos[start : start + 7], qvel[dof : dof + 6]
+        body, qpos, qvel = tree.body, qpos[tree.qpos], qvel[tree.qvel]
         centre, axes = self._frames[body]
         quat = qpos[3:] / np.linalg.norm(qpos[3:])
         turn = matrix_from_quat(quat)
@@ -292,6 +306,10 @@ class World:
     def read_free(self, body: int) -> tuple[list[float], list[float]]:
         """Qpos (7,) and qvel (6,) of a free body, in MuJoCo's conventions."""
         centre, (ax, ay, az, aw) = self._frames[body]
+        if aw == 1 and not any(centre):  # the frames are one
+            pos, (x, y, z, w) = pb.getBasePositionAndOrientation(body, self.client)
+            speed, spin = pb.getBaseVelocity(body, self.client)
+            return [*pos, w, x, y, z], [*speed, *_turned((-x, -y, -z, w), spin)]
         (px, py, pz), pose = pb.getBasePositionAndOrientation(body, self.client)
         (vx, vy, vz), (wx, wy, wz) = pb.getBaseVelocity(body, self.client)
         quat = x, y, z, w = _times(pose, (-ax, -ay, -az, aw))
@@ -307,6 +325,14 @@ class World:
                 *_turned(inverse, (wx, wy, wz)),
             ],
         )
+
+    def link_states(self, tree: Tree) -> list[Any]:
+        """Centre of mass, and its axes (x, y, z, w), of a tree's bodies, then of its sites."""
+        links = [*tree.links.values(), *tree.tips.values()]
+        found = pb.getLinkStates(
+            tree.body, links, computeForwardKinematics=1, physicsClientId=self.client
+        )
+        return [state[:2] for state in found]
 
     def contact_points(self) -> list[Any]:
         """PyBullet's contact points of the last collision detection."""

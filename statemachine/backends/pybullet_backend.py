@@ -204,15 +204,10 @@ class PybulletData(Data):
     def _get_state(self) -> State:
         now = self._machine.present
         fingerprint, layout = self._layout
-        parts = (
-            np.array([self._machine.time]),
-            now.qpos,
-            now.qvel,
-            now.ctrl,
-            now.contact,
-            now.friction,
-        )
-        blob = np.concatenate(parts[: len(layout)]).tobytes()
+        parts = [np.array([self._machine.time]), now.qpos, now.qvel, now.ctrl]
+        if len(layout) > len(parts):
+            parts += self._machine.gathered(now.observed)
+        blob = np.concatenate(parts).tobytes()
         return State("pybullet", self._home.engine_version, fingerprint, layout, blob)
 
     def _set_state(self, state: State) -> None:
@@ -220,7 +215,9 @@ class PybulletData(Data):
         for name, part in zip(INPUTS, parts[1:4], strict=True):
             check_entries(part, name, self._home._coordinate_name)
         self._home._check_quaternions(parts[1])
-        self._machine.restart(float(parts[0][0]), *parts[1:])
+        observed = self._machine.parted(*parts[4:]) if parts[4:] else None
+        qpos, qvel, ctrl = parts[1:4]
+        self._machine.restart(float(parts[0][0]), qpos, qvel, ctrl, observed)
 
     def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
         return self._layout
