@@ -317,7 +317,7 @@ class Machine:
         for arm in self._arms:
             qpos[arm.tree.qpos], qvel[arm.tree.qvel] = arm.angles, arm.speed
         for tree in self._free:
-            qpos[tree.qpos], qvel[tree.qvel] = self.world.read_free(tree.body)
+            qpos[tree.qpos], qvel[tree.qvel] = self.world.read_free(tree, self._last_qpos)
         return qpos, qvel
 
     def _diverge(self, time: float) -> None:
@@ -437,7 +437,7 @@ def _free_dynamics(raw: mujoco.MjModel, body: int, turn: Array, qvel: Array) -> 
     total = mass * (jacobian.T @ jacobian)
     total[3:, 3:] += inertia
     whirl = turn @ np.cross(spin, np.cross(spin, centre))
-    bias = jacobian.T @ (mass * (whirl - gravity(raw)))
+    bias: Array = jacobian.T @ (mass * np.asarray(whirl - gravity(raw), dtype=np.float64))
     bias[3:] += np.cross(spin, inertia @ spin)
     return total, bias
 

@@ -303,28 +303,31 @@ class World:
         pb.resetBasePositionAndOrientation(body, where.tolist(), pose, self.client)
         pb.resetBaseVelocity(body, speed.tolist(), spin.tolist(), self.client)
 
-    def read_free(self, body: int) -> tuple[list[float], list[float]]:
-        """Qpos (7,) and qvel (6,) of a free body, in MuJoCo's conventions."""
-        centre, (ax, ay, az, aw) = self._frames[body]
-        if aw == 1 and not any(centre):  # the frames are one
-            pos, (x, y, z, w) = pb.getBasePositionAndOrientation(body, self.client)
-            speed, spin = pb.getBaseVelocity(body, self.client)
-            return [*pos, w, x, y, z], [*speed, *_turned((-x, -y, -z, w), spin)]
-        (px, py, pz), pose = pb.getBasePositionAndOrientation(body, self.client)
-        (vx, vy, vz), (wx, wy, wz) = pb.getBaseVelocity(body, self.client)
-        quat = x, y, z, w = _times(pose, (-ax, -ay, -az, aw))
-        # r: from the body's origin to its centre of mass, in world axes.
-        rx, ry, rz = _turned(quat, centre)
-        inverse = (-x, -y, -z, w)
-        return (
-            [px - rx, py - ry, pz - rz, w, x, y, z],
-            [
-                vx - (wy * rz - wz * ry),
-                vy - (wz * rx - wx * rz),
-                vz - (wx * ry - wy * rx),
-                *_turned(inverse, (wx, wy, wz)),
-            ],
-        )
+    def read_free(self, tree: Tree, near: Array) -> tuple[list[float], list[float]]:
+        """What of qpos (7,) and qvel (6,) is a free body's, in MuJoCo's conventions.
+
+        Args:
+            tree: The body.
+            near: qpos of before: of a quaternion and its negative, which are one rotation,
+                the nearer one is taken.
+        """
+        centre, (ax, ay, az, aw) = self._frames[tree.body]
+        (px, py, pz), pose = pb.getBasePositionAndOrientation(tree.body, self.client)
+        (vx, vy, vz), spin = pb.getBaseVelocity(tree.body, self.client)
+        quat = pose
+        if aw != 1 or any(centre):  # else the frames are one
+            quat = _times(pose, (-ax, -ay, -az, aw))
+            # r: from the body's origin to its centre of mass, in world axes.
+            rx, ry, rz = _turned(quat, centre)
+            wx, wy, wz = spin
+            px, py, pz = px - rx, py - ry, pz - rz
+            vx, vy, vz = vx - wy * rz + wz * ry, vy - wz * rx + wx * rz, vz - wx * ry + wy * rx
+        x, y, z, w = quat
+        spin = _turned((-x, -y, -z, w), spin)
+        nw, nx, ny, nz = near[tree.qpos][3:].tolist()
+        if w * nw + x * nx + y * ny + z * nz < 0:
+            x, y, z, w = -x, -y, -z, -w
+        return [px, py, pz, w, x, y, z], [vx, vy, vz, *spin]
 
     def link_states(self, tree: Tree) -> list[Any]:
         """Centre of mass, and its axes (x, y, z, w), of a tree's bodies, then of its sites."""
