@@ -44,6 +44,7 @@ class Model(ABC):
         capabilities: What this backend can do.
         timestep: Simulated time of one `step` [s].
         substeps: Engine steps that one `step` takes.
+        gravity: (3,) [m/s²], as the engine has it.
         nq, nv, nu: Lengths of qpos, qvel and ctrl.
         nbody, njnt, nsite, ngeom: Counts; body 0 is the world.
         jnt_type: (njnt,) `JointType`.
@@ -66,6 +67,7 @@ class Model(ABC):
     capabilities: Capabilities
     timestep: float
     substeps: int
+    gravity: Array
     nq: int
     nv: int
     nu: int

@@ -190,3 +190,45 @@ class State:
     def time(self) -> float:
         """Simulated time [s]."""
         return float(self["time"][0])
+
+
+@dataclass(frozen=True)
+class Term:
+    """What the interface calls a thing, and what an engine calls it."""
+
+    thing: str
+    ours: str
+    engine: str
+
+
+@dataclass(frozen=True)
+class Alone:
+    """A joint that nobody commands, on an engine as it comes.
+
+    Attributes:
+        label: What was done to the engine before.
+        time: Simulated time [s].
+        position: Of the joint then [rad; of a slide, m].
+        motor: What the engine's own motor exerts on it [N·m or N].
+        explicit: Largest h·D/M of the joint damping that the engine applies explicitly;
+            above 2 a joint gains speed from being damped.
+    """
+
+    label: str
+    time: float
+    position: float
+    motor: float
+    explicit: float
+
+
+@dataclass(frozen=True)
+class WayBack:
+    """A way to go back to an earlier state, and how far the second future is from the first.
+
+    Attributes:
+        name: What is done.
+        difference: Largest difference of a coordinate; zero means the same bits.
+    """
+
+    name: str
+    difference: float

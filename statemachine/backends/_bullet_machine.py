@@ -22,7 +22,8 @@ from ..records import DERIVED, POSES, Array, Contacts
 from ..rotations import matrix_from_quat, times, wxyz_from_xyzw
 from ._bullet_contacts import contacts
 from ._bullet_servo import Arm, Law
-from ._bullet_world import Tree, World, gravity, pb
+from ._bullet_world import Tree, World, pb
+from ._mjcf import gravity
 
 
 @dataclass(slots=True)

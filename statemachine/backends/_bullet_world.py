@@ -25,6 +25,7 @@ from ..records import Array
 from ..rotations import matrix_from_quat, xyzw_from_wxyz
 from ..silence import silence
 from . import _bullet_urdf as urdf
+from ._mjcf import gravity
 
 pb: Any = require("pybullet")
 
@@ -362,12 +363,6 @@ def described(raw: mujoco.MjModel, root: int, kind: str) -> str:
 
 def _floats(raw: mujoco.MjModel, root: int) -> bool:
     return bool(raw.body_jntnum[root]) and not urdf.axes(raw, root)
-
-
-def gravity(raw: mujoco.MjModel) -> Array:
-    """Gravity (3,) [m/s²], zero where the model's file turns it off."""
-    off = raw.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
-    return np.zeros(3) if off else np.array(raw.opt.gravity)
 
 
 def _connect() -> int:

@@ -73,6 +73,11 @@ def step_length(timestep: float, substeps: int, options: dict[str, Any]) -> floa
     return whole / substeps
 
 
+def gravity(m: mujoco.MjModel) -> Array:
+    """Gravity (3,) [m/s²], zero where the model's file turns it off."""
+    return np.array(m.opt.gravity) * (not m.opt.disableflags & int(_DISABLE.mjDSBL_GRAVITY))
+
+
 def facts(m: mujoco.MjModel) -> dict[str, Any]:
     """What `Model.__init__` wants of a compiled model, but for what a backend adds."""
     on_joint = m.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
@@ -83,6 +88,7 @@ def facts(m: mujoco.MjModel) -> dict[str, Any]:
         & (m.actuator_gainprm[:, 0] != 0)
     )
     return {
+        "gravity": gravity(m),
         "nq": m.nq,
         "nv": m.nv,
         "nu": m.nu,

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..backends import probe
 from ..interface import Model
-from ..records import Array, JointType
+from ..records import Alone, Array, JointType
 from ..verbs import forward, make_data, step
 from ._common import (
     Forces,
@@ -30,6 +31,7 @@ class Droop:
 
     Attributes:
         time: (n,) moments [s]; position: (n,) of the joint then [rad; of a slide, m].
+        path: (steps + 1,) its position after each step.
         qpos: (nq,) at the end.
         forces: On the joint at the end, after `forward`.
         velocity, acceleration: Of the joint at the end [rad/s, rad/s²; or with m].
@@ -40,6 +42,7 @@ class Droop:
 
     time: Array
     position: Array
+    path: Array
     qpos: Array
     forces: Forces
     velocity: float
@@ -56,6 +59,7 @@ class Gravity:
     Attributes:
         joint: The joint that was watched; slide: whether it is one, and no hinge.
         servo: Whether a position servo drives it.
+        alone: The joint on the engine as it comes, where that differs from the contract.
     """
 
     joint: str
@@ -63,6 +67,7 @@ class Gravity:
     servo: bool
     servos_on: Droop
     servos_off: Droop
+    alone: tuple[Alone, ...]
     provenance: Provenance
 
 
@@ -89,12 +94,14 @@ def run(
     on = _droop(model, seconds, joint, lambda part: progress(part / 2))
     off = _droop(limp, seconds, joint, lambda part: progress((1 + part) / 2))
     which = model.joint_id(joint)
+    own = probe(model)
     return Gravity(
         joint=joint,
         slide=int(model.jnt_type[which]) == int(JointType.SLIDE),
         servo=bool(np.isfinite(model.actuator_kp[model.actuator_jntid == which]).any()),
         servos_on=on,
         servos_off=off,
+        alone=own.left_alone(model, seconds, which) if own else (),
         provenance=provenance(model),
     )
 
@@ -104,9 +111,10 @@ def _droop(model: Model, seconds: float, joint: str, progress: Progress) -> Droo
     bodies = carried_by(model, [int(model.jnt_bodyid[model.joint_id(joint)])])
     total = steps_in(model, seconds)
     marks = {round(mark / model.timestep) for mark in milestones(total * model.timestep)}
-    times, positions, touches = [], [], {}
+    times, positions, path, touches = [], [], np.empty(total + 1), {}
     with make_data(model) as data:
         for k in range(total + 1):
+            path[k] = data.qpos[place]
             if k in marks:
                 times.append(data.time)
                 positions.append(float(data.qpos[place]))
@@ -125,6 +133,7 @@ def _droop(model: Model, seconds: float, joint: str, progress: Progress) -> Droo
         return Droop(
             time=np.array(times),
             position=np.array(positions),
+            path=path,
             qpos=data.qpos.copy(),
             forces=forces_on(data, dof),
             velocity=float(data.qvel[dof]),

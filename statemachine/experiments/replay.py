@@ -9,11 +9,12 @@ from typing import Literal
 
 import numpy as np
 
+from ..backends import probe
 from ..checks import as_count
 from ..errors import BadInputError, unknown_name
-from ..interface import Model
-from ..records import Array, Ints, JointType
-from ..verbs import make_data, reset, step
+from ..interface import Data, Model
+from ..records import Array, Ints, JointType, WayBack
+from ..verbs import get_state, make_data, reset, set_state, step
 from ._common import Progress, Provenance, body_pairs, command, provenance, silent
 
 Break = Literal["extra-step", "late-ctrl"]
@@ -34,10 +35,13 @@ class Replay:
         apart: (n+1,) distance [m] between the free body's positions in the two
             runs; None without a free body.
         qpos: (nq,) at the end of the first run.
+        free: Where in qpos a free body's position is; None without one.
         travel: Largest movement of a hinge in the first run [rad].
         contacts: (n,) contacts that each step of the first run found.
         pairs: For each pair of bodies, in how many steps it touched.
         keyframe: Name of the keyframe; its time was set to zero.
+        ways: Ways to go back through this interface, tried.
+        own_ways: The engine's own ways, tried on the raw engine where that differs.
     """
 
     ctrl: Array
@@ -47,10 +51,13 @@ class Replay:
     difference: Array
     apart: Array | None
     qpos: Array
+    free: tuple[int, int, int] | None
     travel: float
     contacts: Ints
     pairs: dict[str, int]
     keyframe: str
+    ways: tuple[WayBack, ...]
+    own_ways: tuple[WayBack, ...]
     provenance: Provenance
 
 
@@ -93,6 +100,7 @@ def run(
         if kind == JointType.FREE
     ]
     gap = first - second
+    own = probe(model)
     hinges = model.jnt_qposadr[model.jnt_type == int(JointType.HINGE)]
     return Replay(
         ctrl=goal,
@@ -102,12 +110,57 @@ def run(
         difference=np.abs(gap).max(axis=1),
         apart=np.linalg.norm(gap[:, free[0] : free[0] + 3], axis=1) if free else None,
         qpos=first[-1],
+        free=(free[0], free[0] + 1, free[0] + 2) if free else None,
         travel=float(np.ptp(first[:, hinges], axis=0).max(initial=0.0)),
         contacts=contacts,
         pairs=pairs,
         keyframe=model.keyframes[0].name,
+        ways=ways_back(model, goal),
+        own_ways=own.ways_back(model) if own else (),
         provenance=provenance(model),
     )
+
+
+def ways_back(model: Model, ctrl: Array, steps: int = 100) -> tuple[WayBack, ...]:
+    """Go back in each way that the interface has, and compare the futures.
+
+    Args:
+        model: Started from keyframe 0.
+        ctrl: The command (nu,).
+        steps: How many before and after the moment to which some ways go back.
+    """
+
+    def start(data: Data) -> None:
+        reset(model, data, keyframe=0)
+        data.ctrl = ctrl
+
+    def future(data: Data, count: int) -> Array:
+        trace = []
+        for _ in range(count):
+            step(model, data)
+            trace.append(data.qpos.copy())
+        return np.array(trace)
+
+    with make_data(model) as data, make_data(model) as other:
+        start(data)
+        whole = future(data, steps)
+        state = get_state(model, data)
+        rest = future(data, steps)
+        found = {}
+        start(data)
+        found["reset to the keyframe"] = future(data, steps) - whole
+        start(other)
+        found["a new Data, the same keyframe"] = future(other, steps) - whole
+        set_state(model, data, state)
+        restored = future(data, steps)
+        found["set_state, mid-contact: on as before?"] = restored - rest
+        set_state(model, other, state)
+        found["set_state twice: the same future?"] = future(other, steps) - restored
+        reset(model, other)
+        for name in ("qpos", "qvel", "ctrl"):
+            setattr(other, name, state[name])
+        found["only qpos, qvel, ctrl written back"] = future(other, steps) - rest
+    return tuple(WayBack(name, float(np.abs(gap).max())) for name, gap in found.items())
 
 
 def _once(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
+from ..backends import load, probe
 from ..checks import as_count
 from ..interface import Data, Model
 from ..verbs import make_data, reset, step
@@ -22,12 +23,15 @@ class Speed:
         nstep: Steps of each run; simulated: their simulated time [s].
         bulk: Wall time of `step(model, data, n)` in a few large chunks [s].
         one_by_one: Wall time of as many single calls from a Python loop [s].
+        as_it_comes: Wall time in bulk of the engine without the emulated servo, as its own
+            users drive it [s]; None where nothing is emulated.
     """
 
     nstep: int
     simulated: float
     bulk: float
     one_by_one: float
+    as_it_comes: float | None
     provenance: Provenance
 
     @property
@@ -55,16 +59,22 @@ def run(model: Model, steps: int = 20_000, progress: Progress = silent) -> Speed
     total = as_count(steps, "steps")
     size = max(1, min(total // _CHUNKS, _CHUNK_MOST))
     chunks = [size] * (total // size) + [total % size] * bool(total % size)
+    ways = [(model, True), (model, False)]
+    if probe(model):
+        as_it_comes = load(model.path, backend=model.backend, defaults="engine")
+        gravity = model.gravity
+        ways.append((as_it_comes.replace(gravity=gravity, timestep=model.timestep), True))
     walls = []
-    for turn, bulk in enumerate((True, False)):
-        with make_data(model) as data:
-            reset(model, data, keyframe=0 if model.keyframes else None)
+    for turn, (each, bulk) in enumerate(ways):
+        with make_data(each) as data:
+            reset(each, data, keyframe=0 if each.keyframes else None)
             wall = 0.0
             for k, chunk in enumerate(chunks):
-                wall += _timed(model, data, chunk, bulk)
-                progress((turn + (k + 1) / len(chunks)) / 2)
+                wall += _timed(each, data, chunk, bulk)
+                progress((turn + (k + 1) / len(chunks)) / len(ways))
             walls.append(wall)
-    return Speed(total, total * model.timestep, walls[0], walls[1], provenance(model))
+    own = walls[2] if len(walls) > 2 else None
+    return Speed(total, total * model.timestep, walls[0], walls[1], own, provenance(model))
 
 
 def _timed(model: Model, data: Data, nstep: int, bulk: bool) -> float:

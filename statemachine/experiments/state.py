@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..backends import probe
 from ..interface import Model
-from ..records import JointType
+from ..records import JointType, Term
 from ..verbs import make_data, reset
 from ._common import Provenance, provenance
 
@@ -30,6 +31,7 @@ class Layout:
         keyframe_time: `data.time` after a reset to keyframe 0; None without one.
         keyframe: Its name.
         fresh_time: `data.time` of a fresh Data.
+        terms: What the engine itself calls all this, where that differs.
     """
 
     nq: int
@@ -40,6 +42,7 @@ class Layout:
     fresh_time: float
     keyframe: str | None
     keyframe_time: float | None
+    terms: tuple[Term, ...]
     provenance: Provenance
 
 
@@ -60,6 +63,7 @@ def run(model: Model) -> Layout:
                 qvel_stop=int(dof) + known.nv,
             )
         )
+    own = probe(model)
     with make_data(model) as data:
         fresh, name, time = data.time, None, None
         if model.keyframes:
@@ -74,5 +78,6 @@ def run(model: Model) -> Layout:
         fresh_time=fresh,
         keyframe=name,
         keyframe_time=time,
+        terms=own.terms(model) if own else (),
         provenance=provenance(model),
     )

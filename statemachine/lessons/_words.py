@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from .page import Page
+from .page import Page, Table
 
 
 def origin(results: Mapping[str, Any]) -> str:
@@ -21,6 +21,34 @@ def origin(results: Mapping[str, Any]) -> str:
 def page_of(title: str, results: Mapping[str, Any], blocks: Sequence[Any]) -> Page:
     """A page with its origin."""
     return Page(title, origin(results), list(blocks))
+
+
+def differences(
+    results: Mapping[str, Any], rows: Sequence[tuple[str, Callable[[Any, Any], str]]]
+) -> list[Table]:
+    """The last table of a page with several engines: each against the first.
+
+    Args:
+        results: By backend.
+        rows: What is compared, and the words for it from the first's result and another's.
+    """
+    if len(results) < 2:
+        return []
+    (name, first), *others = results.items()
+    return [
+        Table(
+            ("", *(f"{other} against {name}" for other, _ in others)),
+            [(label, *(say(first, result) for _, result in others)) for label, say in rows],
+            title="Where they differ, and by how much",
+        )
+    ]
+
+
+def angle_or_length(value: float, slide: bool) -> str:
+    """A difference of a joint's positions, small ones in powers of ten."""
+    if slide:
+        return f"{value * 1e3:.2g} mm"
+    return f"{math.degrees(value):.2g}°"
 
 
 def degrees(radians: float, digits: int = 2) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..experiments import fingertip
-from ._words import millimetres, page_of, vector, where
+from ._words import differences, millimetres, page_of, vector, where
 from .page import Page, Table, Text, Verdict
 
 
@@ -16,6 +16,7 @@ def page(results: Mapping[str, fingertip.Certificate]) -> Page:
     first = next(iter(results.values()))
     seed = first.provenance.seed
     pinocchio = first.provenance.versions["pinocchio"]
+    digits = 6 if len(results) == 1 else 5  # so that two columns fit
     blocks: list[Any] = [
         Text(
             f"The engine computes where the fingertip ({first.site}) is, by forward; Pinocchio "
@@ -27,7 +28,7 @@ def page(results: Mapping[str, fingertip.Certificate]) -> Page:
             ("", *results),
             [
                 ("frames apart", *(_offset(r.frames) for r in results.values())),
-                ("default pose [m]", *(vector(r.default_pose, 6) for r in results.values())),
+                ("default pose [m]", *(vector(r.default_pose, digits) for r in results.values())),
                 ("position, worst [m]", *(_figure(r.position_worst) for r in results.values())),
                 ("position, median [m]", *(_figure(r.position_median) for r in results.values())),
                 ("rotation matrix, worst", *(_figure(r.rotation_worst) for r in results.values())),
@@ -41,6 +42,10 @@ def page(results: Mapping[str, fingertip.Certificate]) -> Page:
     ]
     for name, result in results.items():
         blocks.append(Verdict(f"{where(results, name)}{_said(result)}", result.agrees))
+    blocks += differences(
+        results,
+        [("default pose", lambda a, b: f"{math.dist(a.default_pose, b.default_pose):.1e} m")],
+    )
     return page_of("The fingertip, and an independent witness", results, blocks)
 
 

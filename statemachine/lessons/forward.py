@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..experiments import forward
-from ._words import millimetres, page_of, vector, where
+from ._words import differences, millimetres, page_of, vector, where
 from .page import Code, Page, Table, Text, Verdict
 
 
@@ -34,20 +35,26 @@ def page(results: Mapping[str, forward.Forward]) -> Page:
             )
         ),
     ]
-    for name, result in results.items():
-        twins = {index for pair in result.equal for index in pair}
-        blocks.append(
-            Table(
-                ("", "after", "fingertip [m]", "data.time"),
-                [
-                    (str(i + 1), reading.after, vector(reading.fingertip), f"{reading.time:g} s")
-                    for i, reading in enumerate(result.readings)
-                ],
-                title=f"{where(results, name)}The fingertip, read four times",
-                words=frozenset({0, 1}),
-                emphasis=frozenset(twins),
-            )
+    twins = {index for result in results.values() for pair in result.equal for index in pair}
+    headers = [f"{name} [m]" for name in results] if len(results) > 1 else ["fingertip [m]"]
+    blocks.append(
+        Table(
+            ("", "after", *headers, "data.time"),
+            [
+                (
+                    str(i + 1),
+                    reading.after,
+                    *(vector(result.readings[i].fingertip) for result in results.values()),
+                    f"{reading.time:g} s",
+                )
+                for i, reading in enumerate(first.readings)
+            ],
+            title="The fingertip, read four times",
+            words=frozenset({0, 1}),
+            emphasis=frozenset(twins),
         )
+    )
+    for name, result in results.items():
         blocks.append(
             Verdict(
                 f"{where(results, name)}readings 2 and 3 are equal bit by bit: the write changed "
@@ -68,4 +75,15 @@ def page(results: Mapping[str, forward.Forward]) -> Page:
         blocks.append(
             Verdict(f"{where(results, name)}data.time is the same in all four readings", unmoved)
         )
+    rows = [(f"fingertip, reading {i + 1}", _apart(i)) for i in range(len(first.readings))]
+    blocks += differences(results, rows)
     return page_of("The arm that is nowhere", results, blocks)
+
+
+def _apart(reading: int) -> Callable[[Any, Any], str]:
+    def say(one: forward.Forward, two: forward.Forward) -> str:
+        return (
+            f"{math.dist(one.readings[reading].fingertip, two.readings[reading].fingertip):.1e} m"
+        )
+
+    return say

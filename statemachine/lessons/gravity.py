@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from ..experiments import gravity
-from ._words import page_of, position, signed, where
+from ._words import angle_or_length, differences, page_of, position, signed, where
 from .page import Code, Page, Table, Text, Verdict
 
 _PARTS = (
@@ -84,7 +86,80 @@ def page(results: Mapping[str, gravity.Gravity]) -> Page:
         if run.touching:
             touches = (f"{touch} (since {run.touches[touch]:.3f} s)" for touch in run.touching)
             blocks.append(Text(f"{name}: touching at the end: {', '.join(touches)}."))
+    for name, result in results.items():
+        if result.alone:
+            blocks += _alone(name, result)
+    blocks += differences(
+        results,
+        [
+            ("servos on, worst", lambda a, b: _worst(a, b, "servos_on")),
+            ("servos off, until one touches", lambda a, b: _worst(a, b, "servos_off", False)),
+            ("servos off, after that", lambda a, b: _worst(a, b, "servos_off", True)),
+        ],
+    )
     return page_of("You never wrote ctrl", results, blocks)
+
+
+def _worst(
+    one: gravity.Gravity, two: gravity.Gravity, which: str, touching: bool | None = None
+) -> str:
+    """The largest distance between two runs, before or after the first touch of either."""
+    runs = [getattr(result, which) for result in (one, two)]
+    timestep = one.provenance.timestep
+    gap = np.abs(runs[0].path - runs[1].path)
+    touches = [time for run in runs for time in run.touches.values()]
+    first = round(min(touches, default=np.inf) / timestep) if touches else len(gap)
+    if touching is False:
+        gap = gap[: first + 1]
+    elif touching:
+        if first >= len(gap):
+            return "nothing touched"
+        gap = np.concatenate([np.zeros(first), gap[first:]])
+    worst = int(np.argmax(gap))
+    return f"{angle_or_length(float(gap[worst]), one.slide)} at {worst * timestep:.3f} s"
+
+
+def _alone(name: str, result: gravity.Gravity) -> list[Table | Text]:
+    """The engine without our adapter: what its own defaults do to the joint."""
+    unit = _unit(result)
+    rows = [
+        (
+            each.label,
+            position(each.position, result.slide),
+            f"{signed(each.motor)} {unit}",
+        )
+        for each in result.alone
+    ]
+    time = result.alone[0].time
+    blocks: list[Table | Text] = [
+        Table(
+            (f"{name} itself", result.joint, "its own motor"),
+            rows,
+            title=f"The same arm as {name}'s own users load it, nothing commanded, at {time:g} s",
+        )
+    ]
+    loaded, held, limp, undamped = result.alone
+    if held.motor and abs(held.position) < min(abs(limp.position), abs(undamped.position)) / 10:
+        blocks.append(
+            Text(
+                f"A fresh arm does not fall on {name}, and not because of its servos: without "
+                "being told, gravity is zero; and every joint comes with a motor of the engine's "
+                f"own that holds it still, here with {abs(held.motor):.4f} {unit}. With the "
+                f"motors off and the URDF's damping left out {result.joint} is at "
+                f"{position(undamped.position, result.slide)} then, having started at "
+                f"{position(loaded.position, result.slide)}."
+            )
+        )
+    if limp.explicit > 2:
+        blocks.append(
+            Text(
+                f"With the motors off and the damping in, the arm on {name} flails: a joint's "
+                "damping is applied explicitly there, with the velocity of before the step, and "
+                f"h·D is {limp.explicit:.0f} times an inertia of this arm. Above 2 each step "
+                "turns a velocity round and makes it larger."
+            )
+        )
+    return blocks
 
 
 def _introduction(first: gravity.Gravity) -> str:

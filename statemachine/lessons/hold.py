@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..experiments import hold
-from ._words import millimetres, page_of, position, vector, where
+from ._words import angle_or_length, differences, millimetres, page_of, position, vector, where
 from .page import Code, Page, Table, Text, Verdict
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -79,7 +79,41 @@ def page(results: Mapping[str, hold.Hold]) -> Page:
                 result.previous <= _SAME,
             )
         )
+    blocks += differences(
+        results,
+        [
+            ("any joint, until one touches", lambda a, b: _apart(a, b, False)),
+            ("any joint, after that", lambda a, b: _apart(a, b, True)),
+            ("any joint, at the end", lambda a, b: _gap(a, b, -1)),
+            ("at the end, contacts left out", _apart_freely),
+        ],
+    )
     return page_of(f"Hold {vector(first.target, 1)}", results, blocks)
+
+
+def _gap(one: hold.Hold, two: hold.Hold, step: int) -> str:
+    gaps = np.abs(one.qpos[step] - two.qpos[step])
+    joint = int(np.argmax(gaps))
+    return f"{angle_or_length(float(gaps[joint]), one.slides[joint])}  {one.joints[joint]}"
+
+
+def _apart(one: hold.Hold, two: hold.Hold, touching: bool) -> str:
+    """The worst step before the first touch of either, or from then on."""
+    times = [each.first_contact for each in (one, two) if each.first_contact is not None]
+    first = round(min(times) / one.provenance.timestep) if times else len(one.time) - 1
+    gaps = np.abs(one.qpos - two.qpos).max(axis=1)
+    if touching and not times:
+        return "nothing touched"
+    span = range(first + 1, len(gaps)) if touching else range(first + 1)
+    worst = max(span, key=lambda k: gaps[k], default=first)
+    return f"{_gap(one, two, worst)} at {one.time[worst]:.3f} s"
+
+
+def _apart_freely(one: hold.Hold, two: hold.Hold) -> str:
+    ends = [r.qpos[-1] if r.without_contacts is None else r.without_contacts for r in (one, two)]
+    gaps = np.abs(ends[0] - ends[1])
+    joint = int(np.argmax(gaps))
+    return f"{angle_or_length(float(gaps[joint]), one.slides[joint])}  {one.joints[joint]}"
 
 
 def _at(result: hold.Hold, value: float, joint: int) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..experiments import replay
-from ._words import count, degrees, millimetres, page_of, vector, where
+from ._words import count, degrees, differences, millimetres, page_of, vector, where
 from .page import Code, Page, Table, Text, Verdict
 
 _STEPS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 300, 600, 1000, 2000, 5000, 10_000, 20_000)
@@ -50,8 +50,66 @@ def page(results: Mapping[str, replay.Replay]) -> Page:
     for name, result in results.items():
         blocks.append(_finding(where(results, name), result))
     if not first.broken_by:
+        blocks.append(_ways(results))
+        for name, result in results.items():
+            blocks += _own_ways(name, result)
         blocks.append(Text("Break it on purpose: --break extra-step, or --break late-ctrl."))
+    blocks += differences(
+        results,
+        [
+            ("joints at the end, worst", _joints_apart),
+            ("free body at the end", _bodies_apart),
+            ("contacts a step, on average", _contacts_apart),
+        ],
+    )
     return page_of("The same start, the same commands", results, blocks)
+
+
+def _ways(results: Mapping[str, replay.Replay]) -> Table:
+    names = [way.name for way in next(iter(results.values())).ways]
+    return Table(
+        ("", *results),
+        [
+            (name, *(_exactly(r.ways[k].difference) for r in results.values()))
+            for k, name in enumerate(names)
+        ],
+        title="Ways back, tried: what follows is …",
+    )
+
+
+def _own_ways(name: str, result: replay.Replay) -> list[Table | Text]:
+    if not result.own_ways:
+        return []
+    return [
+        Table(
+            (f"{name} itself", "what follows is …"),
+            [(way.name, _exactly(way.difference)) for way in result.own_ways],
+            title=f"The ways back that {name}'s own users have, tried on it alone",
+        ),
+        Text(
+            "The same bits in one trial are no promise: what was not exact here is not exact; "
+            "what was may differ elsewhere."
+        ),
+    ]
+
+
+def _exactly(difference: float) -> str:
+    return "the same, bit by bit" if difference == 0 else f"off by {difference:.1e} at worst"
+
+
+def _joints_apart(one: replay.Replay, two: replay.Replay) -> str:
+    n = len(one.ctrl)
+    return degrees(float(np.abs(one.qpos[:n] - two.qpos[:n]).max()), 3)
+
+
+def _bodies_apart(one: replay.Replay, two: replay.Replay) -> str:
+    if one.free is None:
+        return "there is none"
+    return millimetres(float(np.linalg.norm(one.qpos[list(one.free)] - two.qpos[list(one.free)])))
+
+
+def _contacts_apart(one: replay.Replay, two: replay.Replay) -> str:
+    return f"{two.contacts.mean():.1f} instead of {one.contacts.mean():.1f}"
 
 
 def _outcome(results: Mapping[str, replay.Replay]) -> Table:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..experiments import state
-from ._words import page_of, where
+from ._words import differences, page_of
 from .page import Code, Page, Table, Text
 
 
@@ -35,7 +35,7 @@ def page(results: Mapping[str, state.Layout]) -> Page:
             title="Sizes: qpos, qvel, ctrl, bodies (the world is one)",
         ),
     ]
-    for name, layout in results.items():
+    for names, layout in _alike(results, lambda each: each.joints):
         blocks.append(
             Table(
                 ("joint", "type", "qpos", "qvel"),
@@ -48,7 +48,7 @@ def page(results: Mapping[str, state.Layout]) -> Page:
                     )
                     for joint in layout.joints
                 ],
-                title=f"{where(results, name)}Who owns which slots",
+                title=f"{names}Who owns which slots",
                 words=frozenset({0, 1}),
             )
         )
@@ -79,17 +79,46 @@ def page(results: Mapping[str, state.Layout]) -> Page:
         blocks.append(
             Text("In this model every joint has the same slots in qpos and qvel; in others not.")
         )
-    for name, layout in results.items():
+    for names, layout in _alike(results, lambda each: (each.keyframe_time, each.fresh_time)):
         if layout.keyframe_time is None:
             continue
         times = f"{layout.keyframe_time:g} s; on a fresh Data it is {layout.fresh_time:g} s"
         blocks.append(
             Text(
-                f"{where(results, name)}After a reset to keyframe 0 ({layout.keyframe!r}), "
+                f"{names}After a reset to keyframe 0 ({layout.keyframe!r}), "
                 f"data.time is {times}. Time is a number of the state like any other."
             )
         )
+    for name, layout in results.items():
+        if layout.terms:
+            blocks.append(
+                Table(
+                    ("", "here", f"in {name} itself"),
+                    [(term.thing, term.ours, term.engine) for term in layout.terms],
+                    title=f"What {name} calls it",
+                    words=frozenset({0, 1, 2}),
+                )
+            )
+    blocks += differences(results, [("names, sizes and slots", _layouts)])
     return page_of("The state is two arrays", results, blocks)
+
+
+def _alike(
+    results: Mapping[str, state.Layout], of: Callable[[state.Layout], Any]
+) -> list[tuple[str, state.Layout]]:
+    """Engines that say the same are shown once: the prefix "a, b: " and one's result."""
+    groups: dict[Any, list[str]] = {}
+    for name, layout in results.items():
+        groups.setdefault(of(layout), []).append(name)
+    several = len(results) > 1
+    return [
+        (f"{', '.join(names)}: " if several else "", results[names[0]]) for names in groups.values()
+    ]
+
+
+def _layouts(one: state.Layout, two: state.Layout) -> str:
+    sizes = [(each.nq, each.nv, each.nu, each.nbody, each.joints) for each in (one, two)]
+    return "none" if sizes[0] == sizes[1] else "they differ: see above"
 
 
 def _line(array: str, kind: str, size: int) -> str:
