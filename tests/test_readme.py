@@ -28,6 +28,8 @@ def test_there_are_commands() -> None:
 @pytest.mark.parametrize("command", COMMANDS)
 def test_command(cli: Cli, command: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
     words = shlex.split(command)[1:]
+    if "pybullet" in words:
+        need_engine("pybullet")
     if "fingertip" in words:
         need_engine("pinocchio")
     if "path/to/menagerie" in words:
@@ -62,8 +64,10 @@ def test_python_block(tmp_path: Path) -> None:
 
 
 def test_the_output_that_is_shown(cli: Cli) -> None:
-    (shown,) = re.findall(r"```text\n(.*?)```", README, re.DOTALL)
-    assert shown in cli("lesson", "gravity").stdout
+    alone, both = re.findall(r"```text\n(.*?)```", README, re.DOTALL)
+    assert alone in cli("lesson", "gravity").stdout
+    need_engine("pybullet")
+    assert both in cli("lesson", "gravity", "--backend", "all").stdout
 
 
 def test_files_that_are_linked_exist() -> None:

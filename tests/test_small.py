@@ -6,6 +6,7 @@ import ast
 import inspect
 import io
 import pickle
+import re
 import tokenize
 
 import numpy as np
@@ -24,6 +25,8 @@ CORE = (
     "errors.py", "rotations.py", "records.py", "checks.py", "engines.py", "models.py",
     "model.py", "interface.py", "verbs.py", "witness_file.py", "kinematics.py", "backends",
 )  # fmt: skip
+# What it takes to make an engine keep a contract that it does not know.
+EMULATION = re.compile(r"pybullet_backend|_bullet_")
 
 angles = st.floats(-3.0, 3.0)
 quats = st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(
@@ -125,18 +128,18 @@ def _code_lines(source: str) -> int:
 
 
 def test_the_core_stays_thin() -> None:
-    """At most 2,000 lines of code, for all backends together."""
+    """At most 1,700 lines of code; the emulation on PyBullet has a limit of its own."""
     package = ROOT / "statemachine"
-    files = [
-        file
-        for name in CORE
-        for file in ([package / name] if name.endswith(".py") else (package / name).glob("*.py"))
-    ]
-    assert sum(_code_lines(file.read_text()) for file in files) <= 2000
+    lines = {False: 0, True: 0}
+    for name in CORE:
+        for file in [package / name] if name.endswith(".py") else (package / name).glob("*.py"):
+            lines[bool(EMULATION.search(file.name))] += _code_lines(file.read_text())
+    assert lines[False] <= 1700
+    assert lines[True] <= 1500
 
 
 def test_the_core_does_not_import_what_stands_on_it() -> None:
-    above = {"experiments", "conformance", "lessons", "report", "cli"}
+    above = {"probes", "experiments", "conformance", "lessons", "report", "cli"}
     package = ROOT / "statemachine"
     for name in CORE:
         for file in [package / name] if name.endswith(".py") else (package / name).glob("*.py"):

@@ -13,7 +13,6 @@ from ..engines import require
 from ..errors import BadInputError, MissingEngineError, unknown_name
 from ..interface import Model
 from ..models import resolve
-from ..records import Alone, Term, WayBack
 
 
 class Loader(Protocol):
@@ -22,42 +21,17 @@ class Loader(Protocol):
     def __call__(self, path: os.PathLike[str], defaults: Literal["model", "engine"]) -> Model: ...
 
 
-class Probe(Protocol):
-    """What a probe module offers: the engine itself, without its adapter."""
-
-    def terms(self, model: Model) -> tuple[Term, ...]:
-        """What the engine calls the things of the interface."""
-        ...
-
-    def left_alone(self, model: Model, seconds: float, joint: int) -> tuple[Alone, ...]:
-        """A joint of a freshly loaded model that nobody commands."""
-        ...
-
-    def ways_back(self, model: Model) -> tuple[WayBack, ...]:
-        """Which of the engine's own ways to go back is exact."""
-        ...
-
-
 @dataclass(frozen=True)
 class Backend:
-    """Where a backend lives: "package.module:function", and the engine it needs.
-
-    `probe` names a module that looks at the raw engine, where that differs from the
-    interface; see `Probe`.
-    """
+    """Where a backend lives: "package.module:function", and the engine it needs."""
 
     loader: str
     engine: str | None = None
-    probe: str | None = None
 
 
 _BACKENDS: dict[str, Backend] = {
     "mujoco": Backend("statemachine.backends.mujoco_backend:load", engine="mujoco"),
-    "pybullet": Backend(
-        "statemachine.backends.pybullet_backend:load",
-        engine="pybullet",
-        probe="statemachine.backends.pybullet_probe",
-    ),
+    "pybullet": Backend("statemachine.backends.pybullet_backend:load", engine="pybullet"),
 }
 
 
@@ -74,14 +48,6 @@ def backend_engine(name: str) -> str | None:
         UnknownNameError: There is no such backend.
     """
     return _find(name).engine
-
-
-def probe(model: Model) -> Probe | None:
-    """What looks at the raw engine of a Model; None where the interface is the engine's own."""
-    entry = _BACKENDS.get(model.backend)
-    if entry is None or entry.probe is None:
-        return None
-    return cast("Probe", importlib.import_module(entry.probe))
 
 
 def register(name: str, loader: str) -> None:

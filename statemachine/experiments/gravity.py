@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..backends import probe
 from ..interface import Model
-from ..records import Alone, Array, JointType
+from ..probes import Alone, probe
+from ..records import Array, JointType
 from ..verbs import forward, make_data, step
 from ._common import (
     Forces,

@@ -9,11 +9,11 @@ from typing import Literal
 
 import numpy as np
 
-from ..backends import probe
 from ..checks import as_count
 from ..errors import BadInputError, unknown_name
 from ..interface import Data, Model
-from ..records import Array, Ints, JointType, WayBack
+from ..probes import WayBack, probe
+from ..records import Array, Ints, JointType
 from ..verbs import get_state, make_data, reset, set_state, step
 from ._common import Progress, Provenance, body_pairs, command, provenance, silent
 

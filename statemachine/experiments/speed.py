@@ -5,9 +5,10 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-from ..backends import load, probe
+from ..backends import load
 from ..checks import as_count
 from ..interface import Data, Model
+from ..probes import probe
 from ..verbs import make_data, reset, step
 from ._common import Progress, Provenance, provenance, silent
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..backends import probe
 from ..interface import Model
-from ..records import JointType, Term
+from ..probes import Term, probe
+from ..records import JointType
 from ..verbs import make_data, reset
 from ._common import Provenance, provenance
 

@@ -16,7 +16,7 @@ def page(results: Mapping[str, fingertip.Certificate]) -> Page:
     first = next(iter(results.values()))
     seed = first.provenance.seed
     pinocchio = first.provenance.versions["pinocchio"]
-    digits = 6 if len(results) == 1 else 5  # so that two columns fit
+    digits = 6 if len(results) == 1 else 4  # so that two columns fit
     blocks: list[Any] = [
         Text(
             f"The engine computes where the fingertip ({first.site}) is, by forward; Pinocchio "

@@ -36,7 +36,9 @@ def page(results: Mapping[str, forward.Forward]) -> Page:
         ),
     ]
     twins = {index for result in results.values() for pair in result.equal for index in pair}
-    headers = [f"{name} [m]" for name in results] if len(results) > 1 else ["fingertip [m]"]
+    several = len(results) > 1
+    headers = [f"{name} [m]" for name in results] if several else ["fingertip [m]"]
+    digits = 3 if several else 4  # so that two columns fit
     blocks.append(
         Table(
             ("", "after", *headers, "data.time"),
@@ -44,7 +46,7 @@ def page(results: Mapping[str, forward.Forward]) -> Page:
                 (
                     str(i + 1),
                     reading.after,
-                    *(vector(result.readings[i].fingertip) for result in results.values()),
+                    *(vector(r.readings[i].fingertip, digits) for r in results.values()),
                     f"{reading.time:g} s",
                 )
                 for i, reading in enumerate(first.readings)

@@ -25,7 +25,7 @@ with mujoco.Renderer(model, 32, 32) as renderer:
 _PATIENCE = 60  # seconds for a probe; a software renderer starts slowly
 _ROLES = {
     "mujoco": "runs every lesson",
-    "pybullet": "for a backend to come; no lesson needs it yet",
+    "pybullet": "the second engine of every lesson",
     "pinocchio": "the witness of `statemachine fingertip`",
 }
 

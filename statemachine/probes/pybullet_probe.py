@@ -13,10 +13,11 @@ from typing import cast
 
 import numpy as np
 
+from ..backends._bullet_world import Tree, World, pb
+from ..backends.pybullet_backend import PybulletModel
 from ..interface import Model
-from ..records import Alone, Array, Term, WayBack
-from ._bullet_world import Tree, World, pb
-from .pybullet_backend import PybulletModel
+from ..records import Array
+from . import Alone, Term, WayBack
 
 _STEPS = 100  # before a state is taken, and after
 
