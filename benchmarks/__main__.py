@@ -102,15 +102,23 @@ def kinematics(name: str, rounds: int) -> list[Ratio]:
     )
 
 
+_AIR = [0.0, -0.3, 0.6, 0.3, 0.0, 0.6]
+_FLOOR = [0.0, -0.6, 1.2, 0.5, 0.0, 0.6]  # of `lesson hold`, where the finger meets the floor
+
+
 def emulation(name: str, rounds: int) -> list[Ratio]:
     """A step of the emulated arm on PyBullet against the engine's own idiom in that world.
 
-    Both hold the same pose. Nothing derived is read, and then poses and contacts are.
+    All hold one pose, on the floor and in the air. Nothing derived is read; then the
+    fingertip is, in each step.
     """
+    return [*_emulation(name, rounds, "floor", _FLOOR), *_emulation(name, rounds, "air", _AIR)]
+
+
+def _emulation(name: str, rounds: int, where: str, target: list[float]) -> list[Ratio]:
+    model = sm.load(name, backend="pybullet")
     import pybullet
 
-    model = sm.load(name, backend="pybullet")
-    target = [0.0, -0.3, 0.6, 0.3, 0.0, 0.6]
     ours, read, theirs = (sm.make_data(model) for _ in range(3))
     for data in (ours, read, theirs):
         data.ctrl[:] = target
@@ -138,11 +146,8 @@ def emulation(name: str, rounds: int) -> list[Ratio]:
             sm.step(model, read)
             _ = read.site_xpos
 
-    return interleaved(
-        engine,
-        {f"PyBullet, {name}": emulated, f"PyBullet, site_xpos read, {name}": reading},
-        rounds,
-    )
+    label = f"PyBullet, {name}, {where}"
+    return interleaved(engine, {label: emulated, f"{label}, tip read": reading}, rounds)
 
 
 # What DESIGN asks of each: at most this, measured on a quiet machine.
@@ -153,7 +158,6 @@ BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None]] = [
     (control_loop, "so101", 1.0),
     (kinematics, "so101", 0.8),
     (emulation, "so101/scene", 1.8),
-    (emulation, "so101/scene_box", 1.8),
 ]
 
 
@@ -167,7 +171,8 @@ def main() -> None:
     for measure, name, budget in BUDGET:
         for ratio in measure(name, rounds):
             spread = f"{ratio.low:.3f} to {ratio.high:.3f}"
-            limit = "" if budget is None or "null" in ratio.name else f"{budget:.3f}"
+            free = "null" in ratio.name or "tip read" in ratio.name
+            limit = "" if budget is None or free else f"{budget:.3f}"
             over = "  over" if limit and ratio.median > float(limit) else ""
             print(f"{ratio.name:44}{ratio.median:8.3f}{spread:>18}{limit:>8}{over}")
 

@@ -34,7 +34,7 @@ ENGINES = {
             name="mujoco",
             module="mujoco",
             distribution="mujoco",
-            wheels="Linux, macOS and Windows",
+            wheels="Linux, Windows, and macOS on Apple silicon",
             probe="MjModel",
         ),
         Engine(
