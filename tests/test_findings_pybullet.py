@@ -1,0 +1,267 @@
+"""What PyBullet does, that our backend relies on: when the engine changes, these notice.
+
+Everything here is the raw engine; nothing goes through our adapter, except the worlds that
+it builds, which are looked at with PyBullet's own functions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from statemachine.models import resolve
+
+from .conftest import need_engine
+
+BOX = (
+    '<robot name="b"><link name="base"><inertial><origin xyz="0.1 0 0" rpy="0 0 0.3"/>'
+    '<mass value="2"/><inertia ixx="1" ixy="0" ixz="0" iyy="2" iyz="0" izz="3"/></inertial>'
+    '<collision><geometry><box size="0.4 0.4 0.4"/></geometry></collision></link></robot>'
+)
+ARM = (
+    '<robot name="a"><link name="world"/><link name="one"><inertial><origin xyz="0.2 0 0"/>'
+    '<mass value="1"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.03"/>'
+    '</inertial></link><joint name="j" type="continuous"><parent link="world"/>'
+    '<child link="one"/><axis xyz="0 1 0"/>{dynamics}</joint></robot>'
+)
+
+
+@pytest.fixture
+def pb() -> Any:
+    """The engine, imported without its banner."""
+    need_engine("pybullet")
+    import pybullet
+
+    return pybullet
+
+
+@pytest.fixture
+def client(pb: Any) -> Iterator[int]:
+    number = pb.connect(pb.DIRECT)
+    yield number
+    pb.disconnect(number)
+
+
+Load = Callable[..., int]
+
+
+@pytest.fixture
+def load(pb: Any, client: int, tmp_path: Path) -> Load:
+    """Load a URDF text with the inertias that it states."""
+
+    def run(text: str, fixed: bool = True, name: str = "x.urdf", **more: Any) -> int:
+        file = tmp_path / name
+        file.write_text(text)
+        return pb.loadURDF(
+            str(file),
+            useFixedBase=fixed,
+            flags=pb.URDF_USE_INERTIA_FROM_FILE,
+            physicsClientId=client,
+            **more,
+        )
+
+    return run
+
+
+def test_a_fresh_world_has_no_gravity_and_240_steps_a_second(
+    pb: Any, client: int, load: Load
+) -> None:
+    body = load(BOX, fixed=False)
+    parameters = pb.getPhysicsEngineParameters(client)
+    assert parameters["gravityAccelerationZ"] == 0
+    assert parameters["fixedTimeStep"] == pytest.approx(1 / 240)
+    friction = pb.getDynamicsInfo(body, -1, client)[1]
+    assert friction == 0.5
+
+
+def test_a_fresh_joint_has_a_motor(pb: Any, client: int, load: Load) -> None:
+    """It holds against gravity; switched off, the joint falls."""
+    body = load(ARM.format(dynamics=""))
+    pb.setGravity(0, 0, -9.81, client)
+    pb.stepSimulation(client)
+    held = pb.getJointState(body, 0, client)
+    assert abs(held[1]) < 1e-4
+    assert abs(held[3]) > 1.9  # m·g·r = 1.96 N·m
+    pb.setJointMotorControl2(body, 0, pb.VELOCITY_CONTROL, force=0, physicsClientId=client)
+    pb.stepSimulation(client)
+    assert abs(pb.getJointState(body, 0, client)[1]) > 0.01
+
+
+def test_bodies_are_damped_until_told_otherwise(pb: Any, client: int, load: Load) -> None:
+    body = load(BOX, fixed=False)
+    speeds = []
+    for _ in range(2):
+        pb.resetBaseVelocity(body, (1, 0, 0), (0, 0, 0), client)
+        pb.stepSimulation(client)
+        speeds.append(pb.getBaseVelocity(body, client)[0][0])
+        pb.changeDynamics(body, -1, linearDamping=0, angularDamping=0, physicsClientId=client)
+    # 0.04, and taken off twice in a step.
+    assert speeds[0] == pytest.approx(1 - 2 * 0.04 / 240, abs=1e-9)
+    assert speeds[1] == 1.0
+
+
+def test_a_damping_that_was_read_cannot_be_taken_back(pb: Any, client: int, load: Load) -> None:
+    """Hence the emulated URDF has none; with changeDynamics alone the joint stays damped."""
+    body = load(ARM.format(dynamics='<dynamics damping="3" friction="0"/>'))
+    pb.changeDynamics(body, 0, jointDamping=0, linearDamping=0, angularDamping=0,
+                      physicsClientId=client)  # fmt: skip
+    pb.setJointMotorControl2(body, 0, pb.VELOCITY_CONTROL, force=0, physicsClientId=client)
+    pb.resetJointState(body, 0, 0, 1.0, client)
+    pb.stepSimulation(client)
+    assert pb.getJointInfo(body, 0, client)[6] == 3
+    assert pb.getJointState(body, 0, client)[1] < 0.9
+
+
+def test_joint_speed_is_clamped_unless_told_otherwise(pb: Any, client: int, load: Load) -> None:
+    body = load(ARM.format(dynamics=""))
+    pb.setJointMotorControl2(body, 0, pb.VELOCITY_CONTROL, force=0, physicsClientId=client)
+    pb.changeDynamics(body, 0, linearDamping=0, angularDamping=0, physicsClientId=client)
+    found = []
+    for _ in range(2):
+        pb.resetJointState(body, 0, 0, 500.0, client)
+        pb.stepSimulation(client)
+        found.append(pb.getJointState(body, 0, client)[1])
+        pb.changeDynamics(body, 0, maxJointVelocity=1e9, physicsClientId=client)
+    assert found[0] == pytest.approx(100)
+    assert found[1] == pytest.approx(500)
+
+
+def test_a_base_is_its_inertial_frame(pb: Any, client: int, load: Load) -> None:
+    """Position of the centre of mass, xyzw, velocities in world axes at the centre of mass."""
+    body = load(BOX, fixed=False)
+    pos, quat = pb.getBasePositionAndOrientation(body, client)
+    assert np.allclose(pos, (0.1, 0, 0), atol=1e-12)
+    assert np.allclose(quat, (0, 0, np.sin(0.15), np.cos(0.15)), atol=1e-12)
+    local = pb.getDynamicsInfo(body, -1, client)[3:5]
+    assert np.allclose(local[0], (0.1, 0, 0), atol=1e-12)
+    assert np.allclose(local[1], quat, atol=1e-12)
+
+
+def test_link_frames_are_single_and_centres_of_mass_double(pb: Any, client: int) -> None:
+    """At the arm's fingertip, over random poses: why sites are links without mass."""
+    from statemachine.backends._bullet_world import World
+
+    raw = mujoco.MjModel.from_xml_path(str(resolve("so101")))
+    data, world = mujoco.MjData(raw), World(raw, "ghost")
+    (tree,) = world.trees
+    random, frame, centre = np.random.default_rng(0), 0.0, 0.0
+    for _ in range(20):
+        data.qpos[:] = random.uniform(*raw.jnt_range.T)
+        mujoco.mj_kinematics(raw, data)
+        world.put(data.qpos, np.zeros(raw.nv))
+        link = tree.tips[raw.site("gripperframe").id]
+        state = pb.getLinkState(
+            tree.body, link, computeForwardKinematics=1, physicsClientId=world.client
+        )
+        tip = data.site("gripperframe").xpos
+        centre = max(centre, float(np.abs(np.subtract(state[0], tip)).max()))
+        frame = max(frame, float(np.abs(np.subtract(state[4], tip)).max()))
+    world.close()
+    assert centre < 1e-14
+    assert 1e-10 < frame < 1e-6
+
+
+def test_dynamics_are_mujocos_given_the_same_inertias(pb: Any) -> None:
+    """Mass matrix and bias of the ghost, in a world that nobody steps."""
+    from statemachine.backends._bullet_world import World
+
+    raw = mujoco.MjModel.from_xml_path(str(resolve("so101")))
+    data, world = mujoco.MjData(raw), World(raw, "ghost")
+    body, random = world.trees[0].body, np.random.default_rng(1)
+    for _ in range(20):
+        data.qpos[:], data.qvel[:] = random.uniform(*raw.jnt_range.T), random.uniform(-2, 2, 6)
+        mujoco.mj_forward(raw, data)
+        full = np.zeros((6, 6))
+        mujoco.mj_fullM(raw, data, full)
+        mass = pb.calculateMassMatrix(body, data.qpos.tolist(), physicsClientId=world.client)
+        bias = pb.calculateInverseDynamics(
+            body, data.qpos.tolist(), data.qvel.tolist(), [0.0] * 6, physicsClientId=world.client
+        )
+        assert np.abs(mass + np.diag(raw.dof_armature) - full).max() < 1e-14
+        assert np.abs(bias - data.qfrc_bias).max() < 1e-14
+    world.close()
+
+
+def test_inverse_dynamics_turns_gravity_with_a_base_that_has_mass(
+    pb: Any, client: int, load: Load
+) -> None:
+    """Hence the emulated arm stands on a link without mass."""
+    turned = ARM.format(dynamics="").replace(
+        '<link name="world"/>',
+        '<link name="world"><inertial><origin xyz="0 0 0" rpy="0 1.5707963 0"/><mass value="1"/>'
+        '<inertia ixx="1" ixy="0" ixz="0" iyy="2" iyz="0" izz="3"/></inertial></link>',
+    )
+    torques = []
+    for name, text in (("a.urdf", ARM.format(dynamics="")), ("b.urdf", turned)):
+        body = load(text, name=name)
+        pb.setGravity(0, 0, -9.81, client)
+        torques.append(
+            pb.calculateInverseDynamics(body, [0.0], [0.0], [0.0], physicsClientId=client)[0]
+        )
+    assert abs(torques[0]) == pytest.approx(1.962, abs=1e-3)
+    assert abs(torques[1]) < 0.1
+
+
+def test_after_a_step_contacts_are_those_of_before(pb: Any, client: int, load: Load) -> None:
+    shape = pb.createCollisionShape(pb.GEOM_PLANE, physicsClientId=client)
+    pb.createMultiBody(0, shape, physicsClientId=client)
+    body = load(BOX, fixed=False)
+    pb.setGravity(0, 0, -9.81, client)
+    pb.resetBasePositionAndOrientation(body, (0, 0, 0.199), (0, 0, 0, 1), client)
+    pb.resetBaseVelocity(body, (0, 0, 5), (0, 0, 0), client)
+    pb.stepSimulation(client)
+    points = pb.getContactPoints(physicsClientId=client)
+    assert pb.getBasePositionAndOrientation(body, client)[0][2] > 0.21
+    assert min(point[8] for point in points) == pytest.approx(-0.001, abs=1e-6)
+
+
+def test_a_box_on_a_plane_is_found_one_corner_at_a_time(pb: Any, client: int, load: Load) -> None:
+    """Hence a reset tilts what is free, so that it stands on all its corners at once."""
+    shape = pb.createCollisionShape(pb.GEOM_PLANE, physicsClientId=client)
+    pb.createMultiBody(0, shape, physicsClientId=client)
+    body = load(BOX.replace('0.3"/>', '0"/>'), fixed=False)
+    pb.resetBasePositionAndOrientation(body, (0, 0, 0.2), (0, 0, 0, 1), client)
+    pb.performCollisionDetection(client)
+    assert len(pb.getContactPoints(physicsClientId=client)) == 1
+    for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1)):
+        tilted = np.array([x * 5e-4, y * 5e-4, 0, 1])
+        pb.resetBasePositionAndOrientation(body, (0, 0, 0.2), tilted.tolist(), client)
+        pb.performCollisionDetection(client)
+    assert len(pb.getContactPoints(physicsClientId=client)) == 4
+
+
+def test_files_are_cached_until_told_otherwise(pb: Any, client: int, load: Load) -> None:
+    masses = []
+    for caching in (1, 0):
+        pb.setPhysicsEngineParameter(enableFileCaching=caching, physicsClientId=client)
+        for mass in ("2", "5"):
+            text = BOX.replace('mass value="2"', f'mass value="{mass}"')
+            body = load(text, fixed=False, name=f"cached{caching}.urdf")
+            masses.append(pb.getDynamicsInfo(body, -1, client)[0])
+    assert masses[2:] == [2, 5]
+    # What the cache serves is the engine's business; ours is that it is off.
+    assert masses[:2] in ([2, 2], [2, 5])
+
+
+def test_friction_of_a_pair_is_the_product(pb: Any, client: int, load: Load) -> None:
+    """A box pushed along the floor is held by mu_1 · mu_2 · m · g, and no more."""
+    shape = pb.createCollisionShape(pb.GEOM_PLANE, physicsClientId=client)
+    floor = pb.createMultiBody(0, shape, physicsClientId=client)
+    body = load(BOX.replace('xyz="0.1 0 0"', 'xyz="0 0 0"'), fixed=False)
+    pb.changeDynamics(body, -1, linearDamping=0, lateralFriction=0.5, physicsClientId=client)
+    pb.changeDynamics(floor, -1, lateralFriction=0.6, physicsClientId=client)
+    pb.setGravity(0, 0, -10, client)
+    pb.resetBasePositionAndOrientation(body, (0, 0, 0.2), (0, 0, 0, 1), client)
+    for _ in range(60):
+        pb.stepSimulation(client)
+    pb.resetBaseVelocity(body, (1, 0, 0), (0, 0, 0), client)
+    before = pb.getBaseVelocity(body, client)[0][0]
+    for _ in range(24):
+        pb.stepSimulation(client)
+    slowed = (before - pb.getBaseVelocity(body, client)[0][0]) / 0.1
+    assert slowed == pytest.approx(0.3 * 10, rel=0.05)
