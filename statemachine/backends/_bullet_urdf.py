@@ -35,8 +35,7 @@ class Dialect:
         looks: Write <visual> elements.
         folder: Write the names of meshes relative to it; absolute without it.
         solids: Write <collision> elements.
-        dynamics: Write the ranges, damping and dry friction of the joints. PyBullet keeps
-            a damping that it has read, whatever changeDynamics says later.
+        dynamics: Write the ranges, damping and dry friction of the joints.
         anchored: Fix the root to a massless link "world", at its place. PyBullet's
             inverse dynamics takes gravity in the principal axes of a fixed base, which
             is gravity in another direction unless the base has no mass.
