@@ -57,15 +57,19 @@ class Shared:
         self.raw = raw
         self.kind: Literal["stepped", "engine"] = kind
         self.lock = threading.RLock()
+        self._ghost: World | None = None
         self._still_joints = np.zeros(raw.nv)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Shared, (self.raw, self.kind)
 
-    @cached_property
+    @property
     def ghost(self) -> World:
         """The true arm in a client that is never stepped: kinematics and dynamics."""
-        return World(self.raw, "ghost")
+        with self.lock:  # for two threads that make the first Data at once
+            if self._ghost is None:
+                self._ghost = World(self.raw, "ghost")
+            return self._ghost
 
     @cached_property
     def still(self) -> tuple[Array, Array, Array, Array]:
@@ -251,6 +255,7 @@ class Machine:
         self._derived: dict[str, Any] = {}
 
     def _place(self, observed: Observed | None = None) -> None:
+        self._known, self._lives = (b"", b""), False  # until all is in its place
         place = self.world.put if self._shared.kind == "engine" else self.world.place
         place(self.qpos, self.qvel)
         for arm, known in zip(self._arms, observed or self._unobserved, strict=True):
@@ -260,10 +265,11 @@ class Machine:
 
     def _heed(self) -> None:
         """Take the command as it is now."""
+        self._commanded = b"?"  # until every arm knows
         self._ctrl = self.ctrl.copy()
-        self._commanded = self.ctrl.tobytes()
         for arm in self._arms:
             arm.command(self._ctrl)
+        self._commanded = self._ctrl.tobytes()
 
     def run(self, nstep: int = 1) -> None:
         """Advance by `nstep` timesteps; all of it or, if anything is raised, nothing."""
