@@ -21,7 +21,8 @@ def silence() -> Iterator[list[str]]:
     descriptors catches that. It concerns the whole process, for as long as it lasts.
     """
     lines: list[str] = []
-    with _LOCK, tempfile.TemporaryFile() as caught:
+    with _LOCK, tempfile.TemporaryFile() as file:
+        caught = apart(file.fileno())  # which may have come where stdout would be
         for stream in (sys.stdout, sys.stderr):
             with suppress(AttributeError, ValueError, OSError):  # none, closed, or a broken pipe
                 stream.flush()
@@ -29,15 +30,25 @@ def silence() -> Iterator[list[str]]:
         kept = {fd: copy for fd in (1, 2) if (copy := _duplicate(fd)) is not None}
         try:
             for fd in kept:
-                os.dup2(caught.fileno(), fd)
+                os.dup2(caught, fd)
             yield lines
         finally:
             _flush()
             for fd, copy in kept.items():
                 os.dup2(copy, fd)
                 os.close(copy)
-            caught.seek(0)
-            lines += caught.read().decode(errors="replace").splitlines()
+            os.close(caught)
+            file.seek(0)
+            lines += file.read().decode(errors="replace").splitlines()
+
+
+def apart(fd: int) -> int:
+    """A duplicate of a descriptor that is none of stdin, stdout and stderr."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        return os.dup(fd)
+    return fcntl.fcntl(fd, fcntl.F_DUPFD_CLOEXEC, 3)
 
 
 def _duplicate(fd: int) -> int | None:

@@ -220,8 +220,7 @@ class Machine:
 
     def _open(self) -> None:
         raw, shared = self._shared.raw, self._shared
-        self._used = False
-        self.world = world = World(raw, shared.kind)
+        world = World(raw, shared.kind)
         trees = [tree for tree in world.trees if tree.joints]
         self._free = [tree for tree in world.trees if tree.free]
         self._arms: list[Any]
@@ -230,6 +229,7 @@ class Machine:
         else:
             self._arms = [Arm(world, tree, shared.ghost, Law(raw, tree)) for tree in trees]
         self._unobserved = [(arm.nothing, arm.nothing) for arm in self._arms]
+        self.world, self._used, self._driven = world, False, False
 
     def close(self) -> None:
         """Give the world back."""
@@ -245,8 +245,9 @@ class Machine:
     ) -> None:
         """Take a state whole; nothing of before has any part in what follows."""
         if self._used and self._shared.kind == "engine":
-            self.world.close()  # only one that is loaded anew starts alike
+            old = self.world  # only one that is loaded anew starts alike
             self._open()
+            old.close()
         self.time, self.qpos[:], self.qvel[:], self.ctrl[:] = time, qpos, qvel, ctrl
         self._place(observed)
         self._heed()
@@ -255,13 +256,17 @@ class Machine:
         self._derived: dict[str, Any] = {}
 
     def _place(self, observed: Observed | None = None) -> None:
-        self._known, self._lives = (b"", b""), False  # until all is in its place
+        self._astray, self._lives = True, False  # until all is in its place
+        if self._driven:  # it was interrupted: let go of what it was driven with
+            pb.stepSimulation(self.world.client)
+            self._driven = False
         place = self.world.put if self._shared.kind == "engine" else self.world.place
         place(self.qpos, self.qvel)
         for arm, known in zip(self._arms, observed or self._unobserved, strict=True):
             arm.place(self.qpos, self.qvel, *known)
         self._last_qpos, self._last_qvel = self.qpos.copy(), self.qvel.copy()
         self._known = self.qpos.tobytes(), self.qvel.tobytes()
+        self._astray = False
 
     def _heed(self) -> None:
         """Take the command as it is now."""
@@ -279,23 +284,28 @@ class Machine:
         if self.ctrl.tobytes() != self._commanded:
             check_entries(self.ctrl, "ctrl", self._label)
             self._heed()
-        if self._known != (self.qpos.tobytes(), self.qvel.tobytes()):
+        if self._written:
             check_entries(self.qpos, "qpos", self._label)
             check_entries(self.qvel, "qvel", self._label)
             self._check_qpos(self.qpos)
             self._place()
-        self._used = True
+        elif self._astray:
+            self._place(self._observed)
+        self._used, start = True, self._observed
         try:
             time = self._several(steps - 1, self.time)
             before = self._read() if steps > 1 else (self._last_qpos, self._last_qvel)
-            moment = Moment(*before, self._ctrl, self._observed)
+            observed = start if steps == 1 else self._observed
+            moment = Moment(*before, self._ctrl, observed)
             time = self._several(1, time)
             qpos, qvel = self._read()
             if self._free and not (qpos.dot(qpos) < _MANY and qvel.dot(qvel) < _MANY):
                 self._diverge(time)
         except BaseException:
-            self._known = b"", b""  # the engine is elsewhere: start from the arrays again
-            self._lives = False
+            # The engine is elsewhere now; the arrays are not, nor is what else is known.
+            self._astray, self._lives = True, False
+            for arm, known in zip(self._arms, start, strict=True):
+                arm.place(self.qpos, self.qvel, *known)
             raise
         self.qpos[:], self.qvel[:], self.time = qpos, qvel, time
         self._last_qpos, self._last_qvel = qpos, qvel
@@ -307,6 +317,8 @@ class Machine:
         for _ in range(steps):
             self._once()
             time += self._timestep
+            for tree in self._free:
+                self.world.follow(tree.body)
             for arm in self._arms:
                 arm.read()
                 if not arm.angles.dot(arm.angles) + arm.speed.dot(arm.speed) < _MANY:
@@ -314,9 +326,11 @@ class Machine:
         return time
 
     def _once(self, settled: bool = False) -> None:
+        self._driven = True  # torques add up until a step takes them
         for arm in self._arms:
             arm.drive(settled)
         pb.stepSimulation(self.world.client)
+        self._driven = False
 
     def _read(self) -> tuple[Array, Array]:
         """Where the engine is: new arrays qpos and qvel."""
@@ -324,7 +338,7 @@ class Machine:
         for arm in self._arms:
             qpos[arm.tree.qpos], qvel[arm.tree.qvel] = arm.angles, arm.speed
         for tree in self._free:
-            qpos[tree.qpos], qvel[tree.qvel] = self.world.read_free(tree, self._last_qpos)
+            qpos[tree.qpos], qvel[tree.qvel] = self.world.read_free(tree)
         return qpos, qvel
 
     def _diverge(self, time: float) -> None:
@@ -342,16 +356,19 @@ class Machine:
                 )
 
     @property
+    def _written(self) -> bool:
+        """Whether qpos or qvel is no longer what it was left at."""
+        return self._known != (self.qpos.tobytes(), self.qvel.tobytes())
+
+    @property
     def _observed(self) -> Observed:
         return [(arm.contact, arm.friction) for arm in self._arms]
 
     @property
     def present(self) -> Moment:
         """All that decides the future but the time."""
-        if self._known == (self.qpos.tobytes(), self.qvel.tobytes()):
-            observed = self._observed
-        else:  # what was observed belongs to another state
-            observed = self._unobserved
+        # After a write, what was observed belongs to another state.
+        observed = self._unobserved if self._written else self._observed
         return Moment(self.qpos.copy(), self.qvel.copy(), self.ctrl.copy(), observed)
 
     def forward(self) -> None:

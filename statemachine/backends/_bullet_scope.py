@@ -70,6 +70,8 @@ def _joints(raw: mujoco.MjModel) -> Found:
             for what in ("armature", "damping", "frictionloss"):
                 if getattr(raw, f"dof_{what}")[own].any():
                     yield f"{what} of a free joint", f"joint {name} has it"
+            if raw.jnt_stiffness[j]:
+                yield "stiffness of a free joint", f"joint {name} has it"
         elif raw.qpos0[raw.jnt_qposadr[j]]:
             yield "joint ref", f"the zero of joint {name} is not that of the file's pose"
         for what, values in (

@@ -23,7 +23,7 @@ from ..engines import require
 from ..errors import EngineError, ModelError
 from ..records import Array
 from ..rotations import matrix_from_quat, xyzw_from_wxyz
-from ..silence import silence
+from ..silence import apart, silence
 from . import _bullet_urdf as urdf
 from ._mjcf import gravity
 
@@ -133,6 +133,7 @@ class World:
             for tree in self.trees
             if tree.free
         }
+        self._last: dict[int, Quat] = dict.fromkeys(self._frames, (0.0, 0.0, 0.0, 1.0))
 
     def close(self) -> None:
         """Give the client back."""
@@ -301,19 +302,28 @@ class World:
         arm, spin = turn @ centre, turn @ qvel[3:]
         pose = _times(xyzw_from_wxyz(quat).tolist(), axes)
         where, speed = qpos[:3] + arm, qvel[:3] + np.cross(spin, arm)
+        self._last[body] = pose
         pb.resetBasePositionAndOrientation(body, where.tolist(), pose, self.client)
         pb.resetBaseVelocity(body, speed.tolist(), spin.tolist(), self.client)
 
-    def read_free(self, tree: Tree, near: Array) -> tuple[list[float], list[float]]:
-        """What of qpos (7,) and qvel (6,) is a free body's, in MuJoCo's conventions.
+    def follow(self, body: int) -> tuple[Any, Quat]:
+        """Where a base is; of a quaternion and its negative the one nearer to the last.
 
-        Args:
-            tree: The body.
-            near: qpos of before: of a quaternion and its negative, which are one rotation,
-                the nearer one is taken.
+        They are one rotation. The engine changes between them at will, MuJoCo never:
+        to be told after each step, so that a body that turns far keeps its sign.
         """
+        where, quat = pb.getBasePositionAndOrientation(body, self.client)
+        x, y, z, w = quat
+        nx, ny, nz, nw = self._last[body]
+        if x * nx + y * ny + z * nz + w * nw < 0:
+            quat = (-x, -y, -z, -w)
+        self._last[body] = quat
+        return where, quat
+
+    def read_free(self, tree: Tree) -> tuple[list[float], list[float]]:
+        """What of qpos (7,) and qvel (6,) is a free body's, in MuJoCo's conventions."""
         centre, (ax, ay, az, aw) = self._frames[tree.body]
-        (px, py, pz), pose = pb.getBasePositionAndOrientation(tree.body, self.client)
+        (px, py, pz), pose = self.follow(tree.body)
         (vx, vy, vz), spin = pb.getBaseVelocity(tree.body, self.client)
         quat = pose
         if aw != 1 or any(centre):  # else the frames are one
@@ -325,9 +335,6 @@ class World:
             vx, vy, vz = vx - wy * rz + wz * ry, vy - wz * rx + wx * rz, vz - wx * ry + wy * rx
         x, y, z, w = quat
         spin = _turned((-x, -y, -z, w), spin)
-        nw, nx, ny, nz = near[tree.qpos][3:].tolist()
-        if w * nw + x * nx + y * ny + z * nz < 0:
-            x, y, z, w = -x, -y, -z, -w
         return [px, py, pz, w, x, y, z], [vx, vy, vz, *spin]
 
     def link_states(self, tree: Tree) -> list[Any]:
@@ -389,7 +396,11 @@ def _as_file(text: str) -> Iterator[str]:
         with open(os.memfd_create("urdf"), "wb") as file:
             file.write(text.encode())
             file.flush()
-            yield f"/proc/self/fd/{file.fileno()}"
+            fd = apart(file.fileno())  # silence takes the places of stdout and stderr
+            try:
+                yield f"/proc/self/fd/{fd}"
+            finally:
+                os.close(fd)
         return
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.urdf"

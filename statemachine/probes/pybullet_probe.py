@@ -254,5 +254,5 @@ def _state(world: World, model: Model) -> tuple[Array, Array]:
             states = pb.getJointStates(tree.body, tree.joints, world.client)
             qpos[tree.qpos], qvel[tree.qvel] = [s[0] for s in states], [s[1] for s in states]
         if tree.free:
-            qpos[tree.qpos], qvel[tree.qvel] = world.read_free(tree, qpos)
+            qpos[tree.qpos], qvel[tree.qvel] = world.read_free(tree)
     return qpos, qvel

@@ -1,0 +1,1154 @@
+"""What is particular to the PyBullet backend: how near it comes, and what it must not lose."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import hashlib
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.errors import (
+    BadInputError,
+    DivergedError,
+    EngineError,
+    UnknownNameError,
+    UnsupportedError,
+)
+from statemachine.records import DERIVED
+from statemachine.rotations import matrix_from_quat
+from statemachine.silence import silence
+
+from .conftest import ROOT, need_engine
+
+Golden = Callable[[str], np.ndarray]
+HOLD = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
+LIFT = 1  # the place of shoulder_lift
+linux = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc, or forks")
+posix = pytest.mark.skipif(os.name != "posix", reason="signals and descriptors of POSIX")
+
+
+@pytest.fixture(autouse=True)
+def _engine() -> None:
+    need_engine("pybullet")
+
+
+def load(name: str | Path, **options: Any) -> sm.Model:
+    model = sm.load(name, backend="pybullet")
+    return model.replace(**options) if options else model
+
+
+def mjcf(folder: Path, inside: str, name: str = "m.xml") -> Path:
+    file = folder / name
+    file.write_text(f"<mujoco model='m'>{inside}</mujoco>")
+    return file
+
+
+def run(
+    model: sm.Model, ctrl: tuple[float, ...], steps: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """qpos before and after every step, and how many contacts each step began with."""
+    with sm.make_data(model) as data:
+        data.ctrl = ctrl
+        poses, counts = [data.qpos.copy()], []
+        for _ in range(steps):
+            sm.step(model, data)
+            poses.append(data.qpos.copy())
+            counts.append(len(data.contacts))
+    return np.array(poses), np.array(counts), np.degrees(np.array(poses)[:, LIFT])
+
+
+def angles(table: np.ndarray) -> np.ndarray:
+    return np.stack([table[f"q{i}_rad"] for i in range(6)], axis=1)
+
+
+def digest(model: sm.Model, data: sm.Data, steps: int, seed: int) -> str:
+    """A hash of all that happens in so many steps under a ctrl that wanders."""
+    random, found = np.random.default_rng(seed), hashlib.sha256()
+    low, high = model.actuator_ctrlrange.T
+    for _ in range(steps):
+        data.ctrl = np.clip(data.ctrl + random.normal(scale=0.03, size=model.nu), low, high)
+        sm.step(model, data)
+        found.update(data.qpos.tobytes() + data.qvel.tobytes())
+    found.update(sm.get_state(model, data).blob)
+    return found.hexdigest()
+
+
+def derived(data: sm.Data) -> dict[str, np.ndarray]:
+    """Copies of everything derived, every part of the contacts too."""
+    contacts = data.contacts
+    parts = ("geom", "dist", "pos", "frame", "force", "torque")
+    found = {f"contacts.{part}": np.array(getattr(contacts, part)) for part in parts}
+    return found | {name: np.array(getattr(data, name)) for name in DERIVED}
+
+
+def same(one: dict[str, np.ndarray], two: dict[str, np.ndarray]) -> None:
+    assert one.keys() == two.keys()
+    for name, array in one.items():
+        assert np.array_equal(array, two[name]), name
+
+
+def python(
+    code: str, folder: Path, *arguments: str, shell: str = "", **environment: str
+) -> subprocess.CompletedProcess[str]:
+    """Run a text in a process of its own, by way of a shell's redirection if one is given."""
+    command = [sys.executable, "-c", code, *arguments]
+    if shell:
+        command = ["/bin/sh", "-c", f'exec "$0" "$@" {shell}', *command]
+    return subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+        check=False,
+    )
+
+
+# How near it comes to MuJoCo, at the 5 ms of the model.
+
+
+def test_droop_under_servos(golden: Golden) -> None:
+    poses, counts, lift = run(load("so101/scene"), (0.0,) * 6, 800)
+    assert not counts.any()
+    # 0.5694 N·m over kp 998.22 is 0.0327°; 0.002° is a sixteenth of it.
+    assert np.abs(lift[[200, 400, 600, 800]] - 0.033).max() < 0.002
+    # 0.0023° was measured on the way there.
+    assert np.abs(np.degrees(poses - angles(golden("golden_gravity_on")))).max() < 0.005
+
+
+def test_hold_before_its_first_contact(golden: Golden) -> None:
+    poses, counts, _ = run(load("so101/scene"), HOLD, 53)
+    assert not counts.any()
+    expected = angles(golden("golden_hold"))[:54]
+    assert np.abs(np.degrees(poses - expected)).max() < 0.1  # 0.02 was measured
+
+
+def hold_error() -> float:
+    """Worst joint error against MuJoCo in 4 s of the bare arm [deg]."""
+    poses, counts, _ = run(load("so101"), HOLD, 800)
+    expected, _, _ = run(sm.load("so101"), HOLD, 800)
+    assert not counts.any()
+    return float(np.abs(np.degrees(poses - expected)).max())
+
+
+def test_hold_of_the_bare_arm() -> None:
+    assert hold_error() < 0.1  # 0.032 was measured
+
+
+def test_fall_without_servos_before_the_floor(golden: Golden) -> None:
+    poses, counts, _ = run(load("so101/scene", actuation=False), (0.0,) * 6, 40)
+    assert not counts.any()
+    expected = angles(golden("golden_gravity_off"))[:41]
+    assert np.abs(np.degrees(poses - expected)).max() < 0.05  # 0.0002 was measured
+
+
+def test_fallen_arm_on_the_floor(golden: Golden) -> None:
+    _, counts, lift = run(load("so101/scene", actuation=False), (0.0,) * 6, 800)
+    assert counts[-1] > 0
+    expected = np.degrees(angles(golden("golden_gravity_off"))[:, LIFT])
+    times = [200, 400, 600, 800]
+    assert np.abs(lift[times] - expected[times]).max() < 0.15  # 0.08 was measured
+
+
+def test_a_held_box_stays_in_the_jaws() -> None:
+    model = load("so101/scene_box")
+    box, gripper, jaw = (model.body_id(n) for n in ("box", "gripper", "moving_jaw_so101_v1"))
+    places = []
+    with sm.make_data(model) as data:
+        sm.reset(model, data, keyframe=0)
+        data.ctrl[:2] += (0.4, -0.2)
+        for k in range(600):
+            sm.step(model, data)
+            pairs = model.geom_bodyid[data.contacts.geom]
+            touching = set(pairs[(pairs == box).any(axis=1)].ravel().tolist())
+            assert {gripper, jaw} <= touching, f"step {k}"
+            turn = matrix_from_quat(data.xquat[gripper])
+            places.append(turn.T @ (data.xpos[box] - data.xpos[gripper]))
+    slip = np.linalg.norm(np.array(places) - places[0], axis=1)
+    assert slip.max() < 0.0015  # 1.1 mm was measured
+
+
+# Replay.
+
+
+def _from_keyframe(model: sm.Model, steps: int) -> str:
+    with sm.make_data(model) as data:
+        sm.reset(model, data, keyframe=0)
+        return digest(model, data, steps, seed=1)
+
+
+def _from_pickles(model: bytes, state: bytes, steps: int) -> str:
+    made = pickle.loads(model)
+    with sm.make_data(made) as data:
+        sm.set_state(made, data, pickle.loads(state))
+        return digest(made, data, steps, seed=2)
+
+
+@pytest.mark.parametrize("steps", [1_000, pytest.param(20_000, marks=pytest.mark.slow)])
+def test_replays_are_bit_identical(steps: int) -> None:
+    model = load("so101/scene_box")
+    runs = []
+    with sm.make_data(model) as used:
+        for _ in range(2):
+            sm.reset(model, used, keyframe=0)
+            runs.append(digest(model, used, steps, seed=1))
+    runs.append(_from_keyframe(model, steps))
+    copy = pickle.loads(pickle.dumps(model))
+    runs.append(_from_keyframe(copy, steps))
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        runs.append(pool.submit(_from_keyframe, copy, steps).result(timeout=300))
+    assert len(set(runs)) == 1, runs
+
+
+def test_a_state_has_one_future_in_every_process() -> None:
+    model = load("so101/scene_box")
+    with sm.make_data(model) as data:
+        sm.reset(model, data, keyframe=0)
+        digest(model, data, 60, seed=3)
+        assert len(data.contacts) > 0
+        pickles = pickle.dumps(model), pickle.dumps(sm.get_state(model, data))
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        there = pool.submit(_from_pickles, *pickles, 300).result(timeout=120)
+    assert there == _from_pickles(*pickles, 300)
+
+
+def test_nothing_of_before_survives_a_reset() -> None:
+    """Forty histories: with the box in the jaws, thrown about, watched or not."""
+    model = load("so101/scene_box")
+    with sm.make_data(model) as data:
+        sm.reset(model, data, keyframe=0)
+        digest(model, data, 40, seed=4)
+        assert len(data.contacts) > 0
+        state = sm.get_state(model, data)
+        random, low_high = np.random.default_rng(5), model.actuator_ctrlrange.T
+        futures: dict[str, set[str]] = {"keyframe": set(), "state": set()}
+        for history in range(40):
+            sm.reset(model, data, keyframe=int(history % 3 > 0))
+            if history % 4 == 0:
+                data.qpos[6:9] += random.uniform(-0.05, 0.05, 3)
+                data.qvel[6:] = random.uniform(-3, 3, 6)
+            for k in range(int(random.integers(1, 60))):
+                data.ctrl[:] = random.uniform(*low_high)
+                sm.step(model, data, 1 + k % 3)
+                if history % 5 == 0:
+                    sm.forward(model, data)
+                    assert len(data.contacts) >= 0 <= len(data.qacc)
+            if history % 2:
+                sm.reset(model, data, keyframe=0)
+            else:
+                sm.set_state(model, data, state)
+            kind = "keyframe" if history % 2 else "state"
+            futures[kind].add(digest(model, data, 60, seed=6))
+    assert {kind: len(ends) for kind, ends in futures.items()} == {"keyframe": 1, "state": 1}
+
+
+def test_a_turning_body_adds_up_in_bulk(tmp_path: Path) -> None:
+    """Half a turn in one call is half a turn in many: of the two quaternions the same."""
+    one, many = _spun(tmp_path, (1, 20))
+    assert np.array_equal(one, many)
+
+
+def test_a_body_that_turns_far_adds_up_in_bulk(tmp_path: Path) -> None:
+    one, many = _spun(tmp_path, (1, 400))
+    assert np.array_equal(one, many)
+
+
+def _spun(folder: Path, sizes: tuple[int, ...]) -> list[np.ndarray]:
+    """qpos of a ball after 400 steps, three turns, in calls of so many steps."""
+    ball = "<body><freejoint/><geom size='0.1' mass='1'/></body>"
+    model = load(mjcf(folder, f"<option gravity='0 0 0' timestep='.005'/>{_world(ball)}"))
+    ends = []
+    for size in sizes:
+        with sm.make_data(model) as data:
+            data.qvel[3:] = (1.0, 9.0, 3.0)
+            for _ in range(400 // size):
+                sm.step(model, data, size)
+            ends.append(data.qpos.copy())
+    return ends
+
+
+def _world(inside: str) -> str:
+    return f"<worldbody>{inside}</worldbody>"
+
+
+# Other models than the arm.
+
+_I = (
+    '<inertial mass="0.3" pos="0.1 0.02 0.03" quat="0.6 0.1 -0.4 0.3" '
+    'diaginertia="0.003 0.004 0.002"/>'
+)
+ZOO = f"""
+<compiler angle="radian"/><option timestep="0.002" integrator="implicitfast"/>
+<worldbody>
+  <body name="root" pos="0.1 0.2 1.3" euler="0.1 0.2 0.3">{_I}
+    <body name="a" pos="0.1 0.2 0.3" euler="0 1.5707963267948966 0.2">{_I}
+      <joint name="ja" pos="0.05 0.01 0.02" axis="1 2 3" range="-1 2" damping="0.05"
+             armature="0.01" stiffness="0.2" springref="0.1"/>
+      <site name="a" pos="0.3 0.2 0.1" euler="0.3 0.2 0.1"/>
+      <body name="b" pos="0 0 0.5" euler="1 2 3">{_I}
+        <joint name="jb" type="slide" axis="0 1 1" damping="1" armature="0.05"/>
+        <joint name="jb2" axis="1 1 0" pos="0 0.1 0" armature="0.01" damping="0.03"
+               frictionloss="0.02"/>
+        <joint name="jb3" axis="0 0 1" pos="0.2 0 0" armature="0.01"/>
+        <body name="c" pos="0.2 0 0">{_I}<site name="tip" pos="0.1 0.1 0.1"/></body>
+      </body>
+    </body>
+    <body name="d" pos="0 1 0">{_I}
+      <joint name="jd" axis="0 0 1" pos="0.1 0 0" armature="0.02" damping="0.01"/>
+      <site name="end" pos="0 0 1"/>
+    </body>
+  </body>
+  <body name="turnstile" pos="2 2 1" euler="1 0 0">{_I}
+    <joint name="js" axis="0 1 0" pos="0 0 0.1"/><site name="s2" pos="0 0 0.1"/>
+  </body>
+  <body name="fly" pos="-1 -1 3" euler="0.3 0.2 0.1">{_I}
+    <freejoint/><site name="f" pos="0 0.1 0.1"/>
+  </body>
+  <body name="ball" pos="-3 -1 3"><freejoint/><geom size="0.05"/></body>
+  <site name="w" pos="1 2 3"/>
+</worldbody>
+<actuator>
+  <motor joint="jd" gear="2"/>
+  <position joint="ja" kp="3" kv="0.3" ctrlrange="-1 1" forcerange="-2 2"/>
+  <velocity joint="jb" kv="2"/>
+  <position joint="ja" kp="1"/>
+</actuator>"""
+
+
+def zoo(folder: Path, turn: float = 1.0) -> list[tuple[sm.Model, sm.Data]]:
+    """A model with one of everything, in one random state, on MuJoCo and on PyBullet."""
+    file, random = mjcf(folder, ZOO), np.random.default_rng(0)
+    made = []
+    for backend in ("mujoco", "pybullet"):
+        model = sm.load(file, backend=backend)
+        made.append((model, sm.make_data(model)))
+    qpos = made[0][1].qpos.copy()
+    qpos[:5] = random.uniform(-0.5, 0.5, 5)
+    qpos[5] = 0.4
+    for start in (6, 13):
+        quat = random.normal(size=4)
+        qpos[start + 3 : start + 7] = quat / np.linalg.norm(quat)
+    qvel = random.uniform(-1, 1, 18)
+    qvel[15:] *= turn
+    for model, data in made:
+        data.qpos, data.qvel, data.ctrl = qpos, qvel, (0.1, 0.3, -0.2, 0.1)
+        sm.forward(model, data)
+    return made
+
+
+def test_zoo_is_what_mujoco_says(tmp_path: Path) -> None:
+    """Poses and forces of a state are closed forms: 3e-14 is the worst that was measured."""
+    (model, theirs), (_, ours) = zoo(tmp_path)
+    assert len(ours.contacts) == len(theirs.contacts) == 0
+    for name in (*DERIVED[:4], "qfrc_bias", "qfrc_passive", "qfrc_actuator", "qacc"):
+        expected, found = getattr(theirs, name), getattr(ours, name)
+        assert np.abs(expected).max() > 0.01, name
+        if name == "xquat":  # a body's quaternion and its negative are one rotation
+            expected, found = matrix_from_quat(expected), matrix_from_quat(found)
+        assert np.abs(found - expected).max() < 1e-10, name
+    # Dry friction is a sum over sweeps; the joint that has it moves too fast to stick.
+    assert np.abs(ours.qfrc_friction - theirs.qfrc_friction).max() < 1e-6
+    assert not ours.qfrc_limit.any()
+    assert np.abs(ours.qfrc_contact).max() < 1e-10
+    assert model.nu == 4
+
+
+def test_zoo_stays_with_mujoco(tmp_path: Path) -> None:
+    """Over 100 contact-free steps; a quaternion has MuJoCo's sign, for it is compared as is."""
+    pairs = zoo(tmp_path)
+    for _ in range(100):
+        for model, data in pairs:
+            sm.step(model, data)
+    (_, theirs), (_, ours) = pairs
+    gap = np.abs(ours.qpos - theirs.qpos)
+    assert gap[:6].max() < 3e-6  # the joints; 6e-7 was measured
+    assert gap[6:].max() < 2e-5  # free bodies, whose integrators differ; 4e-6 was measured
+
+
+def test_a_fast_ball_has_the_signs_of_mujoco(tmp_path: Path) -> None:
+    """Its quaternion turns through both halves of the sphere, step by step."""
+    pairs = zoo(tmp_path, turn=60.0)
+    signs = set()
+    for _ in range(300):
+        for model, data in pairs:
+            sm.step(model, data)
+        (_, theirs), (_, ours) = pairs
+        signs.add(bool(theirs.qpos[16] > 0))
+        assert ours.qpos[16:20] @ theirs.qpos[16:20] > 0.99
+    assert signs == {True, False}
+
+
+def test_two_free_bodies_are_two(tmp_path: Path) -> None:
+    """Each is loaded from a text of its own, under a name that may be the other's again."""
+    from statemachine.backends._bullet_world import pb
+
+    balls = "".join(
+        f"<body name='b{k}' pos='{k} 0 {radius}'><freejoint/>"
+        f"<geom size='{radius}' mass='{mass}'/></body>"
+        for k, (radius, mass) in enumerate(((0.1, 1.0), (0.2, 3.0)))
+    )
+    model = load(mjcf(tmp_path, _world(f"<geom type='plane' size='5 5 1'/>{balls}")))
+    with sm.make_data(model) as data:
+        free = [tree.body for tree in data.raw.trees if tree.free]
+        masses = [pb.getDynamicsInfo(body, -1, data.raw.client)[0] for body in free]
+        assert masses == [1.0, 3.0]
+        sm.step(model, data, 200)
+        # A millimetre into the floor is more than either sinks.
+        assert np.abs(data.qpos[[2, 9]] - (0.1, 0.2)).max() < 0.001
+
+
+# Noise.
+
+_ALL = """
+import os, sys
+import statemachine as sm
+for defaults in ("model", "engine"):
+    model = sm.load("so101/scene_box", backend="pybullet", defaults=defaults)
+    data = sm.make_data(model)
+    sm.reset(model, data, keyframe=0)
+    sm.step(model, data, 5)
+    assert len(data.contacts) > 0
+    sm.forward(model, data)
+    assert len(data.contacts) > 0 and data.qfrc_bias.any() and data.xpos.any()
+    sm.set_state(model, data, sm.get_state(model, data))
+    sm.step(model, data)
+    sm.reset(model, data)
+    sm.make_data(model)
+    data.close()
+open(sys.argv[1], "w").write("done")
+"""
+
+
+def test_it_prints_nothing(tmp_path: Path) -> None:
+    done = python(_ALL, tmp_path, "mark")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert (tmp_path / "mark").read_text() == "done"
+
+
+_WITHOUT = [
+    "<&- >&- 2>&-",
+    ">&-",
+    "2>&-",
+    ">&- 2>&-",
+]
+
+
+@posix
+@pytest.mark.parametrize("shell", _WITHOUT)
+def test_it_works_without_streams(tmp_path: Path, shell: str) -> None:
+    done = python(_ALL, tmp_path, "mark", shell=shell)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert (tmp_path / "mark").read_text() == "done"
+
+
+@posix
+def test_silence_catches_what_c_prints() -> None:
+    libc = ctypes.CDLL(None)
+    with silence() as lines:
+        os.write(1, b"one\n")
+        os.write(2, b"two\n")
+        libc.puts(b"three")
+        assert lines == []
+    assert sorted(lines) == ["one", "three", "two"]
+
+
+@posix
+def test_silence_gives_the_streams_back(capfd: pytest.CaptureFixture[str]) -> None:
+    before = [os.fstat(fd) for fd in (1, 2)]
+    caught = []
+
+    def fail() -> None:
+        with silence() as lines:
+            caught.append(lines)
+            os.write(1, b"caught\n")
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert caught == [["caught"]]
+    after = [os.fstat(fd) for fd in (1, 2)]
+    assert [(s.st_dev, s.st_ino) for s in after] == [(s.st_dev, s.st_ino) for s in before]
+    os.write(1, b"seen\n")
+    os.write(2, b"seen too\n")
+    assert capfd.readouterr() == ("seen\n", "seen too\n")
+
+
+# Refusals.
+
+_G = '<geom size="0.1" mass="1"/>'
+_JOINT = f'<worldbody><body name="x"><joint name="j"/>{_G}</body></worldbody>'
+REFUSED = {
+    "ball joint": _world(f'<body><joint name="wrist" type="ball"/>{_G}</body>'),
+    "joint ref": _world(f'<body><joint name="wrist" ref="0.3"/>{_G}</body>'),
+    "joint margin": _world(f'<body><joint name="wrist" range="-1 1" margin="0.1"/>{_G}</body>'),
+    "joint actuatorfrcrange": _world(
+        f'<body><joint name="wrist" actuatorfrcrange="-1 1"/>{_G}</body>'
+    ),
+    "mocap body": _world(f'<body name="hand" mocap="true">{_G}</body>'),
+    "equality constraint": f'{_JOINT}<equality><joint joint1="j"/></equality>',
+    "tendon": f'{_JOINT}<tendon><fixed><joint joint="j" coef="1"/></fixed></tendon>',
+    "actuator transmission": _JOINT
+    + '<tendon><fixed name="t"><joint joint="j" coef="1"/></fixed></tendon>'
+    + '<actuator><motor name="pull" tendon="t"/></actuator>',
+    "actuator of a free joint": _world(f'<body><freejoint name="f"/>{_G}</body>')
+    + '<actuator><motor name="jet" joint="f" gear="1 0 0 0 0 0"/></actuator>',
+    "actuator dynamics": f'{_JOINT}<actuator><general name="lag" joint="j" dyntype="filter" '
+    'dynprm="0.1"/></actuator>',
+    "actuator gain": f'{_JOINT}<actuator><general name="odd" joint="j" gaintype="affine" '
+    'gainprm="1 1 1"/></actuator>',
+    "free body of several bodies": _world(
+        f'<body name="top"><freejoint/>{_G}<body><joint/>{_G}</body></body>'
+    ),
+    "damping of a free joint": _world(
+        f'<body><joint name="f" type="free" damping="1"/>{_G}</body>'
+    ),
+    "armature of a free joint": _world(
+        f'<body><joint name="f" type="free" armature="1"/>{_G}</body>'
+    ),
+    "shape of a geom": _world(
+        '<body><joint/><geom name="egg" type="ellipsoid" size="0.1 0.2 0.3" mass="1"/></body>'
+    ),
+    "contact margin": _world(
+        '<body><joint/><geom name="skin" size="0.1" mass="1" margin="0.01"/></body>'
+    ),
+    "explicit contact pair": _world(
+        '<body><joint/><geom name="a" size="0.1" mass="1"/></body><geom name="b" size="0.1"/>'
+    )
+    + '<contact><pair geom1="a" geom2="b"/></contact>',
+    "gravity compensation": _world(f'<body gravcomp="1"><joint/>{_G}</body>'),
+    "fluid": f'<option density="1.2"/>{_JOINT}',
+}
+# The part of a file that an error has to name, where it has a name.
+NAMED = {
+    "ball joint": "wrist", "joint ref": "wrist", "joint margin": "wrist", "mocap body": "hand",
+    "joint actuatorfrcrange": "wrist", "actuator transmission": "pull",
+    "actuator of a free joint": "jet", "actuator dynamics": "lag", "actuator gain": "odd",
+    "free body of several bodies": "top", "damping of a free joint": "joint f",
+    "armature of a free joint": "joint f", "shape of a geom": "egg", "contact margin": "skin",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("feature", REFUSED)
+def test_what_it_cannot_do_is_refused_by_name(feature: str, tmp_path: Path) -> None:
+    file = mjcf(tmp_path, REFUSED[feature])
+    sm.load(file)  # MuJoCo takes it
+    for defaults in ("model", "engine"):
+        with pytest.raises(UnsupportedError, match=NAMED.get(feature, feature)) as caught:
+            sm.load(file, backend="pybullet", defaults=defaults)
+        assert caught.value.backend == "pybullet"
+        assert feature in str(caught.value)
+
+
+def test_a_spring_on_a_free_joint_is_refused(tmp_path: Path) -> None:
+    spring = f'<body><joint name="f" type="free" stiffness="30"/>{_G}</body>'
+    with pytest.raises(UnsupportedError, match="free joint"):
+        load(mjcf(tmp_path, _world(spring)))
+
+
+def test_an_ellipsoid_that_touches_nothing_is_taken(tmp_path: Path) -> None:
+    egg = '<geom type="ellipsoid" size="0.1 0.2 0.3" mass="1" contype="0" conaffinity="0"/>'
+    model = load(mjcf(tmp_path, _world(f"<body><joint/>{egg}</body>")))
+    with sm.make_data(model) as data:
+        data.qvel[0] = 1.0
+        sm.step(model, data, 10)
+        assert data.qpos[0] == pytest.approx(10 * model.timestep)  # nothing brakes it
+
+
+def test_all_problems_of_a_file_are_named(tmp_path: Path) -> None:
+    both = '<body><joint name="wrist" ref="0.3"/><geom name="egg" margin="0.1" size="0.1"/></body>'
+    with pytest.raises(UnsupportedError) as caught:
+        load(mjcf(tmp_path, f'<option viscosity="1"/>{_world(both)}'))
+    assert all(word in str(caught.value) for word in ("joint wrist", "geom egg", "fluid"))
+
+
+_BODY = (
+    '<inertial><mass value="1"/>'
+    '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+)
+_TWO_ROOTS = f"""<robot name="two"><link name="a">{_BODY}</link><link name="b">{_BODY}</link>
+<link name="c">{_BODY}</link><joint name="j" type="continuous"><parent link="b"/><child link="c"/>
+<axis xyz="0 1 0"/></joint></robot>"""
+
+
+def test_a_urdf_with_two_roots_is_no_crash(tmp_path: Path) -> None:
+    """PyBullet's own reader crashes on it; MuJoCo, which reads it here, fuses both roots."""
+    (tmp_path / "two.urdf").write_text(_TWO_ROOTS)
+    code = """
+import statemachine as sm
+ends = []
+for backend in ("mujoco", "pybullet"):
+    model = sm.load("two.urdf", backend=backend)
+    with sm.make_data(model) as data:
+        data.qvel[:] = 1.0
+        sm.step(model, data, 10)
+        ends.append((model.body_names, model.joint_names, data.qpos.round(12).tolist()))
+assert ends[0] == ends[1], ends
+print(ends[1][:2])
+"""
+    done = python(code, tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.strip() == "(('world', 'c'), ('j',))"
+
+
+@pytest.mark.parametrize("text", ["", "<mujoco>", "no XML at all"])
+def test_a_file_that_nobody_reads_is_an_error_of_ours(text: str, tmp_path: Path) -> None:
+    for suffix in ("xml", "urdf"):
+        file = tmp_path / f"bad.{suffix}"
+        file.write_text(text)
+        code = f"""
+import statemachine as sm
+try:
+    sm.load("bad.{suffix}", backend="pybullet")
+except sm.errors.StateMachineError as error:
+    print(type(error).__name__)
+"""
+        done = python(code, tmp_path)
+        assert (done.returncode, done.stdout.strip(), done.stderr) == (0, "ModelError", "")
+
+
+def test_unknown_names_and_numbers() -> None:
+    model = load("so101/scene_box")
+    for find in ("body_id", "joint_id", "site_id", "geom_id", "actuator_id", "key_id"):
+        with pytest.raises(UnknownNameError):
+            getattr(model, find)("nobody")
+    with sm.make_data(model) as data:
+        for key in (2, -1, "nobody"):
+            with pytest.raises(UnknownNameError):
+                sm.reset(model, data, keyframe=key)
+        assert data.time == 0.0
+
+
+# PyBullet as its own users meet it.
+
+
+def _as_it_comes(**options: Any) -> sm.Model:
+    model = sm.load("so101/scene", backend="pybullet", defaults="engine")
+    return model.replace(**options) if options else model
+
+
+def test_engine_defaults_are_pybullets() -> None:
+    from statemachine.backends._bullet_world import pb
+
+    model = _as_it_comes()
+    assert model.timestep == 1 / 240
+    with sm.make_data(model) as data:
+        client = data.raw.client
+        assert pb.getPhysicsEngineParameters(client)["gravityAccelerationZ"] == 0
+        for tree in data.raw.trees:
+            for link in range(-1, pb.getNumJoints(tree.body, client)):
+                info = pb.getDynamicsInfo(tree.body, link, physicsClientId=client)
+                assert info[1] == 0.5  # lateral friction
+        sm.step(model, data, 240)
+        assert not data.qpos.any()  # no gravity, and the targets are where the arm is
+    with sm.make_data(model.replace(gravity=[0, 0, -9.81])) as data:
+        parameters = pb.getPhysicsEngineParameters(data.raw.client)
+        assert parameters["gravityAccelerationZ"] == -9.81
+
+
+def test_engine_motors_hold_an_arm_that_nobody_drives() -> None:
+    model = _as_it_comes(gravity=[0, 0, -9.81], actuation=False)
+    with sm.make_data(model) as data:
+        sm.step(model, data, 240)
+        # Limp, it falls 24° in half a second; 0.012° was measured.
+        assert abs(np.degrees(data.qpos[LIFT])) < 0.1
+        assert np.abs(np.degrees(data.qpos)).max() < 1.0  # the gripper moves 0.7°
+        # The motor carries the weight of the arm, 0.5694 N·m.
+        assert data.qfrc_actuator[LIFT] == pytest.approx(-0.5694, rel=0.01)
+        assert data.qfrc_actuator[LIFT] == pytest.approx(data.qfrc_bias[LIFT], rel=0.01)
+
+
+def test_engine_servo_follows_without_droop() -> None:
+    model = _as_it_comes(gravity=[0, 0, -9.81])
+    with sm.make_data(model) as data:
+        sm.step(model, data, 480)
+        assert abs(np.degrees(data.qpos[LIFT])) < 0.001  # 0.033° with the servo of the model
+        data.ctrl = HOLD
+        sm.step(model, data, 480)
+        assert np.abs(np.degrees(data.qpos - HOLD)).max() < 0.005  # 0.0014 was measured
+
+
+def test_engine_does_not_tell_forces_by_part() -> None:
+    model = _as_it_comes()
+    with sm.make_data(model) as data:
+        sm.step(model, data)
+        for name in ("qacc", "qfrc_contact", "qfrc_passive", "qfrc_friction", "qfrc_constraint"):
+            with pytest.raises(UnsupportedError, match="forces by part"):
+                getattr(data, name)
+    for option, value in {"armature": 0.1, "damping": 0.1, "limits": False}.items():
+        with pytest.raises(UnsupportedError, match=option):
+            model.replace(**{option: value})
+
+
+def test_engine_replays_after_a_reset() -> None:
+    model = sm.load("so101/scene_box", backend="pybullet", defaults="engine")
+    with sm.make_data(model) as data, sm.make_data(model) as other:
+        runs = []
+        for each in (data, data, other):
+            sm.reset(model, each, keyframe=0)
+            runs.append(digest(model, each, 100, seed=7))
+    assert len(set(runs)) == 1
+
+
+@pytest.mark.parametrize(("defaults", "lost"), [("model", 0.0), ("engine", 0.04)])
+def test_a_body_in_empty_space_keeps_its_speed(tmp_path: Path, defaults: Any, lost: float) -> None:
+    ball = "<body><freejoint/><geom size='0.1' mass='1'/></body>"
+    file = mjcf(tmp_path, f"<option gravity='0 0 0'/>{_world(ball)}")
+    model = sm.load(file, backend="pybullet", defaults=defaults)
+    speed = np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3])
+    with sm.make_data(model) as data:
+        data.qvel = speed
+        sm.step(model, data, round(1 / model.timestep))
+        if not lost:
+            assert np.array_equal(data.qvel[:3], speed[:3])
+            # The spin passes through the body's axes, and is rounded there.
+            assert np.abs(data.qvel[3:] - speed[3:]).max() < 1e-14
+        else:  # 0.04 a second and more: 16 % and 5 % were measured
+            kept = data.qvel / speed
+            assert kept.max() < 1 - lost
+            assert kept.min() > 0.5
+
+
+# What a Data costs, and gives back.
+
+
+def _memory() -> float:
+    """Resident memory of this process [MB]."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def _clients() -> int:
+    from statemachine.backends._bullet_world import pb
+
+    return sum(pb.getConnectionInfo(client)["isConnected"] for client in range(1024))
+
+
+@linux
+@pytest.mark.parametrize(
+    ("name", "cycles"),
+    [("so101", 400), pytest.param("so101/scene_box", 2_000, marks=pytest.mark.slow)],
+)
+def test_memory_stays_flat(name: str, cycles: int) -> None:
+    model = load(name)
+    clients, start = 0, 0.0
+    for k in range(cycles):
+        if k == 50:  # by then allocators have what they want
+            gc.collect()
+            clients, start = _clients(), _memory()
+        with sm.make_data(model) as data:
+            sm.step(model, data)
+    # A client that is not given back costs 28 MB; 0.01 MB in 800 cycles was measured.
+    assert _memory() - start < 4.0
+    assert _clients() == clients
+
+
+def test_a_dropped_data_gives_its_client_back() -> None:
+    model = load("so101/scene_box")
+    gc.collect()
+    before = _clients()
+    kept = [sm.make_data(model) for _ in range(5)]
+    for data in kept:
+        sm.step(model, data)
+        sm.forward(model, data)
+        assert data.qacc.any()
+    shared = 2  # of the Model's own: the ghost and the mirror
+    assert _clients() == before + 5 + shared
+    data = kept.clear()
+    gc.collect()
+    assert _clients() == before + shared
+    del model
+    gc.collect()
+    assert _clients() == before
+
+
+def test_no_room_for_a_client_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    from statemachine.backends._bullet_world import pb
+
+    model, answers, right = load("so101"), [-1, -1], pb.connect
+    monkeypatch.setattr(pb, "connect", lambda *_: answers.pop() if answers else right(*_))
+    with pytest.raises(EngineError, match="close some Data"):
+        sm.make_data(model)
+    answers.append(-1)  # full once, and not after what was dropped is collected
+    with sm.make_data(model) as data:
+        sm.step(model, data)
+
+
+# Processes and threads.
+
+
+@linux
+def test_a_killed_process_leaves_no_file(tmp_path: Path) -> None:
+    code = """
+import statemachine as sm
+while True:
+    model = sm.load("so101/scene_box", backend="pybullet")
+    with sm.make_data(model) as data:
+        sm.step(model, data, 3)
+        sm.forward(model, data)
+        data.qacc
+        print("went", flush=True)
+"""
+    for delay in (0.0, 0.013, 0.041):
+        child = subprocess.Popen(
+            [sys.executable, "-c", code],
+            stdout=subprocess.PIPE,
+            cwd=ROOT,
+            env={**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path)},
+        )
+        try:
+            assert child.stdout is not None
+            assert child.stdout.readline() == b"went\n"
+            time.sleep(delay)
+            process = Path("/proc") / str(child.pid)
+            assert "/dev/shm" not in (process / "maps").read_text()
+            rows = Path("/proc/sysvipc/shm").read_text().splitlines()[1:]
+            assert str(child.pid) not in [row.split()[4] for row in rows]
+        finally:
+            child.send_signal(signal.SIGKILL)
+            child.wait()
+            if child.stdout is not None:
+                child.stdout.close()
+        assert not list(tmp_path.iterdir())
+
+
+@linux
+def test_a_forked_child_has_a_copy(tmp_path: Path) -> None:
+    code = """
+import os, sys
+import statemachine as sm
+
+model = sm.load("so101/scene_box", backend="pybullet")
+
+def start():
+    data = sm.make_data(model)
+    sm.reset(model, data, keyframe=0)
+    sm.step(model, data, 20)
+    return data
+
+def go_on(data):
+    for k in range(60):
+        data.ctrl[0] += 0.01
+        sm.step(model, data)
+        if k % 20 == 0:
+            sm.forward(model, data)
+            assert len(data.contacts) > 0
+    return sm.get_state(model, data).blob
+
+data, alone = start(), start()
+read, write = os.pipe()
+child = os.fork()
+if not child:
+    os.write(write, go_on(data))
+    sys.exit(0)  # with all that Python does at its end
+mine = go_on(data)
+theirs = os.read(read, 100_000)
+_, status = os.waitpid(child, 0)
+assert status == 0, status
+assert mine == theirs == go_on(alone)
+assert go_on(data) == go_on(alone)
+"""
+    done = python(code, tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_threads_do_not_disturb_each_other() -> None:
+    """They share the Model's ghost and mirror, which poses and forward go through."""
+    model = load("so101/scene_box")
+
+    def work(seed: int) -> str:
+        random, found = np.random.default_rng(seed), hashlib.sha256()
+        with sm.make_data(model) as data:
+            sm.reset(model, data, keyframe=seed % 2)
+            for k in range(150):
+                data.ctrl[:] += random.normal(scale=0.02, size=model.nu)
+                sm.step(model, data)
+                if k % 3 == 0:
+                    sm.forward(model, data)
+                for array in derived(data).values():
+                    found.update(array.tobytes())
+            return found.hexdigest()
+
+    expected = [work(seed) for seed in range(2)]
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-5)  # so that they interrupt each other everywhere
+    try:
+        with ThreadPoolExecutor(2) as pool:
+            assert list(pool.map(work, range(2))) == expected
+    finally:
+        sys.setswitchinterval(interval)
+
+
+# Ctrl-C.
+
+
+def _stop(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+@posix
+def test_an_interrupted_step_is_no_step() -> None:
+    """Ctrl-C at a dozen moments of a step that would take a minute."""
+    model = load("so101/scene_box")
+    ring = signal.signal(signal.SIGALRM, _stop)
+    with sm.make_data(model) as data:
+        sm.reset(model, data, keyframe=0)
+        try:
+            for k in range(12):
+                data.ctrl[0] += 0.01
+                sm.step(model, data, 20)
+                before = [array.copy() for array in (data.qpos, data.qvel, data.ctrl)]
+                moment = data.time
+                signal.setitimer(signal.ITIMER_REAL, 0.001 + 0.0037 * k)
+                with pytest.raises(KeyboardInterrupt):
+                    sm.step(model, data, 200_000)
+                for array, expected in zip((data.qpos, data.qvel, data.ctrl), before, strict=True):
+                    assert np.array_equal(array, expected)
+                assert data.time == moment
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+            signal.signal(signal.SIGALRM, ring)
+        sm.step(model, data, 20)
+        assert len(data.contacts) > 0  # the box is still there
+
+
+def interrupted(
+    monkeypatch: pytest.MonkeyPatch, name: str, good: int, call: Callable[[], Any]
+) -> None:
+    """Call something, and be interrupted at a function of PyBullet's, after so many calls."""
+    from statemachine.backends._bullet_world import pb
+
+    right, counted = getattr(pb, name), iter([True] * good)
+
+    def function(*arguments: Any, **named: Any) -> Any:
+        return right(*arguments, **named) if next(counted, False) else _stop()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(pb, name, function)
+        with pytest.raises(KeyboardInterrupt):
+            call()
+
+
+_PLACES = [
+    ("calculateInverseDynamics", 0),
+    ("setJointMotorControlArray", 4),
+    ("getJointStates", 0),
+    ("getBasePositionAndOrientation", 0),
+    ("stepSimulation", 0),
+    ("stepSimulation", 7),
+]
+
+
+@pytest.mark.parametrize("then", ["step", "reset"])
+@pytest.mark.parametrize(("name", "good"), _PLACES)
+def test_an_interrupted_step_leaves_nothing_in_the_engine(
+    name: str, good: int, then: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = load("so101/scene_box")
+    with sm.make_data(model) as data, sm.make_data(model) as other:
+        for each in (data, other):
+            sm.reset(model, each, keyframe=0)
+            each.ctrl[0] += 0.1
+        interrupted(monkeypatch, name, good, lambda: sm.step(model, data, 10))
+        assert np.array_equal(data.qpos, other.qpos)
+        if then == "reset":
+            for each in (data, other):
+                sm.reset(model, each, keyframe=0)
+        assert digest(model, data, 40, seed=8) == digest(model, other, 40, seed=8)
+
+
+def test_an_interrupted_step_has_the_future_of_the_state_before(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model = load("so101/scene_box")
+    with sm.make_data(model) as data, sm.make_data(model) as other:
+        sm.reset(model, data, keyframe=0)
+        digest(model, data, 40, seed=9)
+        before = sm.get_state(model, data)
+        interrupted(monkeypatch, "getJointStates", 3, lambda: sm.step(model, data, 10))
+        sm.set_state(model, other, before)
+        assert digest(model, data, 60, seed=10) == digest(model, other, 60, seed=10)
+
+
+@pytest.mark.xfail(
+    strict=True, reason="after an interrupted step, what was not yet read comes from the mirror"
+)
+def test_an_interrupted_step_leaves_what_is_derived(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = load("so101/scene_box")
+    found = []
+    for stop in (False, True):
+        with sm.make_data(model) as data:
+            sm.reset(model, data, keyframe=0)
+            digest(model, data, 40, seed=9)
+            if stop:
+                interrupted(monkeypatch, "getJointStates", 3, lambda d=data: sm.step(model, d, 10))
+            found.append(derived(data))
+    same(*found)
+
+
+def test_an_interrupted_reading_is_read_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = load("so101/scene_box")
+    with sm.make_data(model) as data:
+        sm.reset(model, data, keyframe=0)
+        digest(model, data, 40, seed=9)
+        sm.forward(model, data)
+        expected = data.qacc.copy()
+        sm.forward(model, data)
+        interrupted(monkeypatch, "stepSimulation", 0, lambda: data.qacc)
+        assert np.array_equal(data.qacc, expected)
+
+
+def test_an_interrupted_restore_loses_no_body(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the very state that the Data is in, so that the arrays do not tell."""
+    model = load("so101/scene_box")
+    ends = []
+    for stop in (False, True):
+        with sm.make_data(model) as data:
+            sm.reset(model, data, keyframe=0)
+            sm.step(model, data, 40)
+            state = sm.get_state(model, data)
+            if stop:
+                interrupted(
+                    monkeypatch,
+                    "performCollisionDetection",
+                    0,
+                    lambda d=data, s=state: sm.set_state(model, d, s),
+                )
+            sm.step(model, data, 5)
+            ends.append(data.qpos.copy())
+    # Whether the restore counts or not, what it changes is far below a centimetre.
+    assert np.abs(ends[1] - ends[0]).max() < 0.01
+
+
+def test_an_interrupted_reset_of_the_engines_own_can_be_repeated(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model = sm.load("so101/scene_box", backend="pybullet", defaults="engine")
+    with sm.make_data(model) as data, sm.make_data(model) as other:
+        sm.step(model, data, 3)
+        interrupted(monkeypatch, "loadURDF", 1, lambda: sm.reset(model, data))
+        sm.reset(model, data)
+        sm.step(model, data, 5)
+        sm.step(model, other, 5)
+        assert sm.get_state(model, data) == sm.get_state(model, other)
+
+
+def test_an_interrupted_command_is_taken_by_the_next_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    from statemachine.backends._bullet_servo import Arm
+
+    model = load("so101")
+    ends = []
+    for stop in (False, True):
+        with sm.make_data(model) as data:
+            data.ctrl = HOLD
+            if stop:
+                with monkeypatch.context() as patch:
+                    patch.setattr(Arm, "command", _stop)
+                    with pytest.raises(KeyboardInterrupt):
+                        sm.step(model, data)
+            sm.step(model, data, 20)
+            ends.append(data.qpos.copy())
+    assert np.array_equal(ends[0], ends[1])
+
+
+# Writes.
+
+
+def test_a_quaternion_of_any_length_is_its_rotation() -> None:
+    model = load("so101/scene_box")
+    ends = []
+    for length in (1.0, 1.0001, 3.0):
+        with sm.make_data(model) as data:
+            sm.reset(model, data, keyframe=0)
+            data.qpos[9:13] *= length
+            sm.forward(model, data)
+            body = model.body_id("box")
+            quat = data.qpos[9:13] / np.linalg.norm(data.qpos[9:13])
+            assert np.abs(data.xquat[body] - quat).max() < 1e-15
+            sm.step(model, data, 20)
+            assert abs(np.linalg.norm(data.qpos[9:13]) - 1) < 1e-12
+            ends.append(data.qpos.copy())
+    for end in ends[1:]:  # a last bit of the length, in contact for 20 steps
+        assert np.abs(end - ends[0]).max() < 1e-6
+
+
+def test_a_step_starts_from_what_was_written() -> None:
+    model = load("so101/scene_box")
+    with sm.make_data(model) as data, sm.make_data(model) as other:
+        sm.reset(model, data, keyframe=0)
+        digest(model, data, 30, seed=11)
+        data.qpos[0] += 0.2
+        data.qpos[6:9] = (0.3, 0.3, 0.5)
+        data.qvel[:] = 0.1
+        other.qpos, other.qvel, other.ctrl = data.qpos, data.qvel, data.ctrl
+        other.time = data.time
+        assert digest(model, data, 30, seed=12) == digest(model, other, 30, seed=12)
+
+
+@pytest.mark.parametrize("verb", ["step", "bulk", "forward"])
+def test_what_is_read_late_is_what_was(verb: str) -> None:
+    """Derived values are computed when they are read, of the moment that they belong to."""
+    model = load("so101/scene_box")
+    found = []
+    for late in (False, True):
+        with sm.make_data(model) as data:
+            sm.reset(model, data, keyframe=0)
+            digest(model, data, 40, seed=13)
+            if verb == "forward":
+                sm.forward(model, data)
+            else:
+                data.ctrl[0] += 0.1
+                sm.step(model, data, 1 if verb == "step" else 9)
+            if late:
+                data.qpos[0] += 0.3
+                data.qpos[6:9] += 0.1
+                data.qvel[:] = 0.5
+                data.ctrl[:] = 0.0
+                sm.get_state(model, data)
+            found.append(derived(data))
+            assert len(found[-1]["contacts.dist"]) > 0
+            assert np.abs(found[-1]["qfrc_contact"]).max() > 0.1
+    same(*found)
+
+
+def test_a_write_that_is_undone_was_none() -> None:
+    model = load("so101/scene_box")
+    ends = []
+    for write in (False, True):
+        with sm.make_data(model) as data:
+            sm.reset(model, data, keyframe=0)
+            digest(model, data, 40, seed=14)
+            if write:
+                kept = data.qpos.copy()
+                data.qpos[:] += 0.1
+                data.qpos[:] = kept
+            ends.append(digest(model, data, 40, seed=15))
+    assert ends[0] == ends[1]
+
+
+def test_bad_numbers_never_reach_the_engine() -> None:
+    model = load("so101/scene_box")
+    with sm.make_data(model) as data:
+        for name in ("qpos", "qvel", "ctrl"):
+            for bad in (np.nan, np.inf):
+                sm.reset(model, data, keyframe=0)
+                getattr(data, name)[3] = bad
+                with pytest.raises((BadInputError, DivergedError)):
+                    sm.step(model, data)
+                sm.reset(model, data, keyframe=0)
+                assert digest(model, data, 20, seed=16)
+                assert np.isfinite(data.qpos).all()

@@ -1,0 +1,265 @@
+"""Faults that a backend on PyBullet is likely to have; each is caught by what it names.
+
+They are put into our own, one at a time, and run as a third-party backend that is
+registered under the name "faulty". What the conformance checks cannot see, a test of
+test_pybullet_backend does: its name stands there then.
+"""
+
+from __future__ import annotations
+
+import copy
+import functools
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from statemachine import backends, conformance
+from statemachine.records import POSES
+from statemachine.rotations import matrix_from_quat
+
+from . import test_pybullet_backend as ours
+from .conftest import need_engine
+
+Patch = Callable[[pytest.MonkeyPatch], None]
+
+
+@pytest.fixture(autouse=True)
+def _engine() -> None:
+    need_engine("pybullet")
+
+
+def _parts() -> Any:
+    """The modules of the backend, which need the engine to be imported."""
+    from statemachine.backends import (
+        _bullet_machine,
+        _bullet_servo,
+        _bullet_world,
+        pybullet_backend,
+    )
+
+    class Parts:
+        machine, servo, world = _bullet_machine, _bullet_servo, _bullet_world
+        backend, pb = pybullet_backend, _bullet_world.pb
+
+    return Parts
+
+
+def around(where: str, name: str) -> Callable[[Callable[..., Any]], Patch]:
+    """A fault that puts a function around another: it gets the right one, then its arguments.
+
+    Args:
+        where: Path of the owner from `_parts`, as "machine.Shared".
+        name: The function's name there.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Patch:
+        def apply(monkeypatch: pytest.MonkeyPatch) -> None:
+            owner = functools.reduce(getattr, where.split("."), _parts())
+            right = getattr(owner, name)
+
+            def wrapper(*arguments: Any, **named: Any) -> Any:
+                return function(right, *arguments, **named)
+
+            monkeypatch.setattr(owner, name, wrapper)
+
+        return apply
+
+    return decorate
+
+
+@around("machine", "wxyz_from_xyzw")
+def xyzw_for_wxyz(right: Any, quat: Any) -> Any:
+    return np.array(quat)
+
+
+@around("machine.Shared", "poses")
+def centre_of_mass_for_frame(right: Any, self: Any, qpos: Any) -> Any:
+    found = right(self, qpos)
+    turns = matrix_from_quat(found["xquat"])
+    found["xpos"] = found["xpos"] + np.einsum("bij,bj->bi", turns, self.raw.body_ipos)
+    return found
+
+
+@around("pb", "setJointMotorControl2")
+def default_motors_left_on(right: Any, *_: Any, **__: Any) -> None:
+    pass
+
+
+@around("world.Tree", "__init__")
+def joints_counted_without_the_fixed(right: Any, self: Any, *arguments: Any) -> None:
+    right(self, *arguments)
+    self.joints = [index - 1 for index in self.joints]  # the first is fixed: the anchor
+
+
+@around("servo.Law", "__init__")
+def armature_dropped(right: Any, self: Any, raw: Any, tree: Any) -> None:
+    raw = copy.copy(raw)
+    raw.dof_armature[:] = 0
+    right(self, raw, tree)
+
+
+@around("pb", "changeDynamics")
+def damping_left_on(right: Any, *arguments: Any, **named: Any) -> None:
+    named.pop("linearDamping", None)
+    named.pop("angularDamping", None)
+    right(*arguments, **named)
+
+
+@around("pb", "setPhysicsEngineParameter")
+def files_are_cached(right: Any, **named: Any) -> None:
+    # The names repeat: each is the number of a descriptor that is free again.
+    if named.pop("enableFileCaching", None) is None:
+        right(**named)
+
+
+@around("world.World", "contact_points")
+def friction_of_contacts_the_other_way(right: Any, self: Any) -> Any:
+    return [(*p[:10], -p[10], p[11], -p[12], p[13]) for p in right(self)]
+
+
+@around("machine.Machine", "_compute")
+def forward_steps_the_world_itself(right: Any, self: Any, name: str) -> Any:
+    moment = self._moment
+    if moment is None or name in POSES or self._lives or self._mirror is None:
+        return right(self, name)
+    kept = self.time, *(array.copy() for array in (self.qpos, self.qvel, self.ctrl))
+    observed = self.present.observed
+    found = self.look(moment)
+    self.restart(*kept, observed)
+    self._moment = moment
+    return found
+
+
+@around("world.World", "place")
+def reset_without_moving_apart(right: Any, self: Any, *arguments: Any) -> None:
+    self.put(*arguments)
+
+
+def spin_in_world_axes(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = _parts().world.World
+    put, read = world._put_free, world.read_free
+
+    def faulty_put(self: Any, tree: Any, qpos: Any, qvel: Any) -> None:
+        qvel, start = qvel.copy(), tree.qvel.start
+        turn = matrix_from_quat(qpos[tree.qpos][3:] / np.linalg.norm(qpos[tree.qpos][3:]))
+        qvel[start + 3 : start + 6] = turn.T @ qvel[start + 3 : start + 6]
+        put(self, tree, qpos, qvel)
+
+    def faulty_read(self: Any, tree: Any) -> Any:
+        qpos, qvel = read(self, tree)
+        return qpos, [*qvel[:3], *(matrix_from_quat(np.array(qpos[3:])) @ qvel[3:])]
+
+    monkeypatch.setattr(world, "_put_free", faulty_put)
+    monkeypatch.setattr(world, "read_free", faulty_read)
+
+
+@around("servo.Law", "__init__")
+def ctrl_is_not_clamped(right: Any, self: Any, *arguments: Any) -> None:
+    right(self, *arguments)
+    self._ctrl_low, self._ctrl_high = self._ctrl_low - 1e9, self._ctrl_high + 1e9
+
+
+def contacts_are_not_observed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_parts().servo.Arm, "contact", property(lambda self: self.nothing))
+
+
+@around("world", "described")
+def ghost_has_the_padding(right: Any, raw: Any, root: int, kind: str) -> str:
+    return right(raw, root, "stepped" if kind == "ghost" else kind)
+
+
+@around("backend.PybulletData", "_set_state")
+def state_forgets_what_was_observed(right: Any, self: Any, state: Any) -> None:
+    right(self, state)
+    machine = self._machine
+    machine.restart(machine.time, machine.qpos, machine.qvel, machine.ctrl)
+
+
+@around("pb", "setGravity")
+def gravity_is_not_passed_on(right: Any, *_: Any) -> None:
+    pass
+
+
+# The fault, the conformance checks that see it, and the tests of the backend that do.
+FAULTS: dict[str, tuple[Patch, set[str], tuple[Callable[..., None], ...]]] = {
+    "xyzw for wxyz": (xyzw_for_wxyz, {"the_witness_agrees"}, ()),
+    "centre of mass for frame": (
+        centre_of_mass_for_frame,
+        {"the_witness_agrees", "site_and_body_agree"},
+        (),
+    ),
+    "default motors left on": (default_motors_left_on, {"options_do_what_they_say"}, ()),
+    "joints counted without the fixed": (
+        joints_counted_without_the_fixed,
+        {"untouched_ctrl_is_a_command"},
+        (),
+    ),
+    "armature dropped": (armature_dropped, {"a_force_accelerates_by_the_armature"}, ()),
+    "damping left on": (damping_left_on, {"free_body_velocity_conventions"}, ()),
+    # The suite's only model of several trees cannot be loaded then: no check gets to fail.
+    "files are cached": (files_are_cached, set(), (ours.test_two_free_bodies_are_two,)),
+    "friction of contacts the other way": (
+        friction_of_contacts_the_other_way,
+        {"contact_forces_lean_against_a_push"},
+        (),
+    ),
+    "forward steps the world itself": (
+        forward_steps_the_world_itself,
+        {"forward_perturbs_nothing"},
+        (),
+    ),
+    "reset without moving apart": (reset_without_moving_apart, {"replay_is_bit_identical"}, ()),
+    "spin in world axes": (spin_in_world_axes, {"free_body_velocity_conventions"}, ()),
+    "ctrl is not clamped": (ctrl_is_not_clamped, {"ctrl_is_clamped_inside"}, ()),
+    "contacts are not observed": (contacts_are_not_observed, {"forces_balance_at_rest"}, ()),
+    # With the wrong inertia everything is consistent with itself: only another engine sees it.
+    "ghost has the padding": (
+        ghost_has_the_padding,
+        set(),
+        (ours.test_zoo_is_what_mujoco_says, ours.test_zoo_stays_with_mujoco),
+    ),
+    "state forgets what was observed": (
+        state_forgets_what_was_observed,
+        {"a_state_restores_the_inputs"},
+        (),
+    ),
+    "gravity is not passed on": (
+        gravity_is_not_passed_on,
+        {"free_fall", "untouched_ctrl_is_a_command"},
+        (),
+    ),
+}
+
+
+@pytest.fixture
+def faulty() -> Iterator[str]:
+    backends.register("faulty", "statemachine.backends.pybullet_backend:load")
+    yield "faulty"
+    backends._BACKENDS.pop("faulty")
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_fault_is_caught(
+    fault: str, faulty: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    apply, checks, tests = FAULTS[fault]
+    assert checks or tests
+    apply(monkeypatch)
+    with conformance.Lab(faulty) as lab:
+        for check in checks:
+            with pytest.raises(AssertionError):
+                conformance.CHECKS[check](lab)
+        for test in tests:
+            with pytest.raises(AssertionError):
+                test(tmp_path)
+
+
+def test_without_a_fault_nothing_is_caught(faulty: str, tmp_path: Path) -> None:
+    with conformance.Lab(faulty) as lab:
+        for check in set().union(*(checks for _, checks, _ in FAULTS.values())):
+            conformance.CHECKS[check](lab)
+    for test in dict.fromkeys(test for _, _, tests in FAULTS.values() for test in tests):
+        test(tmp_path)
