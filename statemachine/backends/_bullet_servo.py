@@ -10,9 +10,10 @@ velocity. Each step solves
 
     (M + A + h·(D + kv)) · a = w - K·(q - q₀) - D·v - c + f + l + e
 
-for the acceleration a, where f is dry friction, l the force of the joint limits (both
-soft, as in MuJoCo's manual, chapter Computation, section Constraint model) and e the
-generalised force of contacts. The engine then gets the torque that gives its arm this
+for the acceleration a (without kv under MuJoCo's Euler integrator), where f is dry
+friction, l the force of the joint limits (both soft, as in MuJoCo's manual, chapter
+Computation, section Constraint model, and solved with M + A alone) and e the generalised
+force of contacts. The engine then gets the torque that gives its arm this
 acceleration without contacts, less e. Its arm has a share of the armature as inertia of
 its links, so that contact acts on about the true inertia. What that arm did beyond the
 torque it got, by inverse dynamics, is the e of the next step.
@@ -31,7 +32,10 @@ from ..records import Array
 from ._bullet_world import Tree, World, pb
 
 _OFF = mujoco.mjtDisableBit
-_SWEEPS, _SETTLED = 200, 1e-13  # at most so many sweeps, until no force moves more [N·m]
+_SWEEPS, _SETTLED = 500, 1e-9  # at most so many sweeps, until no force moves more [N·m]
+_STEADY = 1e-8  # [N²·m²] a change of friction from which more sweeps are worth it
+_TINY = 1e-15  # smallest pivot
+_EXPLICIT = (int(mujoco.mjtIntegrator.mjINT_EULER), int(mujoco.mjtIntegrator.mjINT_RK4))
 
 
 @dataclass(slots=True)
@@ -64,13 +68,18 @@ class Law:
         rest = stiffness * raw.qpos_spring[tree.qpos]
         # Linear in x, which is positions, velocities and 1.
         passive = np.column_stack([-np.diag(stiffness), -np.diag(damping), rest])
-        self._inertia = np.diag(self.armature + h * damping)
+        euler = raw.opt.integrator in _EXPLICIT
+        damped_later = 0.0 if euler and off["eulerdamp"] else h
+        # The inertia that constraints feel, and the one that velocities are found with.
+        self._inertia = np.array(
+            [np.diag(self.armature), np.diag(self.armature + damped_later * damping)]
+        )
         self._zeros, self._nothing = [0.0] * len(dofs), np.zeros(len(dofs))
         feedback = self._take_actuators(raw, joints, off)
 
         rub = not (off["friction"] or off["constraint"])
         self._frictionloss = raw.dof_frictionloss[dofs] * rub
-        self._least_rub = -self._frictionloss
+        self._least_rub, self._rubs = -self._frictionloss, self._frictionloss.any()
         weight = raw.dof_invweight0[dofs]
         floor = 0.0 if off["refsafe"] else 2 * h
         solref, solimp = raw.dof_solref[dofs], raw.dof_solimp[dofs]
@@ -79,6 +88,8 @@ class Law:
         damped[:, len(dofs) : -1] = np.diag(self._rub_b)
         self._linear = np.vstack([passive, damped, feedback])
         self._rub_r = _softness(_impedance(solimp, np.zeros(len(dofs))), weight)
+
+        self._rub_weight = weight + self._rub_r
 
         limited = raw.jnt_limited[joints].astype(bool) & (not (off["limit"] or off["constraint"]))
         self._low, self._high = _range(raw.jnt_range[joints], limited)
@@ -101,14 +112,21 @@ class Law:
         bias = raw.actuator_biasprm[ids, :3] * affine[:, None]
         self._gain = raw.actuator_gainprm[ids, 0]
         feedback = [bias[:, k, None] * self._gear.T for k in (1, 2)]
-        self._slope = -self.timestep * self._gear**2 * bias[:, 2]
-        self._unsaturated = self._inertia + np.diag(self._slope.sum(axis=1))
+        later = 0.0 if raw.opt.integrator in _EXPLICIT else self.timestep
+        self._slope = -later * self._gear**2 * bias[:, 2]
+        self._unsaturated = self._with_slope(np.ones(len(ids)))
         clamped = raw.actuator_ctrllimited[ids].astype(bool) & (not off["clamp"])
         self._ctrl_low, self._ctrl_high = _range(raw.actuator_ctrlrange[ids], clamped)
         limited = raw.actuator_forcelimited[ids].astype(bool)
         self._low_force, self._high_force = _range(raw.actuator_forcerange[ids], limited)
         self._straight = np.array_equal(self._gear, np.eye(len(joints)))
         return np.column_stack([*feedback, bias[:, 0]])
+
+    def _with_slope(self, free: Array) -> Array:
+        """Both inertias, with the slope of the actuators that are not at their limit."""
+        found = self._inertia.copy()
+        found[1] += np.diag(self._slope @ free)
+        return found
 
     def aim(self, ctrl: Array) -> Array:
         """What a command (nu,) of the whole model adds to the force of each actuator."""
@@ -149,22 +167,30 @@ class Law:
         actuator = force if self._straight else self._gear @ force
         inertia = self._unsaturated
         if force.tobytes() != wanted.tobytes():
-            inertia = self._inertia + np.diag(self._slope @ (force == wanted))
-        inverse = np.linalg.inv(mass + inertia)
+            inertia = self._with_slope(force == wanted)
+        explicit, implicit = mass + inertia
+        mujoco.mju_cholFactor(explicit, _TINY)
+        mujoco.mju_cholFactor(implicit, _TINY)
         others = actuator + passive - bias + contact
         limit = self._nothing
         for place, (low, high) in zip(q, self._ranges, strict=True):
             if not low <= place <= high:
                 settled = True
+        if not settled and self._rubs:
+            # One sweep from the last step's friction, of all joints at once: enough where
+            # nothing changes, as in a joint that rests or slides.
+            rest = _solved(explicit, others + friction) + damped + self._rub_r * friction
+            moved = np.minimum(
+                np.maximum(friction - rest / self._rub_weight, self._least_rub), self._frictionloss
+            )
+            change = moved - friction
+            friction = moved
+            settled = change.dot(change) > _STEADY
         if settled:
-            friction, limit, acceleration = self._sweep(inverse, others, x, friction)
-        else:
-            # One sweep from the last step's friction, of all joints at once.
-            acceleration = inverse @ (others + friction)
-            rest = acceleration + damped + self._rub_r * friction
-            moved = friction - rest / (inverse.diagonal() + self._rub_r)
-            friction = np.minimum(np.maximum(moved, self._least_rub), self._frictionloss)
-            acceleration = inverse @ (others + friction)
+            inverse = np.linalg.inv(mass + self._inertia[0])
+            friction, limit = self._sweep(inverse, others, x, friction)
+            others = others + limit
+        acceleration = _solved(implicit, others + friction)
         return (
             Solution(q, v, speed, bias, mass, actuator, passive, friction, limit, acceleration),
             acceleration,
@@ -172,8 +198,8 @@ class Law:
 
     def _sweep(
         self, inverse: Array, others: Array, x: Array, friction: Array
-    ) -> tuple[Array, Array, Array]:
-        """Friction, limit force and acceleration, by projected Gauss-Seidel."""
+    ) -> tuple[Array, Array]:
+        """Friction and limit force, by projected Gauss-Seidel."""
         place, speed = np.split(x[:-1], 2)
         gap = np.minimum(place - self._low, self._high - place)
         side = np.where(place - self._low < self._high - place, 1.0, -1.0)
@@ -215,7 +241,7 @@ class Law:
         limit = np.zeros(len(speed))
         for (i, sign, *_), force in zip(rows[len(speed) :], forces[len(speed) :], strict=True):
             limit[i] = sign * force
-        return np.array(forces[: len(speed)]), limit, np.array(acceleration)
+        return np.array(forces[: len(speed)]), limit
 
 
 class Arm:
@@ -320,7 +346,15 @@ _FLAGS = {
     "actuation": _OFF.mjDSBL_ACTUATION,
     "clamp": _OFF.mjDSBL_CLAMPCTRL,
     "refsafe": _OFF.mjDSBL_REFSAFE,
+    "eulerdamp": _OFF.mjDSBL_EULERDAMP,
 }
+
+
+def _solved(factor: Array, right: Array) -> Array:
+    """Solve with a factor of `mju_cholFactor`, which is quicker than NumPy for few joints."""
+    found = np.empty(len(right))
+    mujoco.mju_cholSolve(found, factor, right)
+    return found
 
 
 def _range(ranges: Array, limited: Any) -> tuple[Array, Array]:
