@@ -73,7 +73,7 @@ def _by_pinocchio(model: sm.Model, file: Path) -> float:
     worst = 0.0
     for qpos, pos, mat in _poses(model, 1):
         for site in range(model.nsite):
-            pose = witness.pose(qpos, urdf.tip_name(model.raw, site), "body")
+            pose = witness.pose(qpos, urdf.Names(model.raw).tips[site], "body")
             worst = max(worst, float(np.abs(pose.pos - pos[site]).max()))
             worst = max(worst, float(np.abs(pose.mat.ravel() - mat[site]).max()))
     return worst
@@ -104,7 +104,7 @@ print("RESULT", json.dumps(out))
     question = {
         "qpos": [qpos.tolist() for qpos, _, _ in found],
         "joints": model.joint_names,
-        "tips": [urdf.tip_name(model.raw, site) for site in range(model.nsite)],
+        "tips": [urdf.Names(model.raw).tips[site] for site in range(model.nsite)],
     }
     done = subprocess.run(
         [sys.executable, "-c", code],
@@ -162,7 +162,7 @@ def test_every_kind_of_joint(tmp_path: Path, pinocchio: None) -> None:
     for qpos, pos, mat in _poses(model, 3):
         turn = matrix_from_quat(model.raw.body_quat[root])
         for site in range(model.nsite):
-            pose = witness.pose(qpos, urdf.tip_name(model.raw, site), "body")
+            pose = witness.pose(qpos, urdf.Names(model.raw).tips[site], "body")
             placed = model.raw.body_pos[root] + turn @ pose.pos
             assert np.abs(placed - pos[site]).max() < 1e-12
             assert np.abs((turn @ pose.mat).ravel() - mat[site]).max() < 1e-12

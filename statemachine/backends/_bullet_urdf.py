@@ -23,6 +23,7 @@ from ..rotations import matrix_from_quat
 _BOX, _SPHERE = int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_SPHERE)
 _CAPSULE, _CYLINDER = int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER)
 _MESH, _PLANE = int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_PLANE)
+_LONGEST = 200  # PyBullet cuts names at 1,023 bytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,34 +83,53 @@ def write(raw: mujoco.MjModel, root: int, dialect: Dialect = Dialect()) -> str:
     """
     name = raw.names[: raw.names.index(b"\0")].decode() or "robot"
     lines = ['<?xml version="1.0"?>', f"<robot name={quoteattr(name)}>"]
+    names = Names(raw)
     on_world = bool(axes(raw, root)) or dialect.anchored
     if on_world:
         lines.append(_bare_link("world", 0.0, np.zeros((3, 3))))
     for body in tree(raw, root):
-        lines += _link(raw, body, dialect)
+        lines += _link(raw, body, dialect, names)
         if body != root or on_world:
-            lines += _joints(raw, body, root, dialect)
+            lines += _joints(raw, body, root, dialect, names)
     for site in range(raw.nsite):
         if raw.body_rootid[raw.site_bodyid[site]] == root and root:
-            lines += _tip(raw, site)
+            lines += _tip(raw, site, names)
     return "\n".join([*lines, "</robot>", ""])
 
 
-def link_name(raw: mujoco.MjModel, body: int) -> str:
-    """Name of a body's link."""
-    return raw.body(body).name or f"body_{body}"
+class Names:
+    """What bodies, joints and sites are called in a URDF, each name once.
+
+    MuJoCo lets a joint and a body, or two things without names, go by one name; a URDF
+    that does is no file to some readers and the end of the process to others.
+
+    Attributes:
+        links: Of each body's link; joints: of each joint; tips: of each site's link.
+        between: Of the link between two joints of one body, by the first of them.
+        fixed: Of the fixed joint of each body; tips_fixed: of each site's link.
+    """
+
+    def __init__(self, raw: mujoco.MjModel) -> None:
+        links: set[str] = set()
+        joints: set[str] = set()
+        bodies = range(raw.nbody)
+        self.links = {b: _once(raw.body(b).name or f"body_{b}", links) for b in bodies}
+        self.joints = {j: _once(raw.joint(j).name or f"joint_{j}", joints) for j in range(raw.njnt)}
+        self.tips = {
+            s: _once(raw.site(s).name or f"site_{s}", links, "_site") for s in range(raw.nsite)
+        }
+        self.between = {j: _once(f"{name}_link", links) for j, name in self.joints.items()}
+        self.fixed = {b: _once(f"{name}_fixed", joints) for b, name in self.links.items()}
+        self.tips_fixed = {s: _once(f"{name}_fixed", joints) for s, name in self.tips.items()}
 
 
-def tip_name(raw: mujoco.MjModel, site: int) -> str:
-    """Name of a site's link: the site's own unless a body has it."""
-    name = raw.site(site).name or f"site_{site}"
-    taken = {link_name(raw, body) for body in range(raw.nbody)}
-    return f"{name}_site" if name in taken else name
-
-
-def joint_name(raw: mujoco.MjModel, joint: int) -> str:
-    """Name of a joint."""
-    return raw.joint(joint).name or f"joint_{joint}"
+def _once(name: str, taken: set[str], suffix: str = "_2") -> str:
+    """A name that is not taken yet, and not so long that a reader cuts it."""
+    name = name[:_LONGEST]
+    while name in taken:
+        name += suffix
+    taken.add(name)
+    return name
 
 
 def _anchor(raw: mujoco.MjModel, body: int) -> Array:
@@ -128,14 +148,14 @@ def _padding(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> tuple[float, 
     return 0.0, size * (0.50005 * np.eye(3) + 0.5 * np.outer(axis, axis))
 
 
-def _link(raw: mujoco.MjModel, body: int, dialect: Dialect) -> Iterator[str]:
+def _link(raw: mujoco.MjModel, body: int, dialect: Dialect, names: Names) -> Iterator[str]:
     anchor, joints = _anchor(raw, body), axes(raw, body)
     frame = matrix_from_quat(raw.body_iquat[body])
     mass, inertia = float(raw.body_mass[body]), np.diag(raw.body_inertia[body])
     if joints:
         extra, around = _padding(raw, joints[-1], dialect)
         mass, inertia = mass + extra, inertia + frame.T @ around @ frame
-    yield f"  <link name={quoteattr(link_name(raw, body))}>"
+    yield f"  <link name={quoteattr(names.links[body])}>"
     yield "    <inertial>"
     yield f"      {_origin(raw.body_ipos[body] - anchor, frame)}"
     yield f'      <mass value="{_number(mass)}"/>'
@@ -194,22 +214,24 @@ def _mesh_file(raw: mujoco.MjModel, mesh: int, folder: Path | None) -> str:
     return os.path.relpath(name, folder) if folder and os.path.isabs(name) else name
 
 
-def _joints(raw: mujoco.MjModel, body: int, root: int, dialect: Dialect) -> Iterator[str]:
+def _joints(
+    raw: mujoco.MjModel, body: int, root: int, dialect: Dialect, names: Names
+) -> Iterator[str]:
     """The joints between a body and its parent, with massless links between them."""
     upper = int(raw.body_parentid[body])
-    parent = "world" if body == root else link_name(raw, upper)
+    parent = "world" if body == root else names.links[upper]
     turn = matrix_from_quat(raw.body_quat[body])
     place = raw.body_pos[body] - (np.zeros(3) if body == root else _anchor(raw, upper))
     joints = axes(raw, body)
     if not joints:
-        name = f"{link_name(raw, body)}_fixed"
-        yield from _joint(name, "fixed", parent, link_name(raw, body), _origin(place, turn), [])
+        where, name = _origin(place, turn), names.fixed[body]
+        yield from _joint(name, "fixed", parent, names.links[body], where, [])
         return
     place = place + turn @ raw.jnt_pos[joints[0]]
     for joint in joints:
-        child = link_name(raw, body)
+        child = names.links[body]
         if joint != joints[-1]:
-            child = f"{joint_name(raw, joint)}_link"
+            child = names.between[joint]
             yield _bare_link(child, *_padding(raw, joint, dialect))
         slide = raw.jnt_type[joint] == int(JointType.SLIDE)
         limited = bool(raw.jnt_limited[joint]) and dialect.dynamics
@@ -229,7 +251,7 @@ def _joints(raw: mujoco.MjModel, body: int, root: int, dialect: Dialect) -> Iter
             numbers = f'damping="{_number(damping)}" friction="{_number(friction)}"'
             extra.append(f"    <dynamics {numbers}/>")
         where = _origin(place, turn)
-        yield from _joint(joint_name(raw, joint), kind, parent, child, where, extra)
+        yield from _joint(names.joints[joint], kind, parent, child, where, extra)
         if joint != joints[-1]:
             parent, turn = child, np.eye(3)
             place = raw.jnt_pos[joint + 1] - raw.jnt_pos[joint]
@@ -256,12 +278,12 @@ def _effort(raw: mujoco.MjModel, joint: int) -> float:
     return float(max(forces, default=1e9))
 
 
-def _tip(raw: mujoco.MjModel, site: int) -> Iterator[str]:
-    body, name = int(raw.site_bodyid[site]), tip_name(raw, site)
+def _tip(raw: mujoco.MjModel, site: int, names: Names) -> Iterator[str]:
+    body, name = int(raw.site_bodyid[site]), names.tips[site]
     mat = matrix_from_quat(raw.site_quat[site])
     yield _bare_link(name, 0.0, np.zeros((3, 3)))
     where = _origin(raw.site_pos[site] - _anchor(raw, body), mat)
-    yield from _joint(f"{name}_fixed", "fixed", link_name(raw, body), name, where, [])
+    yield from _joint(names.tips_fixed[site], "fixed", names.links[body], name, where, [])
 
 
 def _bare_link(name: str, mass: float, inertia: Array) -> str:

@@ -57,13 +57,13 @@ class Tree:
         self.free = _floats(raw, root)
         infos = [pb.getJointInfo(body, i, client) for i in range(pb.getNumJoints(body, client))]
         indices = {info[12].decode(): info[0] for info in infos}
-        bodies = urdf.tree(raw, root)
-        self.links = {b: indices.get(urdf.link_name(raw, b), -1) for b in bodies}
+        bodies, names = urdf.tree(raw, root), urdf.Names(raw)
+        self.links = {b: indices.get(names.links[b], -1) for b in bodies}
         sites = [
             s for s in range(raw.nsite) if root and raw.body_rootid[raw.site_bodyid[s]] == root
         ]
-        self.tips = {s: indices[urdf.tip_name(raw, s)] for s in sites}
-        by_name = {urdf.joint_name(raw, j): j for b in bodies for j in urdf.axes(raw, b)}
+        self.tips = {s: indices[names.tips[s]] for s in sites}
+        by_name = {names.joints[j]: j for b in bodies for j in urdf.axes(raw, b)}
         moving = [(info[0], by_name[info[1].decode()]) for info in infos if info[3] >= 0]
         ids = [joint for _, joint in moving] or [int(raw.body_jntadr[root])] * self.free
         self.joints = [index for index, _ in moving]
