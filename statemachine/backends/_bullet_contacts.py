@@ -26,7 +26,7 @@ def contacts(raw: mujoco.MjModel, world: World, xpos: Array, xquat: Array) -> Co
         xpos: (nbody, 3) where the bodies were then [m].
         xquat: (nbody, 4) how they were turned, wxyz.
     """
-    geoms = {(body, link): (b, found) for body, link, b, found in world.solids()}
+    geoms = {(body, link): (s.body, s.geoms) for body, link, s in world.solids()}
 
     def geom_at(body: int, link: int, point: Array) -> int:
         b, candidates = geoms[body, link]

@@ -21,6 +21,7 @@ from ..errors import BadInputError, DivergedError
 from ..records import DERIVED, POSES, Array, Contacts
 from ..rotations import matrix_from_quat, times, wxyz_from_xyzw
 from ._bullet_contacts import contacts
+from ._bullet_plan import Plan
 from ._bullet_servo import Arm, Law
 from ._bullet_world import Tree, World, pb
 from ._mjcf import gravity
@@ -48,27 +49,27 @@ class Shared:
     """What the Data of one Model share: the description, and worlds that have no state.
 
     Attributes:
-        raw: The compiled model.
+        plan: What every world is made from; raw: its compiled model.
         kind: "stepped" for the emulated contract, "engine" for PyBullet as it comes.
         lock: Held while one of the shared worlds is used.
     """
 
-    def __init__(self, raw: mujoco.MjModel, kind: Literal["stepped", "engine"]) -> None:
-        self.raw = raw
+    def __init__(self, plan: Plan, kind: Literal["stepped", "engine"]) -> None:
+        self.plan, self.raw = plan, plan.raw
         self.kind: Literal["stepped", "engine"] = kind
         self.lock = threading.RLock()
         self._ghost: World | None = None
-        self._still_joints = np.zeros(raw.nv)
+        self._still_joints = np.zeros(plan.raw.nv)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Shared, (self.raw, self.kind)
+        return Shared, (self.plan, self.kind)
 
     @property
     def ghost(self) -> World:
         """The true arm in a client that is never stepped: kinematics and dynamics."""
         with self.lock:  # for two threads that make the first Data at once
             if self._ghost is None:
-                self._ghost = World(self.raw, "ghost")
+                self._ghost = World(self.plan, "ghost")
             return self._ghost
 
     @cached_property
@@ -220,7 +221,7 @@ class Machine:
 
     def _open(self) -> None:
         raw, shared = self._shared.raw, self._shared
-        world = World(raw, shared.kind)
+        world = World(shared.plan, shared.kind)
         trees = [tree for tree in world.trees if tree.joints]
         self._free = [tree for tree in world.trees if tree.free]
         self._arms: list[Any]

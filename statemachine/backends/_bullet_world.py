@@ -25,17 +25,15 @@ from ..records import Array
 from ..rotations import matrix_from_quat, xyzw_from_wxyz
 from ..silence import apart, silence
 from . import _bullet_urdf as urdf
+from ._bullet_plan import Plan, floats
+from ._bullet_surfaces import Solid
 from ._mjcf import gravity
 
 pb: Any = require("pybullet")
 
-_PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
 _AWAY = 1000.0  # [m] between bodies that a reset has set apart
 _TILT = 5e-4  # half the angle [rad] by which it tilts a free body to find its contacts
 _REST = math.sqrt(1 - 2 * _TILT**2)
-FREE_JOINT = int(mujoco.mjtJoint.mjJNT_FREE)
-# What hinges get of their armature as inertia of the stepped arm; see _bullet_servo.
-_SHARE = 3 / 28
 
 
 class Tree:
@@ -54,7 +52,7 @@ class Tree:
 
     def __init__(self, raw: mujoco.MjModel, root: int, body: int, client: int) -> None:
         self.root, self.body = root, body
-        self.free = _floats(raw, root)
+        self.free = floats(raw, root)
         infos = [pb.getJointInfo(body, i, client) for i in range(pb.getNumJoints(body, client))]
         indices = {info[12].decode(): info[0] for info in infos}
         bodies, names = urdf.tree(raw, root), urdf.Names(raw)
@@ -88,11 +86,11 @@ class World:
         trees: The trees of the model, the world's own geoms first.
     """
 
-    def __init__(self, raw: mujoco.MjModel, kind: Literal["stepped", "ghost", "engine"]) -> None:
+    def __init__(self, plan: Plan, kind: Literal["stepped", "ghost", "engine"]) -> None:
         """Make a world.
 
         Args:
-            raw: The compiled model; its gravity and timestep are taken too.
+            plan: The compiled model and what follows from it.
             kind: "stepped" for the emulated contract; "ghost" for the true inertias of
                 what has joints, never to be stepped; "engine" for PyBullet as it comes.
 
@@ -100,7 +98,8 @@ class World:
             EngineError: The process has no room for another client.
             ModelError: PyBullet cannot read what was written for it.
         """
-        self._raw = raw
+        self._plan, self._raw, self._surfaces = plan, plan.raw, plan.surfaces
+        raw = plan.raw
         self.client = _connect()
         self._end = weakref.finalize(self, _disconnect, self.client)
         pb.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self.client)
@@ -122,8 +121,8 @@ class World:
             pb.setTimeStep(raw.opt.timestep, self.client)
         self._add_planes()
         if kind == "stepped":
-            self._take_friction()
-            self._filter()
+            self._take_surfaces()
+        self._solid_links = [(body, link) for body, link, _ in self.solids()]
         self._homes = [
             (body, pb.getBasePositionAndOrientation(body, self.client))
             for body in (*(tree.body for tree in self.trees), *self._planes.values())
@@ -141,11 +140,16 @@ class World:
 
     def _load(self, root: int, kind: str) -> None:
         raw = self._raw
-        text = described(raw, root, kind)
+        text = self._plan.described(root, kind)
         if not root and "<collision" not in text:
             return
-        free = _floats(raw, root)
-        flags = pb.URDF_USE_INERTIA_FROM_FILE | pb.URDF_USE_SELF_COLLISION
+        free = floats(raw, root)
+        flags = (
+            pb.URDF_USE_INERTIA_FROM_FILE
+            | pb.URDF_USE_SELF_COLLISION
+            | pb.URDF_USE_SELF_COLLISION_INCLUDE_PARENT  # which pairs meet, _filter says
+            | pb.URDF_USE_IMPLICIT_CYLINDER  # else a polygon, and a millimetre too large
+        )
         with _as_file(text) as name, silence() as said:
             try:
                 body = pb.loadURDF(
@@ -179,10 +183,9 @@ class World:
 
     def _add_planes(self) -> None:
         raw = self._raw
-        if raw.opt.disableflags & _NO_CONTACT:
-            return
-        for geom in self._touching(0):
-            if raw.geom_type[geom] == _PLANE:
+        for solid in self._surfaces.solids:
+            if solid.plane:
+                (geom,) = solid.geoms
                 shape = pb.createCollisionShape(pb.GEOM_PLANE, physicsClientId=self.client)
                 self._planes[geom] = pb.createMultiBody(
                     0,
@@ -192,77 +195,49 @@ class World:
                     physicsClientId=self.client,
                 )
 
-    def _touching(self, body: int) -> list[int]:
-        """Geoms of a body that can touch something."""
-        raw, start = self._raw, int(self._raw.body_geomadr[body])
-        geoms = range(start, start + int(raw.body_geomnum[body]))
-        return [g for g in geoms if raw.geom_contype[g] or raw.geom_conaffinity[g]]
+    def solids(self) -> Iterator[tuple[int, int, Solid]]:
+        """PyBullet's body and link of all that can touch, in the order of the surfaces."""
+        links = {b: (tree.body, link) for tree in self.trees for b, link in tree.links.items()}
+        for solid in self._surfaces.solids:
+            body, link = (self._planes[solid.geoms[0]], -1) if solid.plane else links[solid.body]
+            yield body, link, solid
 
-    def solids(self) -> Iterator[tuple[int, int, int, list[int]]]:
-        """(PyBullet's body and link, MuJoCo's body and geoms) of all that can touch."""
-        for geom, body in self._planes.items():
-            yield body, -1, 0, [geom]
-        for tree in self.trees:
-            for b, link in tree.links.items():
-                geoms = [g for g in self._touching(b) if self._raw.geom_type[g] != _PLANE]
-                if geoms:
-                    yield tree.body, link, b, geoms
-
-    def _take_friction(self) -> None:
-        """Friction of links; PyBullet multiplies those of a pair, MuJoCo takes the larger."""
-        raw = self._raw
-        for body, link, _, geoms in self.solids():
-            slide, spin, roll = raw.geom_friction[geoms].T
-            condim = raw.geom_condim[geoms]
+    def _take_surfaces(self) -> None:
+        """Friction of links, and which of them meet."""
+        known = self._surfaces
+        links = [(body, link) for body, link, _ in self.solids()]
+        for k, (body, link) in enumerate(links):
             pb.changeDynamics(
                 body,
                 link,
-                lateralFriction=float(np.sqrt((slide * (condim > 1)).max())),
-                spinningFriction=float((spin * (condim > 3)).max()),
-                rollingFriction=float((roll * (condim > 4)).max()),
+                lateralFriction=float(known.slide[k]),
+                spinningFriction=float(known.spin[k]),
+                rollingFriction=float(known.roll[k]),
                 physicsClientId=self.client,
             )
-
-    def _filter(self) -> None:
-        """Let touch what MuJoCo lets touch."""
-        solids = list(self.solids())
-        for i, (body_a, link_a, b_a, geoms_a) in enumerate(solids):
-            for body_b, link_b, b_b, geoms_b in solids[i + 1 :]:
-                pair = (body_a, body_b, link_a, link_b)
-                touch = self._meet(b_a, b_b) and self._match(geoms_a, geoms_b)
-                pb.setCollisionFilterPair(*pair, int(touch), physicsClientId=self.client)
-
-    def _match(self, geoms_a: list[int], geoms_b: list[int]) -> bool:
-        raw = self._raw
-        return any(
-            raw.geom_contype[a] & raw.geom_conaffinity[b]
-            or raw.geom_contype[b] & raw.geom_conaffinity[a]
-            for a in geoms_a
-            for b in geoms_b
-        )
-
-    def _meet(self, a: int, b: int) -> bool:
-        """MuJoCo's rules for bodies: not within one rigid piece, nor parent and child."""
-        raw = self._raw
-        one, two = int(raw.body_weldid[a]), int(raw.body_weldid[b])
-        if one == two or ((min(a, b) << 16) + max(a, b)) in raw.exclude_signature:
-            return False
-        if raw.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT):
-            return True
-        up_one, up_two = (int(raw.body_weldid[raw.body_parentid[x]]) for x in (one, two))
-        return not ((up_one == two and two) or (up_two == one and one))
+        for (i, j), meet in known.pairs.items():
+            (body_a, link_a), (body_b, link_b) = links[i], links[j]
+            pb.setCollisionFilterPair(
+                body_a, body_b, link_a, link_b, int(meet), physicsClientId=self.client
+            )
 
     def place(self, qpos: Array, qvel: Array) -> None:
         """Set the state so that what follows depends on nothing that was before.
 
         PyBullet remembers contacts and which boxes overlap. Everything is taken far
-        apart and brought back, which leaves it nothing to remember. It finds one point
-        of a contact at a time, and would let a box at rest start on one corner: free
-        bodies are tilted a little each way, so that it finds all of them.
+        apart and brought back, in the new pose, which leaves it nothing to remember. It
+        finds one point of a contact at a time, and would let a box at rest start on one
+        corner: free bodies are tilted a little each way, so that it finds all of them.
         """
+        self.put(qpos, qvel)
+        # Links of one body cannot be taken apart: for a moment they do not meet.
+        for body, link in self._solid_links:
+            pb.setCollisionFilterGroupMask(body, link, 0, 0, self.client)
         for i, (body, (_, quat)) in enumerate(self._homes, start=1):
             pb.resetBasePositionAndOrientation(body, (0, 0, _AWAY * i), quat, self.client)
         pb.performCollisionDetection(self.client)
+        for body, link in self._solid_links:
+            pb.setCollisionFilterGroupMask(body, link, 1, -1, self.client)
         for body, (pos, quat) in self._homes:
             if body not in self._frames:
                 pb.resetBasePositionAndOrientation(body, pos, quat, self.client)
@@ -352,24 +327,6 @@ class World:
 
 ENGINE_TIMESTEP = 1 / 240
 _FAST = 1e9  # [rad/s] PyBullet clamps joint speeds at 100 unless told otherwise
-_NO_CONTACT = int(mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
-
-
-def described(raw: mujoco.MjModel, root: int, kind: str) -> str:
-    """URDF of a tree of bodies as a world of that kind reads it."""
-    dialect = urdf.Dialect(
-        capsules=True,
-        looks=False,
-        solids=kind != "ghost" and not raw.opt.disableflags & _NO_CONTACT,
-        dynamics=kind == "engine",
-        anchored=bool(root) and not _floats(raw, root),
-        padding=_SHARE * raw.dof_armature if kind == "stepped" else None,
-    )
-    return urdf.write(raw, root, dialect)
-
-
-def _floats(raw: mujoco.MjModel, root: int) -> bool:
-    return bool(raw.body_jntnum[root]) and not urdf.axes(raw, root)
 
 
 def _connect() -> int:

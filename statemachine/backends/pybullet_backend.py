@@ -22,8 +22,9 @@ from ..interface import OPTIONS, Data, Model
 from ..records import BEHAVIOURS, INPUTS, Array, Behaviour, Capabilities, Contacts, State
 from . import _bullet_urdf as urdf
 from ._bullet_machine import Machine, Mirror, Shared
+from ._bullet_plan import Plan
 from ._bullet_scope import check
-from ._bullet_world import ENGINE_TIMESTEP, World, described
+from ._bullet_world import ENGINE_TIMESTEP, World
 from ._mjcf import compile_file, edited, facts, step_length
 
 _NOT_ALONE = "Data of one Model share its description, and nothing of the engine"
@@ -116,13 +117,13 @@ class PybulletModel(Model):
         defaults: Literal["model", "engine"],
     ) -> None:
         as_it_comes = defaults == "engine"
-        shared = Shared(raw, "engine" if as_it_comes else "stepped")
+        shared = Shared(Plan(raw), "engine" if as_it_comes else "stepped")
         super().__init__(
             backend="pybullet",
             engine_version=engine_version("pybullet"),
             path=path,
             raw={
-                raw.body(b).name or "world": described(raw, b, shared.kind)
+                raw.body(b).name or f"body {b}": shared.plan.described(b, shared.kind)
                 for b in (0, *urdf.roots(raw))
             },
             capabilities=_capabilities(as_it_comes),

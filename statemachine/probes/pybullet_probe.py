@@ -13,6 +13,7 @@ from typing import cast
 
 import numpy as np
 
+from ..backends._bullet_plan import Plan
 from ..backends._bullet_world import Tree, World, pb
 from ..backends.pybullet_backend import PybulletModel
 from ..interface import Model
@@ -25,11 +26,12 @@ _STEPS = 100  # before a state is taken, and after
 @contextmanager
 def _raw(model: Model, gravity: bool = True, damping: bool = True) -> Iterator[World]:
     """The model in a fresh client, as loadURDF leaves it, with the model's gravity."""
-    raw = cast("PybulletModel", model)._shared.raw
+    plan = cast("PybulletModel", model)._shared.plan
     if not damping:
-        raw = copy.copy(raw)
+        raw = copy.copy(plan.raw)
         raw.dof_damping[:] = 0
-    world = World(raw, "engine")
+        plan = Plan(raw)
+    world = World(plan, "engine")
     if not gravity:
         pb.setGravity(0, 0, 0, world.client)
     try:

@@ -1,0 +1,105 @@
+"""A compiled model as PyBullet's worlds want it: texts, surfaces, and how much padding."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from ..records import Array
+from . import _bullet_urdf as urdf
+from ._bullet_surfaces import Surfaces
+
+_SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
+# Of the armature, as inertia of the stepped arm; see `_padding`.
+_SHARE, _BEARABLE, _SAMPLE = 3 / 28, 1.5, 20
+_NO_CONTACT = int(mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+
+
+class Plan:
+    """A compiled model, and what follows from it for every world.
+
+    Attributes:
+        raw: The compiled model.
+        surfaces: What can touch what; nothing where contacts are off.
+        padding: (nv,) what each degree of freedom gets of its armature as inertia of the
+            links of the stepped arm; see `Dialect` and `_bullet_servo`.
+    """
+
+    def __init__(self, raw: mujoco.MjModel) -> None:
+        self.raw = raw
+        self._touches = not raw.opt.disableflags & _NO_CONTACT
+        self.surfaces = Surfaces(raw)
+        if not self._touches:
+            self.surfaces.solids.clear()
+            self.surfaces.pairs.clear()
+        self.padding = _padding(raw)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Plan, (self.raw,)
+
+    def described(self, root: int, kind: str) -> str:
+        """URDF of a tree of bodies as a world of that kind reads it."""
+        dialect = urdf.Dialect(
+            capsules=True,
+            looks=False,
+            solids=kind != "ghost" and self._touches,
+            dynamics=kind == "engine",
+            anchored=bool(root) and not floats(self.raw, root),
+            padding=self.padding if kind == "stepped" else None,
+        )
+        return urdf.write(self.raw, root, dialect)
+
+
+def _padding(raw: mujoco.MjModel) -> Array:
+    """As much of the armature as the observer of contacts bears.
+
+    It converges while what contact meets, the padded arm, is less than twice what the
+    law reckons with, M + A: the largest eigenvalue of (M + A)⁻¹·(M + padding) is kept
+    below `_BEARABLE` in a sample of poses.
+    """
+    share, data = _SHARE * raw.dof_armature, mujoco.MjData(raw)
+    random = np.random.default_rng(0)
+    low, high = np.where(raw.jnt_limited[:, None].astype(bool), raw.jnt_range, [-np.pi, np.pi]).T
+    poses = [raw.qpos0, *raw.key_qpos]
+    scalar = np.isin(raw.jnt_type, [int(mujoco.mjtJoint.mjJNT_HINGE), _SLIDE])
+    for _ in range(_SAMPLE):
+        qpos = raw.qpos0.copy()
+        qpos[raw.jnt_qposadr[scalar]] = random.uniform(low, high)[scalar]
+        poses.append(qpos)
+    worst = 0.0
+    for qpos in poses if share.any() else []:
+        data.qpos[:] = qpos
+        mujoco.mj_forward(raw, data)
+        whole = np.zeros((raw.nv, raw.nv))
+        mujoco.mj_fullM(raw, data, whole)
+        padded = whole - np.diag(raw.dof_armature) + _padding_at(raw, data, share)
+        worst = max(worst, float(np.linalg.eigvals(np.linalg.solve(whole, padded)).real.max()))
+        while worst > _BEARABLE:  # in halves, until this pose bears it too
+            share, worst = share / 2, 0.0
+            padded = whole - np.diag(raw.dof_armature) + _padding_at(raw, data, share)
+            worst = float(np.linalg.eigvals(np.linalg.solve(whole, padded)).real.max())
+    return share
+
+
+def _padding_at(raw: mujoco.MjModel, data: mujoco.MjData, share: Array) -> Array:
+    """What the padding adds to the mass matrix (nv, nv) in a pose."""
+    total = np.zeros((raw.nv, raw.nv))
+    for j in np.flatnonzero(raw.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE)):
+        dof, body = int(raw.jnt_dofadr[j]), int(raw.jnt_bodyid[j])
+        turning = np.zeros((3, raw.nv))
+        mujoco.mj_jac(raw, data, None, turning, data.xipos[body], body)
+        about = data.xaxis[j] @ turning
+        total += share[dof] * (0.50005 * turning.T @ turning + 0.5 * np.outer(about, about))
+    for j in np.flatnonzero(raw.jnt_type == _SLIDE):
+        dof, body = int(raw.jnt_dofadr[j]), int(raw.jnt_bodyid[j])
+        moving = np.zeros((3, raw.nv))
+        mujoco.mj_jac(raw, data, moving, None, data.xipos[body], body)
+        total += share[dof] * moving.T @ moving
+    return total
+
+
+def floats(raw: mujoco.MjModel, root: int) -> bool:
+    """Whether a tree is a free body."""
+    return bool(raw.body_jntnum[root]) and not urdf.axes(raw, root)

@@ -1,0 +1,147 @@
+"""What can touch what, and with how much friction: MuJoCo's rules in PyBullet's terms.
+
+MuJoCo decides by pairs of geoms, and takes the larger friction or that of the geom with
+priority. PyBullet decides by pairs of links, and multiplies what each link has.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from ..records import Array
+
+PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
+_CLOSE = 0.01  # a friction is the model's if it is within this part of it
+
+
+@dataclass(frozen=True)
+class Solid:
+    """What touches as one: the geoms of a body but for planes, or one plane of the world."""
+
+    body: int
+    geoms: tuple[int, ...]
+    plane: bool
+
+
+class Surfaces:
+    """The solids of a model.
+
+    Attributes:
+        solids: All that can touch; planes first.
+        pairs: Of two solids, by their places, whether they meet.
+        slide, spin, roll: Each solid's friction.
+        mixed: Pairs of bodies of whose geoms some meet and some do not.
+        differences: Where friction is not the model's, in words.
+    """
+
+    def __init__(self, raw: mujoco.MjModel) -> None:
+        self._raw = raw
+        self.solids = _solids(raw)
+        self.pairs: dict[tuple[int, int], bool] = {}
+        self.mixed: list[str] = []
+        wanted = []  # friction (3,) of each pair that meets
+        for (i, one), (j, two) in combinations(enumerate(self.solids), 2):
+            meeting = [
+                (a, b) for a in one.geoms for b in two.geoms if _masks_meet(raw, a, b)
+            ] * _bodies_meet(raw, one.body, two.body)
+            self.pairs[i, j] = bool(meeting)
+            if meeting and len(meeting) < len(one.geoms) * len(two.geoms):
+                self.mixed.append(self._label(i, j))
+            if meeting:
+                wanted.append((i, j, np.max([_friction(raw, a, b) for a, b in meeting], axis=0)))
+        self._solve(wanted)
+
+    def _label(self, i: int, j: int) -> str:
+        def name(solid: Solid) -> str:
+            if solid.plane:
+                return self._raw.geom(solid.geoms[0]).name or f"plane {solid.geoms[0]}"
+            return self._raw.body(solid.body).name or f"body {solid.body}"
+
+        return f"{name(self.solids[i])} and {name(self.solids[j])}"
+
+    def _solve(self, wanted: list[tuple[int, int, Array]]) -> None:
+        """Frictions of solids from those of pairs, as well as it goes."""
+        count = len(self.solids)
+        rows, right = [], []
+        for i, j, (slide, _, _) in wanted:
+            if slide > 0:
+                rows.append(np.isin(np.arange(count), (i, j)).astype(np.float64))
+                right.append(np.log(slide))
+        self.slide = np.zeros(count)
+        if rows:
+            logs = np.linalg.lstsq(np.array(rows), np.array(right), rcond=None)[0]
+            rubs = np.any(rows, axis=0)  # what meets nothing with friction has none
+            self.slide = np.where(rubs, np.exp(np.round(logs, 12)), 0.0)
+        self.spin, self.roll = (self._turning(wanted, k) for k in (1, 2))
+        self.differences = []
+        for i, j, (slide, spin, roll) in wanted:
+            found = (
+                ("friction", slide, self.slide[i] * self.slide[j]),
+                ("spinning friction", spin, self._combined(self.spin, i, j)),
+                ("rolling friction", roll, self._combined(self.roll, i, j)),
+            )
+            self.differences += [
+                f"{what} of {self._label(i, j)} is {ours:.3g}, not {theirs:.3g}"
+                for what, theirs, ours in found
+                if abs(ours - theirs) > _CLOSE * max(theirs, 1e-6)
+            ]
+
+    def _combined(self, each: Array, i: int, j: int) -> float:
+        """What PyBullet makes of the spinning or rolling friction of two."""
+        return float(each[i] * self.slide[j] + each[j] * self.slide[i])
+
+    def _turning(self, wanted: list[tuple[int, int, Array]], which: int) -> Array:
+        matrix = np.zeros((len(wanted), len(self.solids)))
+        for row, (i, j, _) in enumerate(wanted):
+            matrix[row, i], matrix[row, j] = self.slide[j], self.slide[i]
+        right = np.array([friction[which] for _, _, friction in wanted])
+        if not right.any():
+            return np.zeros(len(self.solids))
+        found = np.linalg.lstsq(matrix, right, rcond=None)[0]
+        return np.maximum(np.round(found, 12), 0.0)
+
+
+def _solids(raw: mujoco.MjModel) -> list[Solid]:
+    touching = [g for g in range(raw.ngeom) if raw.geom_contype[g] or raw.geom_conaffinity[g]]
+    planes = [g for g in touching if raw.geom_type[g] == PLANE]
+    found = [Solid(0, (g,), True) for g in planes]
+    for body in range(raw.nbody):
+        geoms = tuple(g for g in touching if raw.geom_bodyid[g] == body and g not in planes)
+        if geoms:
+            found.append(Solid(body, geoms, False))
+    return found
+
+
+def _friction(raw: mujoco.MjModel, a: int, b: int) -> Array:
+    """Sliding, spinning and rolling friction of a pair [manual, Computation, Contact]."""
+    first, second = int(raw.geom_priority[a]), int(raw.geom_priority[b])
+    if first == second:
+        friction = np.maximum(raw.geom_friction[a], raw.geom_friction[b])
+        condim = max(raw.geom_condim[a], raw.geom_condim[b])
+    else:
+        leading = a if first > second else b
+        friction, condim = np.array(raw.geom_friction[leading]), raw.geom_condim[leading]
+    return friction * (int(condim) > np.array([1, 3, 4]))
+
+
+def _masks_meet(raw: mujoco.MjModel, a: int, b: int) -> bool:
+    return bool(
+        raw.geom_contype[a] & raw.geom_conaffinity[b]
+        or raw.geom_contype[b] & raw.geom_conaffinity[a]
+    )
+
+
+def _bodies_meet(raw: mujoco.MjModel, a: int, b: int) -> bool:
+    """Not within one rigid piece, nor parent and child, nor excluded."""
+    one, two = int(raw.body_weldid[a]), int(raw.body_weldid[b])
+    if one == two or ((min(a, b) << 16) + max(a, b)) in raw.exclude_signature:
+        return False
+    if raw.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT):
+        return True
+    up: Any = raw.body_weldid[raw.body_parentid[[one, two]]]
+    return not ((up[0] == two and two) or (up[1] == one and one))
