@@ -125,7 +125,7 @@ class Contacts:
             is the normal, from geom 0 to geom 1.
         force: (n, 3) force of geom 0 on geom 1 along those axes [N], normal first.
         torque: (n, 3) torsional and rolling friction about them [N·m]; zero where the
-            contact, or the engine, has none.
+            contact has none, or the engine does not tell it.
 
     All are read-only.
     """

@@ -146,10 +146,11 @@ def test_a_base_is_its_inertial_frame(pb: Any, client: int, load: Load) -> None:
 
 def test_link_frames_are_single_and_centres_of_mass_double(pb: Any, client: int) -> None:
     """At the arm's fingertip, over random poses: why sites are links without mass."""
+    from statemachine.backends._bullet_plan import Plan
     from statemachine.backends._bullet_world import World
 
     raw = mujoco.MjModel.from_xml_path(str(resolve("so101")))
-    data, world = mujoco.MjData(raw), World(raw, "ghost")
+    data, world = mujoco.MjData(raw), World(Plan(raw), "ghost")
     (tree,) = world.trees
     random, frame, centre = np.random.default_rng(0), 0.0, 0.0
     for _ in range(20):
@@ -170,10 +171,11 @@ def test_link_frames_are_single_and_centres_of_mass_double(pb: Any, client: int)
 
 def test_dynamics_are_mujocos_given_the_same_inertias(pb: Any) -> None:
     """Mass matrix and bias of the ghost, in a world that nobody steps."""
+    from statemachine.backends._bullet_plan import Plan
     from statemachine.backends._bullet_world import World
 
     raw = mujoco.MjModel.from_xml_path(str(resolve("so101")))
-    data, world = mujoco.MjData(raw), World(raw, "ghost")
+    data, world = mujoco.MjData(raw), World(Plan(raw), "ghost")
     body, random = world.trees[0].body, np.random.default_rng(1)
     for _ in range(20):
         data.qpos[:], data.qvel[:] = random.uniform(*raw.jnt_range.T), random.uniform(-2, 2, 6)

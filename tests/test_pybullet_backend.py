@@ -135,7 +135,9 @@ def test_hold_before_its_first_contact(golden: Golden) -> None:
     poses, counts, _ = run(load("so101/scene"), HOLD, 53)
     assert not counts.any()
     expected = angles(golden("golden_hold"))[:54]
-    assert np.abs(np.degrees(poses - expected)).max() < 0.1  # 0.02 was measured
+    assert (
+        np.abs(np.degrees(poses - expected)).max() < 0.03
+    )  # 0.019 was measured, in the last step before its first contact
 
 
 def hold_error() -> float:
@@ -147,14 +149,16 @@ def hold_error() -> float:
 
 
 def test_hold_of_the_bare_arm() -> None:
-    assert hold_error() < 0.1  # 0.032 was measured
+    assert hold_error() < 1e-4  # 4e-6 was measured; the target is 0.1
 
 
 def test_fall_without_servos_before_the_floor(golden: Golden) -> None:
     poses, counts, _ = run(load("so101/scene", actuation=False), (0.0,) * 6, 40)
     assert not counts.any()
     expected = angles(golden("golden_gravity_off"))[:41]
-    assert np.abs(np.degrees(poses - expected)).max() < 0.05  # 0.0002 was measured
+    assert (
+        np.abs(np.degrees(poses - expected)).max() < 1e-4
+    )  # 8e-7 was measured; the target is 0.05
 
 
 def test_fallen_arm_on_the_floor(golden: Golden) -> None:

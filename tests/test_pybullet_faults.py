@@ -35,13 +35,15 @@ def _parts() -> Any:
     """The modules of the backend, which need the engine to be imported."""
     from statemachine.backends import (
         _bullet_machine,
+        _bullet_plan,
         _bullet_servo,
         _bullet_world,
         pybullet_backend,
     )
 
     class Parts:
-        machine, servo, world = _bullet_machine, _bullet_servo, _bullet_world
+        machine, plan = _bullet_machine, _bullet_plan
+        servo, world = _bullet_servo, _bullet_world
         backend, pb = pybullet_backend, _bullet_world.pb
 
     return Parts
@@ -166,9 +168,9 @@ def contacts_are_not_observed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(_parts().servo.Arm, "contact", property(lambda self: self.nothing))
 
 
-@around("world", "described")
-def ghost_has_the_padding(right: Any, raw: Any, root: int, kind: str) -> str:
-    return right(raw, root, "stepped" if kind == "ghost" else kind)
+@around("plan.Plan", "described")
+def ghost_has_the_padding(right: Any, self: Any, root: int, kind: str) -> str:
+    return right(self, root, "stepped" if kind == "ghost" else kind)
 
 
 @around("backend.PybulletData", "_set_state")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -10,8 +11,11 @@ import numpy as np
 
 from ..errors import UnsupportedError
 from ..records import JointType
+from ._bullet_surfaces import Surfaces
 from ._bullet_urdf import axes, tree
 
+# PyBullet has room for 128 numbers of a tree, and goes on without a word beyond it.
+_MOST = 120
 _FREE, _BALL = int(JointType.FREE), int(JointType.BALL)
 _SOLIDS = [
     int(kind)
@@ -26,9 +30,26 @@ _SOLIDS = [
 ]
 
 
-def check(raw: mujoco.MjModel, backend: str) -> None:
-    """Raise UnsupportedError, naming all that PyBullet cannot be told of a model."""
-    found = [*_parts(raw), *_joints(raw), *_bodies(raw), *_geoms(raw), *_actuators(raw)]
+def check(raw: mujoco.MjModel, backend: str, path: Path) -> None:
+    """Raise UnsupportedError, naming all that PyBullet cannot be told of a model.
+
+    Args:
+        raw: The compiled model.
+        backend: For the message.
+        path: The file that it was compiled from.
+    """
+    found = [
+        *_parts(raw),
+        *_joints(raw),
+        *_bodies(raw),
+        *_geoms(raw),
+        *_meshes(raw, path),
+        *_actuators(raw),
+    ]
+    found += [
+        ("contact masks within a body", f"of {pair} some geoms meet and some do not")
+        for pair in Surfaces(raw).mixed
+    ]
     if not found:
         return
     feature, reason = found[0]
@@ -89,6 +110,16 @@ def _bodies(raw: mujoco.MjModel) -> Found:
         name = _name(raw, "body", b)
         if raw.body_mocapid[b] >= 0:
             yield "mocap body", f"body {name} is one"
+        if not raw.body_parentid[b]:
+            bodies = tree(raw, b)
+            joints = sum(len(axes(raw, each)) for each in bodies)
+            sites = int(np.isin(raw.site_bodyid, bodies).sum())
+            if len(bodies) + joints + sites > _MOST:
+                yield (
+                    "a tree of so many parts",
+                    f"{name} has {len(bodies)} bodies, {joints} joints and {sites} sites: "
+                    f"more than {_MOST} together",
+                )
         if not raw.body_parentid[b] and raw.body_jntnum[b] and not axes(raw, b):
             rest = len(tree(raw, b)) - 1
             if rest:
@@ -106,6 +137,27 @@ def _geoms(raw: mujoco.MjModel) -> Found:
             yield "plane on a body", f"geom {name} is not the world's own"
         if raw.geom_margin[g]:
             yield "contact margin", f"geom {name} has one"
+
+
+def _meshes(raw: mujoco.MjModel, path: Path) -> Found:
+    """Of meshes that touch, what their files do not say."""
+    touching = (raw.geom_contype | raw.geom_conaffinity).astype(bool)
+    solid = {
+        int(raw.geom_dataid[g])
+        for g in np.flatnonzero(touching)
+        if raw.geom_type[g] == int(mujoco.mjtGeom.mjGEOM_MESH)
+    }
+    moved = set[str]()
+    if solid and path.suffix.lower() == ".xml":
+        for mesh in mujoco.MjSpec.from_file(str(path)).meshes:
+            if np.any(mesh.refpos) or not np.array_equal(mesh.refquat, (1, 0, 0, 0)):
+                moved.add(mesh.name)
+    for m in sorted(solid):
+        name = _name(raw, "mesh", m)
+        if raw.mesh_pathadr[m] < 0:
+            yield "mesh without a file", f"mesh {name} touches"
+        if name in moved:
+            yield "refpos or refquat of a mesh", f"mesh {name} touches"
 
 
 def _actuators(raw: mujoco.MjModel) -> Found:

@@ -31,6 +31,7 @@ from ._mjcf import gravity
 
 pb: Any = require("pybullet")
 
+_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 _AWAY = 1000.0  # [m] between bodies that a reset has set apart
 _TILT = 5e-4  # half the angle [rad] by which it tilts a free body to find its contacts
 _REST = math.sqrt(1 - 2 * _TILT**2)
@@ -110,6 +111,11 @@ class World:
             jointed = any(urdf.axes(raw, b) for b in urdf.tree(raw, root))
             if jointed or kind != "ghost":
                 self._load(root, kind)
+        with silence():  # what it has to say of a tree, it says the first time
+            for tree in self.trees:
+                if tree.joints:
+                    zero = [0.0] * len(tree.joints)
+                    pb.calculateInverseDynamics(tree.body, zero, zero, zero, 0, self.client)
         if kind == "ghost":
             return
         if kind == "stepped":
@@ -206,6 +212,9 @@ class World:
         """Friction of links, and which of them meet."""
         known = self._surfaces
         links = [(body, link) for body, link, _ in self.solids()]
+        for body, link, solid in self.solids():
+            if (self._raw.geom_type[list(solid.geoms)] == _MESH).any():  # else 1 mm too large
+                pb.changeDynamics(body, link, collisionMargin=0, physicsClientId=self.client)
         for k, (body, link) in enumerate(links):
             pb.changeDynamics(
                 body,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import warnings
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,14 +18,14 @@ import numpy as np
 
 from ..checks import check_entries
 from ..engines import engine_version
-from ..errors import DivergedError
+from ..errors import DivergedError, EngineError, EngineWarning
 from ..interface import OPTIONS, Data, Model
 from ..records import BEHAVIOURS, INPUTS, Array, Behaviour, Capabilities, Contacts, State
 from . import _bullet_urdf as urdf
 from ._bullet_machine import Machine, Mirror, Shared
 from ._bullet_plan import Plan
 from ._bullet_scope import check
-from ._bullet_world import ENGINE_TIMESTEP, World
+from ._bullet_world import ENGINE_TIMESTEP, World, pb
 from ._mjcf import compile_file, edited, facts, step_length
 
 _NOT_ALONE = "Data of one Model share its description, and nothing of the engine"
@@ -34,7 +35,8 @@ _EMULATED = {
     "zeros when fresh": "the adapter's; the engine has poses from the first moment",
     "position servo": "solved by the adapter and sent as torque; the engine's is POSITION_CONTROL",
     "armature": "the engine has none: part of it is inertia of the links, the rest in the servo",
-    "joint damping": "implicit, in the servo; the engine's jointDamping is explicit",
+    "joint damping": "in the servo, as MuJoCo's integrator of the file treats it (RK4 as Euler); "
+    "the engine's jointDamping is explicit",
     "dry friction": "MuJoCo's soft friction, in the servo; the engine ignores a URDF's",
     "joint limits": "MuJoCo's soft limits, in the servo; the engine's own are off",
     "free joint conventions": "converted: the engine speaks of the inertial frame, (x, y, z, w)",
@@ -42,8 +44,8 @@ _EMULATED = {
     "no automatic reset": "the adapter looks at every step; the engine goes on with NaN in silence",
 }
 _NATIVE = {
-    "contacts": "the engine's own, hard: solref and solimp have no counterpart; friction "
-    "coefficients of a pair multiply, so each link has the root of its own",
+    "contacts": "the engine's own, hard: solref, solimp and the cone have no counterpart; each "
+    "link's friction is such that the products are the model's, and load warns where none is",
 }
 _RESTORE = "two restores agree bit by bit; the engine's contact caches cannot be read"
 _TOLD = ("qfrc_bias", "qfrc_actuator")  # of the forces, under defaults="engine"
@@ -93,11 +95,15 @@ def load(
         UnsupportedError: It has something that PyBullet has no counterpart for.
     """
     raw = compile_file(path)
-    check(raw, "pybullet")
+    check(raw, "pybullet", Path(path))
     if defaults == "engine":
         raw.opt.gravity[:] = 0
         raw.opt.timestep = ENGINE_TIMESTEP
-    return PybulletModel(raw, Path(path), 1, defaults)
+    model = PybulletModel(raw, Path(path), 1, defaults)
+    World(model._shared.plan, model._shared.kind).close()  # what PyBullet cannot read shows now
+    for difference in model._shared.plan.surfaces.differences if defaults == "model" else ():
+        warnings.warn(f"PyBullet: {difference}", EngineWarning, stacklevel=3)
+    return model
 
 
 class PybulletModel(Model):
@@ -232,6 +238,9 @@ class PybulletData(Data):
     def _failed(self, error: Exception) -> None:
         if isinstance(error, DivergedError):
             self._give_up(f"{error.quantity}[{error.index}] was not finite at {error.time:g} s")
+        elif isinstance(error, pb.error):
+            self._give_up(f"PyBullet gave up: {error}")
+            raise EngineError(f"PyBullet gave up: {error}") from error
 
 
 def _layout(model: PybulletModel) -> tuple[str, tuple[tuple[str, int], ...]]:

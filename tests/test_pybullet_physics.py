@@ -1,0 +1,278 @@
+"""Physics of the PyBullet backend on small models, against MuJoCo and closed forms."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.errors import EngineWarning, UnsupportedError
+
+from .conftest import need_engine
+
+IMPLICIT = '<option timestep="0.002" integrator="implicitfast"/>'
+FLOOR = '<geom name="floor" type="plane" size="1 1 .1"/>'
+
+
+@pytest.fixture(autouse=True)
+def _engine() -> None:
+    need_engine("pybullet")
+
+
+def both(folder: Path, body: str, option: str = IMPLICIT, rest: str = "") -> list[sm.Model]:
+    """The model on MuJoCo and on PyBullet."""
+    file = folder / "m.xml"
+    file.write_text(f"<mujoco>{option}<worldbody>{body}</worldbody>{rest}</mujoco>")
+    return [sm.load(file, backend=backend) for backend in ("mujoco", "pybullet")]
+
+
+def chain(joint: str, count: int = 3, height: float = 1.0) -> str:
+    """Capsules of 0.1 m and 0.1 kg in a row, each on a hinge."""
+    text = ""
+    for k in reversed(range(count)):
+        pos = f"0 0 {height}" if k == 0 else ".1 0 0"
+        text = (
+            f'<body pos="{pos}"><joint name="j{k}" axis="0 1 0" {joint}/>'
+            f'<geom type="capsule" size=".01" fromto="0 0 0 .1 0 0" mass=".1"/>{text}</body>'
+        )
+    return text
+
+
+def apart(models: list[sm.Model], steps: int, qpos: float, ctrl: float = 0.0) -> float:
+    """The largest difference of a joint's position on the way."""
+    paths = []
+    for model in models:
+        with sm.make_data(model) as data:
+            data.qpos[:] = qpos
+            data.ctrl[:] = ctrl
+            path = []
+            for _ in range(steps):
+                sm.step(model, data)
+                path.append(data.qpos.copy())
+        paths.append(np.array(path))
+    return float(np.abs(paths[0] - paths[1]).max())
+
+
+def test_strong_dry_friction_in_joints_that_pull_at_each_other(tmp_path: Path) -> None:
+    """Without armature, friction of one joint moves the next: a plain sweep diverges here."""
+    # 4e-4 was measured, of a sweep that ends when no force moves by 1e-4 N·m.
+    assert apart(both(tmp_path, chain('frictionloss="1"')), 300, 0.3) < 2e-3
+
+
+def test_limits_under_a_stiff_servo(tmp_path: Path) -> None:
+    """Constraints feel the explicit inertia, velocities the implicit one."""
+    servos = "".join(f'<position joint="j{k}" kp="50" kv="5"/>' for k in range(3))
+    models = both(
+        tmp_path,
+        chain('range="-20 30" limited="true" armature=".01" damping=".1"'),
+        rest=f"<actuator>{servos}</actuator>",
+    )
+    assert apart(models, 300, 0.0, ctrl=2.0) < 1e-8
+
+
+@pytest.mark.parametrize("flag", ["", '<flag eulerdamp="disable"/>'])
+def test_the_integrator_of_the_file(tmp_path: Path, flag: str) -> None:
+    """Under Euler a servo's kv is explicit, and joint damping is not, or is."""
+    servos = "".join(f'<position joint="j{k}" kp="5" kv=".1"/>' for k in range(3))
+    option = f'<option timestep="0.005" integrator="Euler">{flag}</option>'
+    models = both(
+        tmp_path, chain('armature=".02" damping=".05"'), option, f"<actuator>{servos}</actuator>"
+    )
+    assert apart(models, 200, 0.2) < 1e-9
+    fast = both(
+        tmp_path, chain('armature=".02" damping=".05"'), rest=f"<actuator>{servos}</actuator>"
+    )
+    assert apart([models[0], fast[0].replace(timestep=0.005)], 200, 0.2) > 1e-5
+
+
+def test_friction_and_limits_in_forward(tmp_path: Path) -> None:
+    found = []
+    for model in both(tmp_path, chain('frictionloss=".02" range="-20 30" limited="true"')):
+        with sm.make_data(model) as data:
+            data.qpos[:] = (0.6, -0.2, 0.55)  # two of them beyond 30°
+            data.qvel[:] = (0.3, -0.4, 0.001)
+            sm.forward(model, data)
+            found.append([data.qacc, data.qfrc_limit, data.qfrc_friction, data.qfrc_bias])
+    assert found[0][1].any()
+    for ours, theirs in zip(found[1], found[0], strict=True):
+        assert np.abs(ours - theirs).max() < 1e-6 * max(1.0, float(np.abs(theirs).max()))
+
+
+@pytest.mark.parametrize("armature", ["0 0 1", "0 0 .1", ".01 .01 .3"])
+def test_light_joints_before_a_heavy_motor_rest_on_the_floor(tmp_path: Path, armature: str) -> None:
+    """All of the armature as inertia of the last link would make the observer swing."""
+    text = chain('damping=".02"', height=0.1)
+    for k, value in enumerate(armature.split()):
+        text = text.replace(f'name="j{k}"', f'name="j{k}" armature="{value}"')
+    servos = "".join(f'<position joint="j{k}" kp="20" kv=".5"/>' for k in range(3))
+    option = '<option timestep="0.005" integrator="implicitfast"/>'
+    _, model = both(tmp_path, FLOOR + text, option, f"<actuator>{servos}</actuator>")
+    with sm.make_data(model) as data:
+        data.ctrl[:] = 0.8
+        sm.step(model, data, 1500)
+        fastest = 0.0
+        for _ in range(200):
+            sm.step(model, data)
+            fastest = max(fastest, float(np.abs(data.qvel).max()))
+    assert fastest < 0.02
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        '<joint name="joint_1" axis="0 1 0"/>{g}<body><joint axis="0 1 0"/>{g}</body>',
+        '<joint name="b_fixed" axis="0 1 0"/>{g}<body name="b" pos="0 0 1">{g}</body>',
+        '<joint name="s_fixed" axis="0 1 0"/>{g}<site name="s"/>',
+        '<joint name="j"/><joint name="k" axis="1 0 0"/>{g}<body name="j_link">{g}</body>',
+        '<joint axis="0 1 0"/>{g}<body name="body_1" pos="0 0 1">{g}</body>',
+        '<joint name="{long}" axis="0 1 0"/>{g}<body name="{long}" pos="0 0 1">{g}</body>',
+    ],
+)
+def test_names_that_a_urdf_would_have_twice(tmp_path: Path, names: str) -> None:
+    """Two joints of one name end the process when PyBullet reads them."""
+    inside = names.replace("{g}", '<geom size=".05"/>').replace("{long}", "n" * 5000)
+    _, model = both(tmp_path, f"<body>{inside}</body>")
+    with sm.make_data(model) as data:
+        data.qpos[0] = 0.3
+        sm.step(model, data, 3)
+        assert np.isfinite(data.qpos).all()
+
+
+def test_more_than_it_can_tell_of_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UnsupportedError, match="so many parts"):
+        both(tmp_path, chain("", 125))
+
+
+def test_a_static_base_meets_what_its_joint_carries(tmp_path: Path) -> None:
+    """MuJoCo lets a parent and its child pass, unless the parent is as good as the world."""
+    body = (
+        '<body name="base"><geom type="box" size=".5 .5 .05" pos="0 0 -.05"/>'
+        '<body pos="0 0 .3"><joint axis="0 1 0"/>'
+        '<geom type="capsule" size=".03" fromto=".1 0 0 .4 0 0"/></body></body>'
+    )
+    ends = []
+    for model in both(tmp_path, body):
+        with sm.make_data(model) as data:
+            sm.step(model, data, 1500)
+            ends.append((float(data.qpos[0]), len(data.contacts)))
+    assert ends[0][1]
+    assert ends[1][1]
+    assert ends[1][0] == pytest.approx(ends[0][0], abs=1e-3)
+
+
+def _cube(folder: Path) -> str:
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    faces = "1 2 4, 1 4 3, 5 7 8, 5 8 6, 1 5 6, 1 6 2, 3 4 8, 3 8 7, 1 3 7, 1 7 5, 2 6 8, 2 8 4"
+    text = "".join(f"v {x * 0.05} {y * 0.05} {z * 0.05}\n" for x, y, z in corners)
+    text += "".join(f"f {face.strip()}\n" for face in faces.split(","))
+    (folder / "cube.obj").write_text(text)
+    return '<asset><mesh name="cube" file="cube.obj"/></asset>'
+
+
+@pytest.mark.parametrize(
+    "geom",
+    [
+        'type="box" size=".05 .05 .05"',
+        'type="cylinder" size=".05 .05"',
+        'type="sphere" size=".05"',
+        'type="mesh" mesh="cube"',
+    ],
+)
+def test_everything_rests_at_its_own_height(tmp_path: Path, geom: str) -> None:
+    """Round and pointed shapes come with a millimetre of their own unless told otherwise."""
+    asset = _cube(tmp_path) if "mesh" in geom else ""
+    body = f'{FLOOR}<body pos="0 0 .052"><freejoint/><geom {geom}/></body>'
+    _, model = both(tmp_path, body, rest=asset)
+    with sm.make_data(model) as data:
+        sm.step(model, data, 1000)
+        assert data.qpos[2] == pytest.approx(0.05, abs=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("floor", "box", "slides"),
+    [
+        ('friction="1"', 'friction=".3"', False),  # the larger counts
+        ('friction=".1" priority="1"', 'friction="1"', True),  # priority counts
+        ('friction="1" condim="3"', 'friction="1" condim="1"', False),  # the larger counts
+        ('friction="1" condim="1"', 'friction="1" condim="1"', True),
+    ],
+)
+def test_friction_of_a_pair_is_the_models(
+    tmp_path: Path, floor: str, box: str, slides: bool
+) -> None:
+    """On a floor that leans by atan(0.2): a box slides at g·(sin − µ·cos), or stays."""
+    option = '<option timestep="0.002" gravity="1.96 0 -9.81" integrator="implicitfast"/>'
+    body = (
+        f'<geom type="plane" size="1 1 .1" {floor}/>'
+        f'<body pos="0 0 .05"><freejoint/><geom type="box" size=".05 .05 .05" {box}/></body>'
+    )
+    _, model = both(tmp_path, body, option)
+    with sm.make_data(model) as data:
+        sm.step(model, data, 500)
+        moved = float(data.qpos[0])
+    friction = 0.1 if "priority" in floor else 0.0
+    expected = (1.96 - friction * 9.81) / 2 if slides else 0.0
+    assert moved == pytest.approx(expected, abs=0.01)
+
+
+def test_friction_that_no_product_gives_is_named(tmp_path: Path) -> None:
+    """Three that meet each other have three pairs and three numbers; four have six pairs."""
+    bodies = "".join(
+        f'<body name="b{k}" pos="{k} 0 1"><freejoint/>'
+        f'<geom size=".1" friction="{friction}" priority="{priority}"/></body>'
+        for k, (friction, priority) in enumerate(((0.2, 3), (1.0, 2), (0.5, 1), (0.9, 0)))
+    )
+    with pytest.warns(EngineWarning, match="friction of b0 and b1"):
+        both(tmp_path, bodies)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sm.load("so101/scene_box", backend="pybullet")
+
+
+@pytest.mark.parametrize(
+    ("body", "rest", "word"),
+    [
+        (
+            f'{FLOOR}<body><freejoint/><geom size=".1"/>'
+            '<geom size=".2" contype="2" conaffinity="2"/></body>',
+            "",
+            "contact masks",
+        ),
+        (
+            f'{FLOOR}<body><freejoint/><geom type="mesh" mesh="m"/></body>',
+            '<asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>',
+            "mesh without a file",
+        ),
+    ],
+)
+def test_what_would_touch_otherwise_is_refused(
+    tmp_path: Path, body: str, rest: str, word: str
+) -> None:
+    with pytest.raises(UnsupportedError, match=word):
+        both(tmp_path, body, rest=rest)
+
+
+def test_a_mesh_that_was_moved_is_refused(tmp_path: Path) -> None:
+    asset = _cube(tmp_path).replace("/></asset>", ' refpos=".3 .2 .1"/></asset>')
+    with pytest.raises(UnsupportedError, match="refpos"):
+        both(tmp_path, f'<body>{FLOOR.replace("plane", "sphere")}</body><body><freejoint/>'
+             '<geom type="mesh" mesh="cube"/></body>', rest=asset)  # fmt: skip
+
+
+def test_a_reset_forgets_what_the_links_of_one_arm_touched() -> None:
+    """Thrown about until it meets itself, then reset: the same bits as a new Data."""
+    model = sm.load("so101/scene_box", backend="pybullet")
+    ends = []
+    for wild in (False, True):
+        with sm.make_data(model) as data:
+            sm.reset(model, data, keyframe=0)
+            if wild:
+                data.qvel[:6] = 100
+                sm.step(model, data, 200)
+                sm.reset(model, data, keyframe=0)
+            sm.step(model, data, 300)
+            ends.append(data.qpos.copy())
+    assert np.array_equal(*ends)
