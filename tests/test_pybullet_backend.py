@@ -399,7 +399,7 @@ def test_a_fast_ball_has_the_signs_of_mujoco(tmp_path: Path) -> None:
 
 def test_two_free_bodies_are_two(tmp_path: Path) -> None:
     """Each is loaded from a text of its own, under a name that may be the other's again."""
-    from statemachine.backends._bullet_world import pb
+    from statemachine.backends._bullet_client import pb
 
     balls = "".join(
         f"<body name='b{k}' pos='{k} 0 {radius}'><freejoint/>"
@@ -646,7 +646,7 @@ def _as_it_comes(**options: Any) -> sm.Model:
 
 
 def test_engine_defaults_are_pybullets() -> None:
-    from statemachine.backends._bullet_world import pb
+    from statemachine.backends._bullet_client import pb
 
     model = _as_it_comes()
     assert model.timestep == 1 / 240
@@ -737,7 +737,7 @@ def _memory() -> float:
 
 
 def _clients() -> int:
-    from statemachine.backends._bullet_world import pb
+    from statemachine.backends._bullet_client import pb
 
     return sum(pb.getConnectionInfo(client)["isConnected"] for client in range(1024))
 
@@ -781,7 +781,7 @@ def test_a_dropped_data_gives_its_client_back() -> None:
 
 
 def test_no_room_for_a_client_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    from statemachine.backends._bullet_world import pb
+    from statemachine.backends._bullet_client import pb
 
     model, answers, right = load("so101"), [-1, -1], pb.connect
     monkeypatch.setattr(pb, "connect", lambda *_: answers.pop() if answers else right(*_))
@@ -934,7 +934,7 @@ def interrupted(
     monkeypatch: pytest.MonkeyPatch, name: str, good: int, call: Callable[[], Any]
 ) -> None:
     """Call something, and be interrupted at a function of PyBullet's, after so many calls."""
-    from statemachine.backends._bullet_world import pb
+    from statemachine.backends._bullet_client import pb
 
     right, counted = getattr(pb, name), iter([True] * good)
 
@@ -1052,7 +1052,7 @@ def test_an_interrupted_reset_of_the_engines_own_can_be_repeated(
 
 
 def test_an_interrupted_command_is_taken_by_the_next_step(monkeypatch: pytest.MonkeyPatch) -> None:
-    from statemachine.backends._bullet_servo import Arm
+    from statemachine.backends._bullet_arm import Arm
 
     model = load("so101")
     ends = []

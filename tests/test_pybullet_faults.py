@@ -34,16 +34,18 @@ def _engine() -> None:
 def _parts() -> Any:
     """The modules of the backend, which need the engine to be imported."""
     from statemachine.backends import (
+        _bullet_arm,
+        _bullet_law,
         _bullet_machine,
         _bullet_plan,
-        _bullet_servo,
+        _bullet_shared,
         _bullet_world,
         pybullet_backend,
     )
 
     class Parts:
-        machine, plan = _bullet_machine, _bullet_plan
-        servo, world = _bullet_servo, _bullet_world
+        machine, plan, shared = _bullet_machine, _bullet_plan, _bullet_shared
+        arm, law, world = _bullet_arm, _bullet_law, _bullet_world
         backend, pb = pybullet_backend, _bullet_world.pb
 
     return Parts
@@ -72,12 +74,12 @@ def around(where: str, name: str) -> Callable[[Callable[..., Any]], Patch]:
     return decorate
 
 
-@around("machine", "wxyz_from_xyzw")
+@around("shared", "wxyz_from_xyzw")
 def xyzw_for_wxyz(right: Any, quat: Any) -> Any:
     return np.array(quat)
 
 
-@around("machine.Shared", "poses")
+@around("shared.Shared", "poses")
 def centre_of_mass_for_frame(right: Any, self: Any, qpos: Any) -> Any:
     found = right(self, qpos)
     turns = matrix_from_quat(found["xquat"])
@@ -96,7 +98,7 @@ def joints_counted_without_the_fixed(right: Any, self: Any, *arguments: Any) -> 
     self.joints = [index - 1 for index in self.joints]  # the first is fixed: the anchor
 
 
-@around("servo.Law", "__init__")
+@around("law.Law", "__init__")
 def armature_dropped(right: Any, self: Any, raw: Any, tree: Any) -> None:
     raw = copy.copy(raw)
     raw.dof_armature[:] = 0
@@ -158,14 +160,14 @@ def spin_in_world_axes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(world, "read_free", faulty_read)
 
 
-@around("servo.Law", "__init__")
+@around("law.Law", "__init__")
 def ctrl_is_not_clamped(right: Any, self: Any, *arguments: Any) -> None:
     right(self, *arguments)
     self._ctrl_low, self._ctrl_high = self._ctrl_low - 1e9, self._ctrl_high + 1e9
 
 
 def contacts_are_not_observed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_parts().servo.Arm, "contact", property(lambda self: self.nothing))
+    monkeypatch.setattr(_parts().arm.Arm, "contact", property(lambda self: self.nothing))
 
 
 @around("plan.Plan", "described")

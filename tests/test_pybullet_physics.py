@@ -225,8 +225,9 @@ def test_friction_that_no_product_gives_is_named(tmp_path: Path) -> None:
         f'<geom size=".1" friction="{friction}" priority="{priority}"/></body>'
         for k, (friction, priority) in enumerate(((0.2, 3), (1.0, 2), (0.5, 1), (0.9, 0)))
     )
-    with pytest.warns(EngineWarning, match="friction of b0 and b1"):
+    with pytest.warns(EngineWarning) as told:
         both(tmp_path, bodies)
+    assert any("friction of b0 and b1 is" in str(warning.message) for warning in told)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         sm.load("so101/scene_box", backend="pybullet")

@@ -128,14 +128,14 @@ def _code_lines(source: str) -> int:
 
 
 def test_the_core_stays_thin() -> None:
-    """At most 1,700 lines of code; the emulation on PyBullet has a limit of its own."""
+    """At most 1,600 lines of code; the emulation on PyBullet has a limit of its own."""
     package = ROOT / "statemachine"
     lines = {False: 0, True: 0}
     for name in CORE:
         for file in [package / name] if name.endswith(".py") else (package / name).glob("*.py"):
             lines[bool(EMULATION.search(file.name))] += _code_lines(file.read_text())
-    assert lines[False] <= 1700
-    assert lines[True] <= 1500
+    assert lines[False] <= 1600
+    assert lines[True] <= 1850
 
 
 def test_the_core_does_not_import_what_stands_on_it() -> None:

@@ -7,11 +7,10 @@ copies of the moment that it belongs to.
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -19,12 +18,13 @@ import numpy as np
 from ..checks import HUGE, check_entries
 from ..errors import BadInputError, DivergedError
 from ..records import DERIVED, POSES, Array, Contacts
-from ..rotations import matrix_from_quat, times, wxyz_from_xyzw
+from ..rotations import matrix_from_quat
+from ._bullet_arm import Arm, Motors
+from ._bullet_client import pb
 from ._bullet_contacts import contacts
-from ._bullet_plan import Plan
-from ._bullet_servo import Arm, Law
-from ._bullet_world import Tree, World, pb
-from ._mjcf import gravity
+from ._bullet_law import Law
+from ._bullet_shared import Shared, free_dynamics
+from ._bullet_world import World
 
 
 @dataclass(slots=True)
@@ -45,131 +45,7 @@ class Moment:
 Observed = list[tuple[Array, Array]]
 
 
-class Shared:
-    """What the Data of one Model share: the description, and worlds that have no state.
-
-    Attributes:
-        plan: What every world is made from; raw: its compiled model.
-        kind: "stepped" for the emulated contract, "engine" for PyBullet as it comes.
-        lock: Held while one of the shared worlds is used.
-    """
-
-    def __init__(self, plan: Plan, kind: Literal["stepped", "engine"]) -> None:
-        self.plan, self.raw = plan, plan.raw
-        self.kind: Literal["stepped", "engine"] = kind
-        self.lock = threading.RLock()
-        self._ghost: World | None = None
-        self._still_joints = np.zeros(plan.raw.nv)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Shared, (self.plan, self.kind)
-
-    @property
-    def ghost(self) -> World:
-        """The true arm in a client that is never stepped: kinematics and dynamics."""
-        with self.lock:  # for two threads that make the first Data at once
-            if self._ghost is None:
-                self._ghost = World(self.plan, "ghost")
-            return self._ghost
-
-    @cached_property
-    def still(self) -> tuple[Array, Array, Array, Array]:
-        """xpos, xquat, site_xpos and site_xmat of what never moves."""
-        data = mujoco.MjData(self.raw)
-        mujoco.mj_kinematics(self.raw, data)
-        return data.xpos, data.xquat, data.site_xpos, data.site_xmat
-
-    def poses(self, qpos: Array) -> dict[str, Array]:
-        """xpos, xquat, site_xpos and site_xmat, by the engine's own forward kinematics.
-
-        Centres of mass and their axes are what PyBullet reports in double precision; a
-        site is the centre of mass of a link of its own.
-        """
-        raw = self.raw
-        xpos, xquat, site_xpos, site_xmat = (array.copy() for array in self.still)
-        for tree in self.ghost.trees:
-            bodies, sites = list(tree.links), list(tree.tips)
-            with self.lock:
-                self.ghost.put(qpos, self._still_joints)
-                states = self.ghost.link_states(tree)
-            where, turned = (np.array(part) for part in zip(*states, strict=True))
-            turned = wxyz_from_xyzw(turned)
-            n = len(bodies)
-            xquat[bodies] = times(turned[:n], raw.body_iquat[bodies] * _INVERSE)
-            turns = matrix_from_quat(xquat[bodies])
-            xpos[bodies] = where[:n] - np.einsum("bij,bj->bi", turns, raw.body_ipos[bodies])
-            site_xpos[sites], site_xmat[sites] = (
-                where[n:],
-                matrix_from_quat(turned[n:]).reshape(-1, 9),
-            )
-        for joint in np.flatnonzero(raw.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)):
-            body, start = int(raw.jnt_bodyid[joint]), int(raw.jnt_qposadr[joint])
-            quat = qpos[start + 3 : start + 7]
-            xpos[body], xquat[body] = qpos[start : start + 3], quat / np.linalg.norm(quat)
-            turn = matrix_from_quat(xquat[body])
-            for site in np.flatnonzero(raw.site_bodyid == body):
-                site_xpos[site] = xpos[body] + turn @ raw.site_pos[site]
-                site_xmat[site] = (turn @ matrix_from_quat(raw.site_quat[site])).ravel()
-        return dict(zip(POSES, (xpos, xquat, site_xpos, site_xmat), strict=True))
-
-
 _MANY = HUGE * HUGE
-_INVERSE = np.array([1.0, -1.0, -1.0, -1.0])  # of a unit quaternion
-
-
-class Motors:
-    """One tree of joints as PyBullet's users drive it: POSITION_CONTROL to ctrl."""
-
-    def __init__(self, world: World, tree: Tree, raw: mujoco.MjModel) -> None:
-        self._world, self.tree = world, tree
-        joints = raw.dof_jntid[tree.dofs].tolist()
-        off = raw.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
-        driven = [] if off else list(range(raw.nu))
-        pairs = [
-            (joints.index(raw.actuator_trnid[a, 0]), a)
-            for a in driven
-            if raw.actuator_trnid[a, 0] in joints
-        ]
-        self.contact = self.friction = self.nothing = np.zeros(len(tree.dofs))
-        self._driven = [tree.joints[place] for place, _ in pairs]
-        self._ids = [a for _, a in pairs]
-
-    def place(self, qpos: Array, qvel: Array, *_: Array) -> None:
-        """Start from a state."""
-        self.angles, self.speed = qpos[self.tree.qpos], qvel[self.tree.qvel]
-
-    def read(self) -> None:
-        """Take over what the engine made of the last step."""
-        states = pb.getJointStates(self.tree.body, self.tree.joints, self._world.client)
-        self.angles, self.speed, self.torque = np.array([(s[0], s[1], s[3]) for s in states]).T
-
-    def forces(self) -> dict[str, Array]:
-        """What the engine tells: its bias, and the torque of its motors in the last step."""
-        return {"qfrc_bias": self._bias, "qfrc_actuator": self.torque}
-
-    def command(self, ctrl: Array) -> None:
-        """Take a new command (nu,) of the whole model."""
-        self._targets = ctrl[self._ids].tolist()
-
-    def drive(self, settled: bool = False) -> None:
-        """Command the motors, as a PyBullet user would; without actuation, nothing is said."""
-        self._bias = np.array(
-            pb.calculateInverseDynamics(
-                self.tree.body,
-                self.angles.tolist(),
-                self.speed.tolist(),
-                self.nothing.tolist(),
-                physicsClientId=self._world.client,
-            )
-        )
-        if self._driven:
-            pb.setJointMotorControlArray(
-                self.tree.body,
-                self._driven,
-                pb.POSITION_CONTROL,
-                targetPositions=self._targets,
-                physicsClientId=self._world.client,
-            )
 
 
 class Mirror:
@@ -435,7 +311,7 @@ class Machine:
         touched = set(raw.geom_bodyid[self.derive("contacts").geom].ravel().tolist())
         for tree in self._free:
             own, turn = tree.qvel, matrix_from_quat(self.derive("xquat")[tree.root])
-            inertia, bias = _free_dynamics(raw, tree.root, turn, moment.qvel[own])
+            inertia, bias = free_dynamics(raw, tree.root, turn, moment.qvel[own])
             found["qfrc_bias"][own] = bias
             if tree.root in touched:  # what it did beyond falling, contact did
                 rate = (self._last_qvel[own] - moment.qvel[own]) / self._timestep
@@ -445,26 +321,6 @@ class Machine:
         for part in parts:
             found["qfrc_constraint"] += found[f"qfrc_{part}"]
         return found
-
-
-def _free_dynamics(raw: mujoco.MjModel, body: int, turn: Array, qvel: Array) -> tuple[Array, Array]:
-    """Mass matrix (6, 6) and bias (6,) of a free body, in MuJoCo's coordinates.
-
-    Newton's and Euler's equations about the centre of mass, whose velocity is J·qvel.
-    """
-    mass, centre = float(raw.body_mass[body]), raw.body_ipos[body]
-    axes = matrix_from_quat(raw.body_iquat[body])
-    inertia = np.einsum("ij,j,kj->ik", axes, raw.body_inertia[body], axes)
-    spin = qvel[3:]
-    cross = np.cross(np.eye(3), centre)  # cross @ w = w × centre … of rows
-    jacobian = np.zeros((3, 6))
-    jacobian[:, :3], jacobian[:, 3:] = np.eye(3), turn @ cross.T
-    total = mass * (jacobian.T @ jacobian)
-    total[3:, 3:] += inertia
-    whirl = turn @ np.cross(spin, np.cross(spin, centre))
-    bias: Array = jacobian.T @ (mass * np.asarray(whirl - gravity(raw), dtype=np.float64))
-    bias[3:] += np.cross(spin, inertia @ spin)
-    return total, bias
 
 
 def _zeros(raw: mujoco.MjModel) -> dict[str, Any]:

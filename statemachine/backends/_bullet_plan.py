@@ -24,7 +24,7 @@ class Plan:
         raw: The compiled model.
         surfaces: What can touch what; nothing where contacts are off.
         padding: (nv,) what each degree of freedom gets of its armature as inertia of the
-            links of the stepped arm; see `Dialect` and `_bullet_servo`.
+            links of the stepped arm; see `Dialect` and `_bullet_law`.
     """
 
     def __init__(self, raw: mujoco.MjModel) -> None:

@@ -6,30 +6,23 @@ body's inertial frame, joints by the index of their link.
 
 from __future__ import annotations
 
-import gc
 import math
-import os
-import tempfile
 import weakref
 from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
 from typing import Any, Literal
 
 import mujoco
 import numpy as np
 
-from ..engines import require
-from ..errors import EngineError, ModelError
+from ..errors import ModelError
 from ..records import Array
 from ..rotations import matrix_from_quat, xyzw_from_wxyz
-from ..silence import apart, silence
+from ..silence import silence
 from . import _bullet_urdf as urdf
+from ._bullet_client import Quat, as_file, connect, disconnect, pb, times, turned
 from ._bullet_plan import Plan, floats
 from ._bullet_surfaces import Solid
 from ._mjcf import gravity
-
-pb: Any = require("pybullet")
 
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 _AWAY = 1000.0  # [m] between bodies that a reset has set apart
@@ -101,8 +94,8 @@ class World:
         """
         self._plan, self._raw, self._surfaces = plan, plan.raw, plan.surfaces
         raw = plan.raw
-        self.client = _connect()
-        self._end = weakref.finalize(self, _disconnect, self.client)
+        self.client = connect()
+        self._end = weakref.finalize(self, disconnect, self.client)
         pb.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self.client)
         pb.setGravity(*gravity(raw).tolist(), self.client)
         self.trees: list[Tree] = []
@@ -156,7 +149,7 @@ class World:
             | pb.URDF_USE_SELF_COLLISION_INCLUDE_PARENT  # which pairs meet, _filter says
             | pb.URDF_USE_IMPLICIT_CYLINDER  # else a polygon, and a millimetre too large
         )
-        with _as_file(text) as name, silence() as said:
+        with as_file(text) as name, silence() as said:
             try:
                 body = pb.loadURDF(
                     name,
@@ -256,7 +249,7 @@ class World:
         poses = {body: pb.getBasePositionAndOrientation(body, self.client) for body in self._frames}
         for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1)):
             for body, (pos, quat) in poses.items():
-                tilted = _times((x * _TILT, y * _TILT, 0.0, _REST), quat)
+                tilted = times((x * _TILT, y * _TILT, 0.0, _REST), quat)
                 pb.resetBasePositionAndOrientation(body, pos, tilted, self.client)
             pb.performCollisionDetection(self.client)
         for tree in self.trees:
@@ -284,7 +277,7 @@ class World:
         quat = qpos[3:] / np.linalg.norm(qpos[3:])
         turn = matrix_from_quat(quat)
         arm, spin = turn @ centre, turn @ qvel[3:]
-        pose = _times(xyzw_from_wxyz(quat).tolist(), axes)
+        pose = times(xyzw_from_wxyz(quat).tolist(), axes)
         where, speed = qpos[:3] + arm, qvel[:3] + np.cross(spin, arm)
         self._last[body] = pose
         pb.resetBasePositionAndOrientation(body, where.tolist(), pose, self.client)
@@ -311,14 +304,14 @@ class World:
         (vx, vy, vz), spin = pb.getBaseVelocity(tree.body, self.client)
         quat = pose
         if aw != 1 or any(centre):  # else the frames are one
-            quat = _times(pose, (-ax, -ay, -az, aw))
+            quat = times(pose, (-ax, -ay, -az, aw))
             # r: from the body's origin to its centre of mass, in world axes.
-            rx, ry, rz = _turned(quat, centre)
+            rx, ry, rz = turned(quat, centre)
             wx, wy, wz = spin
             px, py, pz = px - rx, py - ry, pz - rz
             vx, vy, vz = vx - wy * rz + wz * ry, vy - wz * rx + wx * rz, vz - wx * ry + wy * rx
         x, y, z, w = quat
-        spin = _turned((-x, -y, -z, w), spin)
+        spin = turned((-x, -y, -z, w), spin)
         return [px, py, pz, w, x, y, z], [vx, vy, vz, *spin]
 
     def link_states(self, tree: Tree) -> list[Any]:
@@ -336,66 +329,3 @@ class World:
 
 ENGINE_TIMESTEP = 1 / 240
 _FAST = 1e9  # [rad/s] PyBullet clamps joint speeds at 100 unless told otherwise
-
-
-def _connect() -> int:
-    client = pb.connect(pb.DIRECT)
-    if client < 0:
-        gc.collect()  # Data that nobody closed may hold the places
-        client = pb.connect(pb.DIRECT)
-    if client < 0:
-        raise EngineError("PyBullet holds 1024 worlds in one process at most: close some Data")
-    return client
-
-
-def _disconnect(client: int) -> None:
-    try:
-        pb.disconnect(client)
-    except (pb.error, TypeError):  # the user has, or the module is gone at exit
-        return
-
-
-@contextmanager
-def _as_file(text: str) -> Iterator[str]:
-    """A name under which PyBullet can read a text; nothing is left when the process dies."""
-    if hasattr(os, "memfd_create"):
-        with open(os.memfd_create("urdf"), "wb") as file:
-            file.write(text.encode())
-            file.flush()
-            fd = apart(file.fileno())  # silence takes the places of stdout and stderr
-            try:
-                yield f"/proc/self/fd/{fd}"
-            finally:
-                os.close(fd)
-        return
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "model.urdf"
-        path.write_text(text)
-        yield str(path)
-
-
-Quat = tuple[float, float, float, float]
-
-
-def _times(a: Any, b: Any) -> Quat:
-    """Product of two quaternions, (x, y, z, w)."""
-    ax, ay, az, aw = a
-    bx, by, bz, bw = b
-    return (
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )
-
-
-def _turned(quat: Any, vector: Any) -> tuple[float, float, float]:
-    """A vector turned by a unit quaternion (x, y, z, w)."""
-    x, y, z, w = quat
-    vx, vy, vz = vector
-    tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
-    return (
-        vx + w * tx + y * tz - z * ty,
-        vy + w * ty + z * tx - x * tz,
-        vz + w * tz + x * ty - y * tx,
-    )

@@ -22,10 +22,12 @@ from ..errors import DivergedError, EngineError, EngineWarning
 from ..interface import OPTIONS, Data, Model
 from ..records import BEHAVIOURS, INPUTS, Array, Behaviour, Capabilities, Contacts, State
 from . import _bullet_urdf as urdf
-from ._bullet_machine import Machine, Mirror, Shared
+from ._bullet_client import pb
+from ._bullet_machine import Machine, Mirror
 from ._bullet_plan import Plan
 from ._bullet_scope import check
-from ._bullet_world import ENGINE_TIMESTEP, World, pb
+from ._bullet_shared import Shared
+from ._bullet_world import ENGINE_TIMESTEP, World
 from ._mjcf import compile_file, edited, facts, step_length
 
 _NOT_ALONE = "Data of one Model share its description, and nothing of the engine"

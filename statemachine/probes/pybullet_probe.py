@@ -13,8 +13,9 @@ from typing import cast
 
 import numpy as np
 
+from ..backends._bullet_client import pb
 from ..backends._bullet_plan import Plan
-from ..backends._bullet_world import Tree, World, pb
+from ..backends._bullet_world import Tree, World
 from ..backends.pybullet_backend import PybulletModel
 from ..interface import Model
 from ..records import Array

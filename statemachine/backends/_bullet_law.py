@@ -29,7 +29,8 @@ import mujoco
 import numpy as np
 
 from ..records import Array
-from ._bullet_world import Tree, World, pb
+from ._bullet_client import pb
+from ._bullet_world import Tree
 
 _OFF = mujoco.mjtDisableBit
 _SWEEPS, _SETTLED = 500, 1e-9  # at most so many sweeps, until no force moves more [N·m]
@@ -242,99 +243,6 @@ class Law:
         for (i, sign, *_), force in zip(rows[len(speed) :], forces[len(speed) :], strict=True):
             limit[i] = sign * force
         return np.array(forces[: len(speed)]), limit
-
-
-class Arm:
-    """One tree of joints in a stepped world, driven by its law.
-
-    Attributes:
-        q, v: Positions and velocities, as the engine has them; `angles` and `speed` are
-            the same as arrays.
-        friction: (n,) the dry friction of the last step [N·m or N].
-        last: What the last step was driven with.
-    """
-
-    def __init__(self, world: World, tree: Tree, ghost: World, law: Law) -> None:
-        twin = next(other for other in ghost.trees if other.root == tree.root)
-        self._ghost = (twin.body, ghost.client)
-        self._client, self._body = world.client, tree.body
-        self.tree, self.law = tree, law
-        self.last: Solution | None = None
-        self.angles = self.speed = np.zeros(len(tree.dofs))
-        self.q: Sequence[float] = []
-        self.v: Sequence[float] = []
-        self.nothing = self.friction = np.zeros(len(tree.dofs))
-        self._contact: Array | None = self.nothing
-
-    def place(self, qpos: Array, qvel: Array, contact: Array, friction: Array) -> None:
-        """Start from a state; contact and friction (n,) are those of the step before it."""
-        self.q, self.v = qpos[self.tree.qpos].tolist(), qvel[self.tree.qvel].tolist()
-        self._x = np.array([*self.q, *self.v, 1.0])
-        self.angles, self.speed = self._x[: len(self.q)], self._x[len(self.q) : -1]
-        self._contact, self.friction = contact, friction
-        self.last = None
-
-    def read(self) -> None:
-        """Take over what the engine made of the last step."""
-        self.q, self.v, _, _ = zip(
-            *pb.getJointStates(self._body, self.tree.joints, self._client), strict=True
-        )
-        self._x = np.array([*self.q, *self.v, 1.0])
-        self.angles, self.speed = self._x[: len(self.q)], self._x[len(self.q) : -1]
-        self._contact = None
-
-    @property
-    def contact(self) -> Array:
-        """(n,) the generalised force of contacts during the last step [N·m or N]."""
-        if self._contact is None:
-            last = self.last
-            assert last is not None  # it was read after a step
-            rate = ((self.speed - last.speed) / self.law.timestep).tolist()
-            needed = pb.calculateInverseDynamics(
-                self._body, last.qpos, last.qvel, rate, 0, self._client
-            )
-            self._contact = np.array(needed) - last.torque
-        return self._contact
-
-    def forces(self) -> dict[str, Array]:
-        """Accelerations and forces of the last step, by their names in the contract."""
-        last, contact = self.last, self.contact
-        assert last is not None  # it was read after a step
-        total = last.actuator + last.passive + last.friction + last.limit + contact
-        inertia = last.mass + np.diag(self.law.armature)
-        acceleration: Array = np.linalg.inv(inertia) @ (total - last.bias)
-        return {
-            "qacc": acceleration,
-            "qfrc_bias": last.bias,
-            "qfrc_actuator": last.actuator,
-            "qfrc_passive": last.passive,
-            "qfrc_friction": last.friction,
-            "qfrc_limit": last.limit,
-            "qfrc_contact": contact,
-        }
-
-    def command(self, ctrl: Array) -> None:
-        """Take a new command (nu,) of the whole model."""
-        self._aim = self.law.aim(ctrl)
-
-    def drive(self, settled: bool = False) -> None:
-        """Give the engine the torque of the next step."""
-        contact = self.contact
-        self.last, acceleration = self.law.solve(
-            self._ghost, self.q, self.v, self._x, self._aim, contact, self.friction, settled
-        )
-        self.friction = self.last.friction
-        needed = pb.calculateInverseDynamics(
-            self._body, self.q, self.v, acceleration.tolist(), 0, self._client
-        )
-        self.last.torque = torque = np.array(needed) - contact
-        pb.setJointMotorControlArray(
-            self._body,
-            self.tree.joints,
-            pb.TORQUE_CONTROL,
-            forces=torque.tolist(),
-            physicsClientId=self._client,
-        )
 
 
 _FLAGS = {

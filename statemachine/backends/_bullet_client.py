@@ -1,0 +1,80 @@
+"""A client of PyBullet's: opened, given a file, closed; and its quaternions (x, y, z, w)."""
+
+from __future__ import annotations
+
+import gc
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from ..engines import require
+from ..errors import EngineError
+from ..silence import apart
+
+pb: Any = require("pybullet")
+
+
+def connect() -> int:
+    client = pb.connect(pb.DIRECT)
+    if client < 0:
+        gc.collect()  # Data that nobody closed may hold the places
+        client = pb.connect(pb.DIRECT)
+    if client < 0:
+        raise EngineError("PyBullet holds 1024 worlds in one process at most: close some Data")
+    return client
+
+
+def disconnect(client: int) -> None:
+    try:
+        pb.disconnect(client)
+    except (pb.error, TypeError):  # the user has, or the module is gone at exit
+        return
+
+
+@contextmanager
+def as_file(text: str) -> Iterator[str]:
+    """A name under which PyBullet can read a text; nothing is left when the process dies."""
+    if hasattr(os, "memfd_create"):
+        with open(os.memfd_create("urdf"), "wb") as file:
+            file.write(text.encode())
+            file.flush()
+            fd = apart(file.fileno())  # silence takes the places of stdout and stderr
+            try:
+                yield f"/proc/self/fd/{fd}"
+            finally:
+                os.close(fd)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model.urdf"
+        path.write_text(text)
+        yield str(path)
+
+
+Quat = tuple[float, float, float, float]
+
+
+def times(a: Any, b: Any) -> Quat:
+    """Product of two quaternions, (x, y, z, w)."""
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
+def turned(quat: Any, vector: Any) -> tuple[float, float, float]:
+    """A vector turned by a unit quaternion (x, y, z, w)."""
+    x, y, z, w = quat
+    vx, vy, vz = vector
+    tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
+    return (
+        vx + w * tx + y * tz - z * ty,
+        vy + w * ty + z * tx - x * tz,
+        vz + w * tz + x * ty - y * tx,
+    )
