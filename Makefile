@@ -1,4 +1,4 @@
-# make lesson       set everything up and run the main lesson
+# make lesson       set everything up and run the main lessons
 # make test         set everything up and run all checks and tests
 # make check        lint, format, layers and types only
 # make bench        the speed budget, as ratios

@@ -7,11 +7,18 @@ import difflib
 import io
 import os
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from . import __version__
-from .errors import MissingEngineError, StateMachineError
+from .errors import (
+    EngineWarning,
+    MissingEngineError,
+    ModelError,
+    StateMachineError,
+    UnsupportedError,
+)
 from .lessons import LESSONS, Lesson, module
 
 PROGRAM = "statemachine"
@@ -56,6 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a console without Unicode must not end a lesson
             stream.reconfigure(errors="replace")
+    warnings.showwarning = _show_warning
     parser = _parser()
     options = parser.parse_args(arguments)
     if getattr(options, "run", None) is None:
@@ -81,12 +89,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _complain(OSError(f"the output cannot be written: {error.strerror}"), NO_OUTPUT)
 
 
+def _show_warning(message: Warning | str, category: type[Warning], *where: Any) -> None:
+    """What an engine warns of in one line; where in our code it came up is no help."""
+    if issubclass(category, EngineWarning):
+        _complain(message, 0)
+    else:
+        sys.stderr.write(warnings.formatwarning(message, category, *where[:2]))
+
+
 def _let_go_of_output() -> None:
     """Nothing more can be said there; without this, Python would try once more at its end."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _complain(error: Exception, code: int) -> int:
+def _complain(error: Exception | str, code: int) -> int:
     print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
     return code
 
@@ -236,11 +252,12 @@ def _on_each_backend(
 
     everyone = options.backend == "all"
     results: dict[str, Any] = {}
-    missing: list[MissingEngineError] = []
+    missing: list[StateMachineError] = []
     for backend in backend_names() if everyone else [options.backend]:
         try:
             model = load(options.model, backend=backend, menagerie=options.menagerie)
-        except MissingEngineError as error:
+        except (MissingEngineError, ModelError, UnsupportedError) as error:
+            # A file that is bad for all is no engine's doing.
             if not everyone:
                 raise
             missing.append(error)

@@ -86,6 +86,7 @@ def require(name: str) -> ModuleType:
             engine=name,
         ) from None
     except Exception as error:  # a missing shared library, a bad MUJOCO_GL, …
+        raise_if_interrupted(error)
         raise _broken(engine, error) from error
     if not hasattr(module, engine.probe):
         raise MissingEngineError(
@@ -94,6 +95,19 @@ def require(name: str) -> ModuleType:
             engine=name,
         )
     return module
+
+
+def raise_if_interrupted(error: BaseException) -> None:
+    """Raise KeyboardInterrupt if that is what made an import fail.
+
+    A Ctrl-C that falls into the start of a C extension comes out as "initialization
+    failed", and would pass for an engine that does not load.
+    """
+    seen: BaseException | None = error
+    while seen is not None:
+        if isinstance(seen, KeyboardInterrupt):
+            raise KeyboardInterrupt from error
+        seen = seen.__cause__ or seen.__context__
 
 
 def _broken(engine: Engine, error: Exception) -> MissingEngineError:

@@ -182,7 +182,7 @@ class Model(ABC):
         checked = {}
         for name, value in options.items():
             if name not in OPTIONS:
-                error = unknown_name("option", name, OPTIONS)
+                error = unknown_name("option", name, self.capabilities.options)
                 raise UnsupportedError(
                     str(error), backend=self.backend, feature=name, reason="unknown"
                 ) from None

@@ -93,6 +93,15 @@ class Capabilities:
     shared_model: bool
     exact_restore: bool
 
+    def __str__(self) -> str:
+        lines = [f"options of replace: {', '.join(self.options)}"]
+        lines.append(f"integrators: {', '.join(self.integrators) or 'as in the file'}")
+        alone = "share the compiled model" if self.shared_model else "share its description only"
+        lines.append(f"several Data of a Model {alone}")
+        for name, behaviour in self.behaviours.items():
+            lines.append(f"{name}: {behaviour.support}; {behaviour.note}")
+        return "\n".join(lines)
+
 
 @dataclass(frozen=True, eq=False)
 class Keyframe:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Protocol, cast
 
-from ..engines import require
+from ..engines import raise_if_interrupted, require
 from ..errors import BadInputError, MissingEngineError, unknown_name
 from ..interface import Model
 from ..models import resolve
@@ -103,6 +103,7 @@ def load(
     try:
         loader = cast("Callable[..., Model]", getattr(importlib.import_module(module), function))
     except (ImportError, AttributeError) as error:
+        raise_if_interrupted(error)
         raise MissingEngineError(
             f"backend {backend!r} cannot be loaded from {entry.loader!r}: {error}", engine=backend
         ) from error

@@ -120,6 +120,8 @@ class Law:
         self._ctrl_low, self._ctrl_high = _range(raw.actuator_ctrlrange[ids], clamped)
         limited = raw.actuator_forcelimited[ids].astype(bool)
         self._low_force, self._high_force = _range(raw.actuator_forcerange[ids], limited)
+        fenced = raw.jnt_actfrclimited[joints].astype(bool)
+        self._fence = _range(raw.jnt_actfrcrange[joints], fenced) if fenced.any() else None
         self._straight = np.array_equal(self._gear, np.eye(len(joints)))
         return np.column_stack([*feedback, bias[:, 0]])
 
@@ -166,6 +168,8 @@ class Law:
         passive, damped, wanted = linear[:n], linear[n : 2 * n], linear[2 * n :] + aim
         force = np.minimum(np.maximum(wanted, self._low_force), self._high_force)
         actuator = force if self._straight else self._gear @ force
+        if self._fence is not None:
+            actuator = np.minimum(np.maximum(actuator, self._fence[0]), self._fence[1])
         inertia = self._unsaturated
         if force.tobytes() != wanted.tobytes():
             inertia = self._with_slope(force == wanted)

@@ -98,7 +98,6 @@ def _joints(raw: mujoco.MjModel) -> Found:
         for what, values in (
             ("nonlinear spring", raw.jnt_stiffnesspoly[j]),
             ("nonlinear damping", raw.dof_dampingpoly[dof]),
-            ("joint actuatorfrcrange", raw.jnt_actfrclimited[j]),
             ("joint margin", raw.jnt_margin[j] * raw.jnt_limited[j]),
         ):
             if np.any(values):

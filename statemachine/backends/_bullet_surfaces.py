@@ -59,7 +59,7 @@ class Surfaces:
     def _label(self, i: int, j: int) -> str:
         def name(solid: Solid) -> str:
             if solid.plane:
-                return self._raw.geom(solid.geoms[0]).name or f"plane {solid.geoms[0]}"
+                return self._raw.geom(solid.geoms[0]).name or f"the plane (geom {solid.geoms[0]})"
             return self._raw.body(solid.body).name or f"body {solid.body}"
 
         return f"{name(self.solids[i])} and {name(self.solids[j])}"

@@ -200,8 +200,8 @@ def _geom(
     elif kind != _PLANE:  # which URDF does not know
         raise ValueError(f"geom {geom} has no counterpart in URDF")
     name = raw.geom(geom).name
-    label = f" name={quoteattr(name)}" if name else ""
-    for where, solid in solids:
+    for k, (where, solid) in enumerate(solids):
+        label = f" name={quoteattr(name)}" if name and not k else ""  # each name once
         yield f"    <{element}{label}>"
         yield f"      {_origin(where, mat)}"
         yield f"      <geometry>{solid}</geometry>"

@@ -30,44 +30,49 @@ from ._bullet_shared import Shared
 from ._bullet_world import ENGINE_TIMESTEP, World
 from ._mjcf import compile_file, edited, facts, step_length
 
-_NOT_ALONE = "Data of one Model share its description, and nothing of the engine"
 _EMULATED = {
-    "stale after a write": "the adapter's own copies; the engine would follow a write at once",
-    "stale after a step": "poses by forward kinematics of the state before, when they are read",
-    "zeros when fresh": "the adapter's; the engine has poses from the first moment",
-    "position servo": "solved by the adapter and sent as torque; the engine's is POSITION_CONTROL",
-    "armature": "the engine has none: part of it is inertia of the links, the rest in the servo",
-    "joint damping": "in the servo, as MuJoCo's integrator of the file treats it (RK4 as Euler); "
-    "the engine's jointDamping is explicit",
-    "dry friction": "MuJoCo's soft friction, in the servo; the engine ignores a URDF's",
-    "joint limits": "MuJoCo's soft limits, in the servo; the engine's own are off",
-    "free joint conventions": "converted: the engine speaks of the inertial frame, (x, y, z, w)",
-    "forces by part": "contact from what a step did beyond the other forces, these as solved",
+    "stale after a write": "by copies of the adapter; the engine's own values follow a write",
+    "stale after a step": "poses of the state before are computed when they are read",
+    "zeros when fresh": "by the adapter; the engine has poses from the first moment",
+    "position servo": "the adapter solves the model's servo and sends torques; the engine's own "
+    "way is POSITION_CONTROL",
+    "armature": "the engine has none: the adapter reckons with it, and gives the engine's links a "
+    "part of it as inertia",
+    "joint damping": "by the adapter, as the file's integrator treats it (RK4 as Euler); the "
+    "engine's jointDamping is explicit",
+    "dry friction": "by the adapter, MuJoCo's soft friction; the engine ignores that of a URDF",
+    "joint limits": "by the adapter, MuJoCo's soft limits; the engine's own are off",
+    "free joint conventions": "converted: the engine speaks of the centre of mass, and x y z w",
+    "forces by part": "contact: what a step did beyond all other forces; those as solved",
     "no automatic reset": "the adapter looks at every step; the engine goes on with NaN in silence",
 }
 _NATIVE = {
-    "contacts": "the engine's own, hard: solref, solimp and the cone have no counterpart; each "
-    "link's friction is such that the products are the model's, and load warns where none is",
+    "contacts": "the engine's own, which are hard: solref, solimp and the friction cone have no "
+    "counterpart. It multiplies the frictions of two links: they are chosen so that the products "
+    "are the model's, and load warns where that cannot be",
 }
-_RESTORE = "two restores agree bit by bit; the engine's contact caches cannot be read"
+_RESTORE = (
+    "two restores of one State have the same future, bit by bit, but not that of the run it was "
+    "taken from: the engine's memory of contacts cannot be read"
+)
 _TOLD = ("qfrc_bias", "qfrc_actuator")  # of the forces, under defaults="engine"
 _AS_IT_COMES = {
     "position servo": Behaviour(
         "native", "POSITION_CONTROL; with actuation off its motors hold every joint still"
     ),
     "armature": Behaviour("unsupported", "the engine has none"),
-    "joint damping": Behaviour("native", "the URDF's, explicit, and 0.04 on every body"),
-    "dry friction": Behaviour("unsupported", "the engine ignores a URDF's"),
-    "joint limits": Behaviour("native", "the URDF's"),
+    "joint damping": Behaviour("native", "that of the URDF, explicit, and 0.04 on every body"),
+    "dry friction": Behaviour("unsupported", "the engine ignores that of a URDF"),
+    "joint limits": Behaviour("native", "those of the URDF"),
     "forces by part": Behaviour("unsupported", "the engine tells its bias and its motors' torque"),
-    "contacts": Behaviour("native", "friction 0.5, and none between links of one robot"),
+    "contacts": Behaviour("native", "friction 0.5, and none between the links of one robot"),
 }
 
 
 def _capabilities(as_it_comes: bool) -> Capabilities:
     behaviours = {name: Behaviour("emulated", note) for name, note in _EMULATED.items()}
     behaviours |= {name: Behaviour("native", note) for name, note in _NATIVE.items()}
-    behaviours["exact restore"] = Behaviour("emulated", f"{_RESTORE}. {_NOT_ALONE}")
+    behaviours["exact restore"] = Behaviour("unsupported", _RESTORE)
     options = tuple(name for name in OPTIONS if name != "integrator")
     if as_it_comes:
         behaviours |= _AS_IT_COMES
@@ -103,8 +108,9 @@ def load(
         raw.opt.timestep = ENGINE_TIMESTEP
     model = PybulletModel(raw, Path(path), 1, defaults)
     World(model._shared.plan, model._shared.kind).close()  # what PyBullet cannot read shows now
-    for difference in model._shared.plan.surfaces.differences if defaults == "model" else ():
-        warnings.warn(f"PyBullet: {difference}", EngineWarning, stacklevel=3)
+    differences = model._shared.plan.surfaces.differences
+    if differences and defaults == "model":
+        warnings.warn(f"PyBullet: {'; '.join(differences)}", EngineWarning, stacklevel=3)
     return model
 
 

@@ -40,6 +40,7 @@ class Hold:
         previous: Largest distance [m] between the fingertip that a step leaves and
             the one that `forward` computed before that step.
         first_contact: When the robot first touched something [s], or None.
+        touched: What touched what then; contact_steps: how many steps found a contact.
         touching: What it touches at the end.
         speed: (nu,) velocities of the actuated joints at the end.
         without_contacts: (nu,) where the joints end if nothing can touch; None if
@@ -55,6 +56,8 @@ class Hold:
     lag: Array
     previous: float
     first_contact: float | None
+    touched: tuple[str, ...]
+    contact_steps: int
     touching: tuple[str, ...]
     speed: Array
     without_contacts: Array | None
@@ -98,6 +101,8 @@ def run(
     addresses = np.array([scalar_joint(model, name) for name in names], dtype=np.int64)
     robot, total = moved_by_actuators(model), steps_in(model, seconds)
     times, poses, lags, first, previous = [0.0], [], [], None, 0.0
+    touched: tuple[str, ...] = ()
+    contact_steps = 0
     with make_data(model) as data:
         poses.append(data.qpos[addresses[:, 0]])
         data.ctrl = goal
@@ -106,8 +111,10 @@ def run(
         for k in range(total):
             began = data.time
             step(model, data)
-            if first is None and touching(model, data.contacts, robot):
-                first = began
+            found = touching(model, data.contacts, robot)
+            contact_steps += bool(found)
+            if found and first is None:
+                first, touched = began, found
             stale = np.array(data.site_xpos[tip])
             previous = max(previous, float(np.linalg.norm(stale - fresh)))
             forward(model, data)
@@ -119,7 +126,7 @@ def run(
                 progress(k / total)
         at_end = touching(model, data.contacts, robot)
         if first is None and at_end:
-            first = data.time
+            first, touched = data.time, at_end
         return Hold(
             target=goal,
             goal=np.clip(goal, *model.actuator_ctrlrange.T),
@@ -128,6 +135,8 @@ def run(
             lag=np.array(lags),
             previous=previous,
             first_contact=first,
+            touched=touched,
+            contact_steps=contact_steps,
             touching=at_end,
             speed=data.qvel[addresses[:, 1]].copy(),
             without_contacts=None if first is None else _freely(model, goal, total, addresses),

@@ -150,16 +150,16 @@ def ways_back(model: Model, ctrl: Array, steps: int = 100) -> tuple[WayBack, ...
         start(data)
         found["reset to the keyframe"] = future(data, steps) - whole
         start(other)
-        found["a new Data, the same keyframe"] = future(other, steps) - whole
+        found["a new Data, same keyframe"] = future(other, steps) - whole
         set_state(model, data, state)
         restored = future(data, steps)
-        found["set_state, mid-contact: on as before?"] = restored - rest
+        found["set_state: on as before?"] = restored - rest
         set_state(model, other, state)
-        found["set_state twice: the same future?"] = future(other, steps) - restored
+        found["set_state, and once more"] = future(other, steps) - restored
         reset(model, other)
         for name in ("qpos", "qvel", "ctrl"):
             setattr(other, name, state[name])
-        found["only qpos, qvel, ctrl written back"] = future(other, steps) - rest
+        found["qpos, qvel, ctrl put back"] = future(other, steps) - rest
     return tuple(WayBack(name, float(np.abs(gap).max())) for name, gap in found.items())
 
 

@@ -16,7 +16,6 @@ def page(results: Mapping[str, fingertip.Certificate]) -> Page:
     first = next(iter(results.values()))
     seed = first.provenance.seed
     pinocchio = first.provenance.versions["pinocchio"]
-    digits = 6 if len(results) == 1 else 4  # so that two columns fit
     blocks: list[Any] = [
         Text(
             f"The engine computes where the fingertip ({first.site}) is, by forward; Pinocchio "
@@ -28,7 +27,7 @@ def page(results: Mapping[str, fingertip.Certificate]) -> Page:
             ("", *results),
             [
                 ("frames apart", *(_offset(r.frames) for r in results.values())),
-                ("default pose [m]", *(vector(r.default_pose, digits) for r in results.values())),
+                ("default pose [m]", *(vector(r.default_pose) for r in results.values())),
                 ("position, worst [m]", *(_figure(r.position_worst) for r in results.values())),
                 ("position, median [m]", *(_figure(r.position_median) for r in results.values())),
                 ("rotation matrix, worst", *(_figure(r.rotation_worst) for r in results.values())),

@@ -37,6 +37,7 @@ def page(results: Mapping[str, gravity.Gravity]) -> Page:
         for name, result in results.items()
         for state, droop in (("on", result.servos_on), ("off", result.servos_off))
     }
+    headers = [name.replace(": ", "\n") for name in columns]
     digits = {name: 3 if name.endswith("on") else 2 for name in columns}
     end = float(first.servos_on.time[-1])
     steps = f"{round(end / first.provenance.timestep)})"
@@ -55,7 +56,7 @@ def page(results: Mapping[str, gravity.Gravity]) -> Page:
             )
         ),
         Table(
-            ("time", *columns),
+            ("time", *headers),
             [
                 (
                     f"{time:.2f} s",
@@ -69,7 +70,7 @@ def page(results: Mapping[str, gravity.Gravity]) -> Page:
             title=f"{first.joint} under gravity",
         ),
         Table(
-            ("who", *columns),
+            ("who", *headers),
             [
                 *(
                     (label, *(signed(_part(run, part)) for run in columns.values()))
@@ -135,17 +136,18 @@ def _alone(name: str, result: gravity.Gravity) -> list[Table | Text]:
         Table(
             (f"{name} itself", result.joint, "its own motor"),
             rows,
-            title=f"The same arm as {name}'s own users load it, nothing commanded, at {time:g} s",
+            title=f"The same model as {name}'s own users load it, left alone, at {time:.3g} s",
         )
     ]
     loaded, held, limp, undamped = result.alone
     if held.motor and abs(held.position) < min(abs(limp.position), abs(undamped.position)) / 10:
         blocks.append(
             Text(
-                f"A fresh arm does not fall on {name}, and not because of its servos: without "
-                "being told, gravity is zero; and every joint comes with a motor of the engine's "
-                f"own that holds it still, here with {abs(held.motor):.4f} {unit}. With the "
-                f"motors off and the URDF's damping left out {result.joint} is at "
+                f"At {name}'s own 1/240 s a step. There a freshly loaded arm does not fall, and "
+                "not because of its servos: gravity is zero until it is set, and every joint "
+                "comes with a motor of the engine's own that holds it still, here with "
+                f"{abs(held.motor):.4f} {unit}. With gravity set, the motors off and no joint "
+                f"damping in the URDF, {result.joint} is at "
                 f"{position(undamped.position, result.slide)} then, having started at "
                 f"{position(loaded.position, result.slide)}."
             )
@@ -153,10 +155,10 @@ def _alone(name: str, result: gravity.Gravity) -> list[Table | Text]:
     if limp.explicit > 2:
         blocks.append(
             Text(
-                f"With the motors off and the damping in, the arm on {name} flails: a joint's "
-                "damping is applied explicitly there, with the velocity of before the step, and "
-                f"h·D is {limp.explicit:.0f} times an inertia of this arm. Above 2 each step "
-                "turns a velocity round and makes it larger."
+                f"With the motors off and the damping in, it flails: {name} takes the damping "
+                "torque of the velocity before the step. In a step that changes the velocity by "
+                f"timestep × damping ÷ inertia, here up to {limp.explicit:.0f} times itself; from "
+                "2 on the joint turns round faster than it was."
             )
         )
     return blocks
@@ -204,10 +206,11 @@ def _finding(name: str, run: gravity.Droop, first: gravity.Gravity) -> Text | Ve
     label = max(against, key=lambda each: against[each])
     unit = _unit(first)
     text = (
-        f"{name}: {first.joint} is held by the {label}: {against[label]:.4f} of "
-        f"{abs(load):.4f} {unit}, and all forces sum to zero"
+        f"{name}: {first.joint} is held by the {label}, with {against[label]:.4f} {unit} against "
+        f"gravity's {abs(load):.4f} {unit}, and all forces sum to zero"
     )
     if label == "contact":
-        rest = sum(against.get(part, 0.0) for part in ("damping", "dry friction"))
-        text += f". Damping and dry friction together hold {rest:.4f} {unit}"
+        rest = -sum(_part(run, part) or 0.0 for part in ("passive", "friction")) * np.sign(load)
+        how = "hold" if rest >= 0 else "pull the other way, with gravity, by"
+        text += f". Damping and dry friction together {how} {abs(rest):.4f} {unit}"
     return Verdict(text, True)

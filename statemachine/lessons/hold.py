@@ -13,6 +13,7 @@ from .page import Code, Page, Table, Text, Verdict
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
 _SAME = 1e-12  # metres
+_STILL = 1e-6  # rad/s or m/s
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> hold.Hold:
@@ -124,11 +125,15 @@ def _end(result: hold.Hold) -> str:
     fastest = int(np.argmax(np.abs(result.speed)))
     speed = position(abs(result.speed[fastest]), result.slides[fastest], 3)
     text = f"At the end {result.joints[fastest]} is the fastest, at {speed}/s."
+    if abs(result.speed[fastest]) < _STILL:
+        text = "At the end everything stands still."
     if result.first_contact is None:
         return text + " The robot touched nothing."
-    text += f" The robot touches something, first at {result.first_contact:.3f} s"
-    if result.touching:
-        text += f"; at the end: {', '.join(result.touching)}"
+    text += (
+        f" The robot touches something in {result.contact_steps} of {len(result.lag)} steps, first "
+        f"at {result.first_contact:.3f} s: {', '.join(result.touched)}; at the end: "
+        f"{', '.join(result.touching) or 'nothing'}"
+    )
     if result.without_contacts is not None:
         gap = np.abs(result.without_contacts - result.goal)
         worst = int(np.argmax(gap))

@@ -21,7 +21,8 @@ from ..interface import Model
 from ..records import Array
 from . import Alone, Term, WayBack
 
-_STEPS = 100  # before a state is taken, and after
+# Before a state is taken, while the jaws still touch what they hold; and after it.
+_BEFORE, _AFTER = 10, 100
 
 
 @contextmanager
@@ -128,8 +129,8 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[Alone, ...]:
     for label, gravity, motors, damping in (
         ("as loadURDF leaves it", False, True, True),
         ("gravity set", True, True, True),
-        ("and motors off", True, False, True),
-        ("and no damping in the URDF", True, False, False),
+        ("gravity set, motors off", True, False, True),
+        ("… and no joint damping", True, False, False),
     ):
         with _raw(model, gravity, damping) as world:
             # The engine's own timestep, whatever the model's file says.
@@ -173,6 +174,7 @@ def ways_back(model: Model) -> tuple[WayBack, ...]:
     qpos = start.qpos if start else cast("PybulletModel", model)._shared.raw.qpos0
     target = start.ctrl if start else np.zeros(model.nu)
     zero = np.zeros(model.nv)
+    touching: list[int] = []
 
     def run(world: World, steps: int) -> Array:
         trace = []
@@ -188,11 +190,12 @@ def ways_back(model: Model) -> tuple[WayBack, ...]:
     def difference(back: Callable[[World], Callable[[], None]]) -> float:
         with _raw(model) as world:
             begin(world)
-            run(world, _STEPS)
+            run(world, _BEFORE)
+            touching.append(sum(point[8] <= 0 for point in world.contact_points()))
             restore = back(world)
-            first = run(world, _STEPS)
+            first = run(world, _AFTER)
             restore()
-            return float(np.abs(run(world, _STEPS) - first).max(initial=0.0))
+            return float(np.abs(run(world, _AFTER) - first).max(initial=0.0))
 
     def saved(world: World) -> Callable[[], None]:
         state = pb.saveState(world.client)
@@ -206,18 +209,20 @@ def ways_back(model: Model) -> tuple[WayBack, ...]:
     for _ in range(2):
         with _raw(model) as world:
             begin(world)
-            futures.append(run(world, 2 * _STEPS))
+            futures.append(run(world, _BEFORE + _AFTER))
     again = float(np.abs(futures[1] - futures[0]).max(initial=0.0))
     with _raw(model) as world:
         begin(world)
-        first = run(world, _STEPS)
+        first = run(world, _AFTER)
         begin(world)
-        same_client = float(np.abs(run(world, _STEPS) - first).max(initial=0.0))
+        same_client = float(np.abs(run(world, _AFTER) - first).max(initial=0.0))
+    kept, put = difference(saved), difference(written)
+    moment = f"after {_BEFORE} steps, {touching[0]} contacts"
     return (
-        WayBack("the same client, resetJointState and resetBase…", same_client),
-        WayBack("saveState, restoreState, mid-contact", difference(saved)),
-        WayBack("positions and velocities written back, mid-contact", difference(written)),
-        WayBack("a new client, loaded again, from the start", again),
+        WayBack("a new client, loaded again", again),
+        WayBack("resetJointState, resetBase… to the start", same_client),
+        WayBack(f"saveState, restoreState {moment}", kept),
+        WayBack(f"written back {moment}", put),
     )
 
 

@@ -76,7 +76,7 @@ def page(diagnosis: Diagnosis) -> Page:
             *blocks,
             *(Text(step) for step in steps),
             Verdict(
-                "everything that the lessons need is here"
+                "everything that the lessons need on MuJoCo is here"
                 if diagnosis.healthy
                 else "the lessons cannot run yet: see above",
                 diagnosis.healthy,
