@@ -106,7 +106,9 @@ def test_gravity_prints_the_table_of_the_course(cli: Cli) -> None:
     for run in (found["servos_on"], off):
         assert abs(run["forces"]["total"]) < 1e-5
     assert found["servos_on"]["forces"]["contact"] == 0.0
-    assert "shoulder_lift is held by the contact: 0.6079 of 0.6168 N·m" in " ".join(page.split())
+    said = " ".join(page.split())
+    assert "held by the contact, with 0.6079 N·m against gravity's 0.6168 N·m" in said
+    assert "Damping and dry friction together hold 0.0089 N·m" in said
 
 
 def test_gravity_beyond_four_seconds_creeps(cli: Cli) -> None:
@@ -375,7 +377,7 @@ def test_gravity_of_a_slide_and_of_an_equality(cli: Cli, tmp_path: Path) -> None
     rest = "<equality><joint joint1='j'/></equality>"
     file = _model(tmp_path, body, rest)
     page = cli("lesson", "gravity", "--model", file, "--joint", "j")
-    assert "j is held by the equality: 9.81" in page.stdout
+    assert "j is held by the equality, with 9.81" in page.stdout
     assert "[N]" in page.stdout
     assert "mm" in page.stdout
     assert page.returncode == 0
@@ -486,3 +488,42 @@ def test_output_that_cannot_be_written(tmp_path: Path, command: str) -> None:
         )
         assert done.returncode in codes, done.stderr
         assert len(done.stderr.splitlines()) == (1 if 74 in codes else 0), done.stderr
+
+
+def test_a_run_that_has_just_begun_is_no_broken_balance(cli: Cli) -> None:
+    """At 0.1 s the joint is slow and about to move: that its forces do not cancel is right."""
+    page = cli("lesson", "gravity", "--seconds", "0.1")
+    assert page.returncode == 0
+    assert "still moves" in page.stdout
+
+
+def test_one_engine_that_refuses_a_model_leaves_the_other(cli: Cli, tmp_path: Path) -> None:
+    need_engine("pybullet")
+    body = "<body><joint name='b' type='ball'/><geom size='0.1'/></body>"
+    file = _model(tmp_path, body)
+    done = cli("lesson", "state", "--model", file, "--backend", "all", "--json")
+    assert done.returncode == 0
+    assert list(json.loads(done.stdout)) == ["mujoco"]
+    (line,) = done.stderr.splitlines()
+    assert "ball joint: joint b" in line
+
+
+def test_what_an_engine_warns_of_is_one_line_without_our_code(cli: Cli, tmp_path: Path) -> None:
+    need_engine("pybullet")
+    body = "<geom type='plane' size='1 1 1' friction='.1'/><body pos='0 0 1'><joint name='j'/>"
+    body += "<geom size='.1' friction='.1'/><geom pos='1 0 0' size='.1' friction='.9'/></body>"
+    file = _model(tmp_path, body)
+    done = cli("lesson", "gravity", "--model", file, "--joint", "j", "--backend", "pybullet")
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("statemachine: PyBullet: friction of ")
+    assert ".py" not in line
+
+
+def test_the_projects_own_urdf_runs_on_both(cli: Cli) -> None:
+    need_engine("pybullet")
+    from statemachine.models import models_dir
+
+    file = models_dir() / "so101" / "so101.urdf"
+    done = cli("lesson", "state", "--model", file, "--backend", "all", "--json")
+    assert list(json.loads(done.stdout)) == ["mujoco", "pybullet"]
+    assert not done.stderr

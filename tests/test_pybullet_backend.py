@@ -500,9 +500,6 @@ REFUSED = {
     "ball joint": _world(f'<body><joint name="wrist" type="ball"/>{_G}</body>'),
     "joint ref": _world(f'<body><joint name="wrist" ref="0.3"/>{_G}</body>'),
     "joint margin": _world(f'<body><joint name="wrist" range="-1 1" margin="0.1"/>{_G}</body>'),
-    "joint actuatorfrcrange": _world(
-        f'<body><joint name="wrist" actuatorfrcrange="-1 1"/>{_G}</body>'
-    ),
     "mocap body": _world(f'<body name="hand" mocap="true">{_G}</body>'),
     "equality constraint": f'{_JOINT}<equality><joint joint1="j"/></equality>',
     "tendon": f'{_JOINT}<tendon><fixed><joint joint="j" coef="1"/></fixed></tendon>',
@@ -540,7 +537,7 @@ REFUSED = {
 # The part of a file that an error has to name, where it has a name.
 NAMED = {
     "ball joint": "wrist", "joint ref": "wrist", "joint margin": "wrist", "mocap body": "hand",
-    "joint actuatorfrcrange": "wrist", "actuator transmission": "pull",
+    "actuator transmission": "pull",
     "actuator of a free joint": "jet", "actuator dynamics": "lag", "actuator gain": "odd",
     "free body of several bodies": "top", "damping of a free joint": "joint f",
     "armature of a free joint": "joint f", "shape of a geom": "egg", "contact margin": "skin",

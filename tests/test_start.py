@@ -148,3 +148,15 @@ def test_a_missing_or_broken_engine_is_one_line(
     assert done.returncode == 3, done.stderr
     assert len(done.stderr.splitlines()) == 1, done.stderr
     assert words in done.stderr
+
+
+def test_an_interrupt_is_no_engine_that_does_not_load(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A Ctrl-C in the start of a C extension comes out as an ImportError of it."""
+    from statemachine import engines
+
+    def interrupted(name: str) -> None:
+        raise ImportError("initialization failed") from KeyboardInterrupt()
+
+    monkeypatch.setattr(engines.importlib, "import_module", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        engines.require("mujoco")

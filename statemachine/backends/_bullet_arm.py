@@ -89,11 +89,11 @@ class Arm:
         """Take a new command (nu,) of the whole model."""
         self._aim = self.law.aim(ctrl)
 
-    def drive(self, settled: bool = False) -> None:
+    def drive(self, afresh: bool = False) -> None:
         """Give the engine the torque of the next step."""
         contact = self.contact
         self.last, acceleration = self.law.solve(
-            self._ghost, self.q, self.v, self._x, self._aim, contact, self.friction, settled
+            self._ghost, self.q, self.v, self._x, self._aim, contact, self.friction, afresh
         )
         self.friction = self.last.friction
         needed = pb.calculateInverseDynamics(
@@ -143,7 +143,7 @@ class Motors:
         """Take a new command (nu,) of the whole model."""
         self._targets = ctrl[self._ids].tolist()
 
-    def drive(self, settled: bool = False) -> None:
+    def drive(self, afresh: bool = False) -> None:
         """Command the motors, as a PyBullet user would; without actuation, nothing is said."""
         self._bias = np.array(
             pb.calculateInverseDynamics(

@@ -33,8 +33,8 @@ from ._bullet_client import pb
 from ._bullet_world import Tree
 
 _OFF = mujoco.mjtDisableBit
-_SWEEPS, _SETTLED = 500, 1e-9  # at most so many sweeps, until no force moves more [N·m]
-_STEADY = 1e-8  # [N²·m²] a change of friction from which more sweeps are worth it
+_PIVOTS, _SWEEPS, _SETTLED = 30, 500, 1e-9
+_STEADY = 1e-5  # of the largest friction: a change of it that is worth the whole solution
 _TINY = 1e-15  # smallest pivot
 _EXPLICIT = (int(mujoco.mjtIntegrator.mjINT_EULER), int(mujoco.mjtIntegrator.mjINT_RK4))
 
@@ -81,6 +81,7 @@ class Law:
         rub = not (off["friction"] or off["constraint"])
         self._frictionloss = raw.dof_frictionloss[dofs] * rub
         self._least_rub, self._rubs = -self._frictionloss, self._frictionloss.any()
+        self._steady = _STEADY**2 * float(self._frictionloss @ self._frictionloss)
         weight = raw.dof_invweight0[dofs]
         floor = 0.0 if off["refsafe"] else 2 * h
         solref, solimp = raw.dof_solref[dofs], raw.dof_solimp[dofs]
@@ -145,7 +146,7 @@ class Law:
         aim: Array,
         contact: Array,
         friction: Array,
-        settled: bool = False,
+        afresh: bool = False,
     ) -> tuple[Solution, Array]:
         """The forces of a step and the acceleration (n,) that they give.
 
@@ -157,7 +158,7 @@ class Law:
             aim: Of the command.
             contact: (n,) observed in the last step.
             friction: (n,) of the last step.
-            settled: Do not rely on the last step's friction.
+            afresh: Solve for friction whole, not from the last step's.
         """
         body, client = ghost
         mass = np.array(pb.calculateMassMatrix(body, q, 0, client))
@@ -178,22 +179,23 @@ class Law:
         mujoco.mju_cholFactor(implicit, _TINY)
         others = actuator + passive - bias + contact
         limit = self._nothing
+        solve = afresh
         for place, (low, high) in zip(q, self._ranges, strict=True):
             if not low <= place <= high:
-                settled = True
-        if not settled and self._rubs:
+                solve = True
+        if not solve and self._rubs:
             # One sweep from the last step's friction, of all joints at once: enough where
-            # nothing changes, as in a joint that rests or slides.
+            # it hardly changes, as in a joint that rests or slides.
             rest = _solved(explicit, others + friction) + damped + self._rub_r * friction
             moved = np.minimum(
                 np.maximum(friction - rest / self._rub_weight, self._least_rub), self._frictionloss
             )
             change = moved - friction
             friction = moved
-            settled = change.dot(change) > _STEADY
-        if settled:
+            solve = change.dot(change) > self._steady
+        if solve:
             inverse = np.linalg.inv(mass + self._inertia[0])
-            friction, limit = self._sweep(inverse, others, x, friction)
+            friction, limit = self._constrained(inverse, others, x, friction)
             others = others + limit
         acceleration = _solved(implicit, others + friction)
         return (
@@ -201,52 +203,64 @@ class Law:
             acceleration,
         )
 
-    def _sweep(
+    def _constrained(
         self, inverse: Array, others: Array, x: Array, friction: Array
     ) -> tuple[Array, Array]:
-        """Friction and limit force, by projected Gauss-Seidel."""
-        place, speed = np.split(x[:-1], 2)
+        """Friction and limit force, by pivoting between free and bounded rows.
+
+        Each row of sign s at joint i has a force F between two bounds, and wants
+        s·a_i + R·F = its reference; a row at a bound may miss it to one side.
+        """
+        n = len(friction)
+        place, speed = x[:n], x[n:-1]
         gap = np.minimum(place - self._low, self._high - place)
-        side = np.where(place - self._low < self._high - place, 1.0, -1.0)
-        strength = _impedance(self._solimp, gap)
-        stop_r = _softness(strength, self._weight)
-        aim = -self._stop_b * side * speed - self._stop_k * strength * gap
-        rows = [  # (joint, sign, R, reference, smallest force, largest force)
-            *zip(
-                range(len(speed)),
-                np.ones(len(speed)),
-                self._rub_r.tolist(),
-                (-self._rub_b * speed).tolist(),
-                self._least_rub.tolist(),
-                self._frictionloss.tolist(),
-                strict=True,
-            ),
-            *(
-                (i, side[i], stop_r[i], aim[i], 0.0, np.inf)
-                for i in np.flatnonzero(gap < 0).tolist()
-            ),
-        ]
-        forces = [*friction.tolist(), *[0.0] * (len(rows) - len(speed))]
-        acceleration = (inverse @ (others + friction)).tolist()
-        columns = inverse.T.tolist()
-        for _ in range(_SWEEPS):
-            change = 0.0
-            for k, (i, sign, soft, goal, least, most) in enumerate(rows):
-                rest = sign * acceleration[i] + soft * forces[k] - goal
-                new = min(max(forces[k] - rest / (columns[i][i] + soft), least), most)
-                moved = new - forces[k]
-                forces[k] = new
-                if moved:
-                    change = max(change, abs(moved))
-                    acceleration = [
-                        a + sign * moved * c for a, c in zip(acceleration, columns[i], strict=True)
-                    ]
-            if change < _SETTLED:
-                break
-        limit = np.zeros(len(speed))
-        for (i, sign, *_), force in zip(rows[len(speed) :], forces[len(speed) :], strict=True):
-            limit[i] = sign * force
-        return np.array(forces[: len(speed)]), limit
+        hit = np.flatnonzero(gap < 0)
+        side = np.where(place - self._low < self._high - place, 1.0, -1.0)[hit]
+        strength = _impedance(self._solimp[hit], gap[hit])
+        stop = -self._stop_b[hit] * side * speed[hit] - self._stop_k[hit] * strength * gap[hit]
+        at = np.concatenate([np.arange(n), hit])
+        sign = np.concatenate([np.ones(n), side])
+        soft = np.concatenate([self._rub_r, _softness(strength, self._weight[hit])])
+        goal = np.concatenate([-self._rub_b * speed, stop])
+        least = np.concatenate([self._least_rub, np.zeros(len(hit))])
+        most = np.concatenate([self._frictionloss, np.full(len(hit), np.inf)])
+        matrix = sign[:, None] * inverse[np.ix_(at, at)] * sign + np.diag(soft)
+        right = goal - sign * (inverse @ others)[at]
+        force = np.concatenate([friction, np.zeros(len(hit))])
+        force = _pivoted(matrix, right, least, most, force)
+        limit = np.zeros(n)
+        limit[hit] = side * force[n:]
+        return force[:n], limit
+
+
+def _pivoted(matrix: Array, right: Array, least: Array, most: Array, start: Array) -> Array:
+    """F with matrix·F = right where it is between its bounds, and beyond them nowhere.
+
+    At its lower bound a row may have matrix·F > right, at its upper one <. Rows change
+    between free and bounded until none has to; where that goes round in circles,
+    projected Gauss-Seidel ends it, for the matrix is positive definite.
+    """
+    force = np.minimum(np.maximum(start, least), most)
+    free = (force > least) & (force < most) | (least == 0) & (most > 0)
+    for _ in range(_PIVOTS):
+        force[free] = np.linalg.solve(
+            matrix[np.ix_(free, free)], right[free] - matrix[np.ix_(free, ~free)] @ force[~free]
+        )
+        outside = free & ((force < least) | (force > most))
+        force = np.minimum(np.maximum(force, least), most)
+        miss = matrix @ force - right
+        back = ~free & (least < most) & np.where(force <= least, miss < 0, miss > 0)
+        if not (outside.any() or back.any()):
+            return force
+        free = free & ~outside | back
+    for _ in range(_SWEEPS):
+        before = force.copy()
+        for k in range(len(force)):
+            new = force[k] - (matrix[k] @ force - right[k]) / matrix[k, k]
+            force[k] = min(max(new, least[k]), most[k])
+        if np.abs(force - before).max() < _SETTLED * np.abs(force).max():
+            break
+    return force
 
 
 _FLAGS = {
@@ -284,7 +298,8 @@ def _impedance(solimp: Array, distance: Array) -> Array:
     x = np.minimum(np.abs(distance) / width, 1.0)
     rising = x**power / middle ** (power - 1)
     falling = 1 - (1 - x) ** power / (1 - middle) ** (power - 1)
-    return low + np.where(x <= middle, rising, falling) * (high - low)
+    found = low + np.where(x <= middle, rising, falling) * (high - low)
+    return np.where(solimp[:, 2] <= 1e-15, (low + high) / 2, found)
 
 
 def _softness(impedance: Array, inverse_weight: Array) -> Array:

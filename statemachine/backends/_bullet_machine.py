@@ -202,10 +202,10 @@ class Machine:
                     self._diverge(time)
         return time
 
-    def _once(self, settled: bool = False) -> None:
+    def _once(self, afresh: bool = False) -> None:
         self._driven = True  # torques add up until a step takes them
         for arm in self._arms:
-            arm.drive(settled)
+            arm.drive(afresh)
         pb.stepSimulation(self.world.client)
         self._driven = False
 
@@ -289,7 +289,7 @@ class Machine:
         self.restart(0.0, moment.qpos, moment.qvel, moment.ctrl, moment.observed)
         self._used = self._lives = True
         self._moment = moment
-        self._once(settled=True)
+        self._once(afresh=True)
         for arm in self._arms:
             arm.read()
         _, self._last_qvel = self._read()

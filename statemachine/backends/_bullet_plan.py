@@ -14,7 +14,6 @@ from ._bullet_surfaces import Surfaces
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 # Of the armature, as inertia of the stepped arm; see `_padding`.
 _SHARE, _BEARABLE, _SAMPLE = 3 / 28, 1.5, 20
-_NO_CONTACT = int(mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
 
 
 class Plan:
@@ -29,11 +28,7 @@ class Plan:
 
     def __init__(self, raw: mujoco.MjModel) -> None:
         self.raw = raw
-        self._touches = not raw.opt.disableflags & _NO_CONTACT
         self.surfaces = Surfaces(raw)
-        if not self._touches:
-            self.surfaces.solids.clear()
-            self.surfaces.pairs.clear()
         self.padding = _padding(raw)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -44,7 +39,7 @@ class Plan:
         dialect = urdf.Dialect(
             capsules=True,
             looks=False,
-            solids=kind != "ghost" and self._touches,
+            solids=kind != "ghost" and bool(self.surfaces.solids),
             dynamics=kind == "engine",
             anchored=bool(root) and not floats(self.raw, root),
             padding=self.padding if kind == "stepped" else None,
@@ -71,7 +66,9 @@ def _padding(raw: mujoco.MjModel) -> Array:
     worst = 0.0
     for qpos in poses if share.any() else []:
         data.qpos[:] = qpos
-        mujoco.mj_forward(raw, data)
+        mujoco.mj_kinematics(raw, data)
+        mujoco.mj_comPos(raw, data)
+        mujoco.mj_crb(raw, data)
         whole = np.zeros((raw.nv, raw.nv))
         mujoco.mj_fullM(raw, data, whole)
         padded = whole - np.diag(raw.dof_armature) + _padding_at(raw, data, share)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import UnsupportedError
 from ..records import JointType
-from ._bullet_surfaces import Surfaces
+from ._bullet_surfaces import NO_CONTACT, Surfaces
 from ._bullet_urdf import axes, tree
 
 # PyBullet has room for 128 numbers of a tree, and goes on without a word beyond it.
@@ -30,26 +30,21 @@ _SOLIDS = [
 ]
 
 
-def check(raw: mujoco.MjModel, backend: str, path: Path) -> None:
+def check(raw: mujoco.MjModel, backend: str, path: Path | None) -> None:
     """Raise UnsupportedError, naming all that PyBullet cannot be told of a model.
 
     Args:
         raw: The compiled model.
         backend: For the message.
-        path: The file that it was compiled from.
+        path: The file that it was compiled from; None for a variant of what was checked.
     """
-    found = [
-        *_parts(raw),
-        *_joints(raw),
-        *_bodies(raw),
-        *_geoms(raw),
-        *_meshes(raw, path),
-        *_actuators(raw),
-    ]
-    found += [
-        ("contact masks within a body", f"of {pair} some geoms meet and some do not")
-        for pair in Surfaces(raw).mixed
-    ]
+    found = [*_parts(raw), *_joints(raw), *_bodies(raw), *_actuators(raw)]
+    if not raw.opt.disableflags & NO_CONTACT:
+        found += [*_geoms(raw), *(_meshes(raw, path) if path else ())]
+        found += [
+            ("contact masks within a body", f"of {pair} some geoms meet and some do not")
+            for pair in Surfaces(raw).mixed
+        ]
     if not found:
         return
     feature, reason = found[0]
@@ -79,6 +74,24 @@ def _parts(raw: mujoco.MjModel) -> Found:
             yield feature, f"the model has {count}"
     if raw.opt.density or raw.opt.viscosity:
         yield "fluid", "density or viscosity is not zero"
+
+
+def ignored(raw: mujoco.MjModel) -> list[str]:
+    """Settings of a model that have no counterpart, and do not make it another robot."""
+    override, sleep = mujoco.mjtEnableBit.mjENBL_OVERRIDE, mujoco.mjtEnableBit.mjENBL_SLEEP
+    integrator = {
+        int(mujoco.mjtIntegrator.mjINT_IMPLICIT): "implicit acts as implicitfast",
+        int(mujoco.mjtIntegrator.mjINT_RK4): "RK4 acts as Euler",
+    }.get(int(raw.opt.integrator))
+    found = [f"the integrator {integrator}"] if integrator else []
+    for what, there in (
+        ("noslip_iterations", raw.opt.noslip_iterations),
+        ("the override of contact parameters", raw.opt.enableflags & int(override)),
+        ("sleep", raw.opt.enableflags & int(sleep)),
+    ):
+        if there:
+            found.append(f"{what} has no effect")
+    return found
 
 
 def _joints(raw: mujoco.MjModel) -> Found:
@@ -147,10 +160,14 @@ def _meshes(raw: mujoco.MjModel, path: Path) -> Found:
         if raw.geom_type[g] == int(mujoco.mjtGeom.mjGEOM_MESH)
     }
     moved = set[str]()
-    if solid and path.suffix.lower() == ".xml":
-        for mesh in mujoco.MjSpec.from_file(str(path)).meshes:
-            if np.any(mesh.refpos) or not np.array_equal(mesh.refquat, (1, 0, 0, 0)):
-                moved.add(mesh.name)
+    try:
+        known = mujoco.MjSpec.from_file(str(path)).meshes if solid else []
+    except (ValueError, mujoco.FatalError):
+        known = []
+        yield "a mesh that touches, in a binary model", "what moved it is not in the file"
+    for mesh in known:
+        if np.any(mesh.refpos) or not np.array_equal(mesh.refquat, (1, 0, 0, 0)):
+            moved.add(mesh.name)
     for m in sorted(solid):
         name = _name(raw, "mesh", m)
         if raw.mesh_pathadr[m] < 0:

@@ -16,6 +16,8 @@ import numpy as np
 from ..records import Array
 
 PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
+NO_CONTACT = int(mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+_MOST = 10.0  # PyBullet's largest friction of a pair
 _CLOSE = 0.01  # a friction is the model's if it is within this part of it
 
 
@@ -41,7 +43,8 @@ class Surfaces:
 
     def __init__(self, raw: mujoco.MjModel) -> None:
         self._raw = raw
-        self.solids = _solids(raw)
+        self.solids = [] if raw.opt.disableflags & NO_CONTACT else _solids(raw)
+        several: list[str] = []
         self.pairs: dict[tuple[int, int], bool] = {}
         self.mixed: list[str] = []
         wanted = []  # friction (3,) of each pair that meets
@@ -53,8 +56,15 @@ class Surfaces:
             if meeting and len(meeting) < len(one.geoms) * len(two.geoms):
                 self.mixed.append(self._label(i, j))
             if meeting:
-                wanted.append((i, j, np.max([_friction(raw, a, b) for a, b in meeting], axis=0)))
+                frictions = np.array([_friction(raw, a, b) for a, b in meeting])
+                wanted.append((i, j, frictions.max(axis=0)))
+                if np.ptp(frictions[:, 0]) > _CLOSE * frictions[:, 0].max():
+                    several.append(
+                        f"friction of {self._label(i, j)} is {frictions[:, 0].max():.3g} for all "
+                        f"their geoms, not {frictions[:, 0].min():.3g} for some"
+                    )
         self._solve(wanted)
+        self.differences += several
 
     def _label(self, i: int, j: int) -> str:
         def name(solid: Solid) -> str:
@@ -81,7 +91,7 @@ class Surfaces:
         self.differences = []
         for i, j, (slide, spin, roll) in wanted:
             found = (
-                ("friction", slide, self.slide[i] * self.slide[j]),
+                ("friction", slide, min(self.slide[i] * self.slide[j], _MOST)),
                 ("spinning friction", spin, self._combined(self.spin, i, j)),
                 ("rolling friction", roll, self._combined(self.roll, i, j)),
             )

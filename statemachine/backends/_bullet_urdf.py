@@ -123,11 +123,14 @@ class Names:
         self.tips_fixed = {s: _once(f"{name}_fixed", joints) for s, name in self.tips.items()}
 
 
-def _once(name: str, taken: set[str], suffix: str = "_2") -> str:
+def _once(name: str, taken: set[str], suffix: str = "") -> str:
     """A name that is not taken yet, and not so long that a reader cuts it."""
-    name = name[:_LONGEST]
+    first = name = name.encode()[:_LONGEST].decode(errors="ignore")
+    if name in taken and suffix:
+        name = first + suffix
+    number = 2
     while name in taken:
-        name += suffix
+        name, number = f"{first}{suffix}_{number}", number + 1
     taken.add(name)
     return name
 

@@ -25,7 +25,7 @@ from . import _bullet_urdf as urdf
 from ._bullet_client import pb
 from ._bullet_machine import Machine, Mirror
 from ._bullet_plan import Plan
-from ._bullet_scope import check
+from ._bullet_scope import check, ignored
 from ._bullet_shared import Shared
 from ._bullet_world import ENGINE_TIMESTEP, World
 from ._mjcf import compile_file, edited, facts, step_length
@@ -108,7 +108,7 @@ def load(
         raw.opt.timestep = ENGINE_TIMESTEP
     model = PybulletModel(raw, Path(path), 1, defaults)
     World(model._shared.plan, model._shared.kind).close()  # what PyBullet cannot read shows now
-    differences = model._shared.plan.surfaces.differences
+    differences = [*ignored(raw), *model._shared.plan.surfaces.differences]
     if differences and defaults == "model":
         warnings.warn(f"PyBullet: {'; '.join(differences)}", EngineWarning, stacklevel=3)
     return model
@@ -153,6 +153,7 @@ class PybulletModel(Model):
 
     def _replace(self, options: dict[str, Any]) -> PybulletModel:
         raw = edited(self._shared.raw, options)
+        check(raw, "pybullet", None)
         substeps = options.get("substeps", self.substeps)
         raw.opt.timestep = step_length(self.timestep, substeps, options)
         defaults = "engine" if self._shared.kind == "engine" else "model"

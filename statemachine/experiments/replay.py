@@ -35,6 +35,7 @@ class Replay:
         apart: (n+1,) distance [m] between the free body's positions in the two
             runs; None without a free body.
         qpos: (nq,) at the end of the first run.
+        hinges: Where in qpos the hinges are.
         free: Where in qpos a free body's position is; None without one.
         travel: Largest movement of a hinge in the first run [rad].
         contacts: (n,) contacts that each step of the first run found.
@@ -51,6 +52,7 @@ class Replay:
     difference: Array
     apart: Array | None
     qpos: Array
+    hinges: tuple[int, ...]
     free: tuple[int, int, int] | None
     travel: float
     contacts: Ints
@@ -110,6 +112,7 @@ def run(
         difference=np.abs(gap).max(axis=1),
         apart=np.linalg.norm(gap[:, free[0] : free[0] + 3], axis=1) if free else None,
         qpos=first[-1],
+        hinges=tuple(hinges.tolist()),
         free=(free[0], free[0] + 1, free[0] + 2) if free else None,
         travel=float(np.ptp(first[:, hinges], axis=0).max(initial=0.0)),
         contacts=contacts,

@@ -45,10 +45,9 @@ def differences(
 
 
 def angle_or_length(value: float, slide: bool) -> str:
-    """A difference of a joint's positions, small ones in powers of ten."""
-    if slide:
-        return f"{value * 1e3:.2g} mm"
-    return f"{math.degrees(value):.2g}°"
+    """A difference of a joint's positions; what is below a millionth is only called so."""
+    shown, unit = (value * 1e3, " mm") if slide else (math.degrees(value), "°")
+    return f"{shown:.2g}{unit}" if shown >= 1e-6 else f"below 1e-6{unit}"
 
 
 def degrees(radians: float, digits: int = 2) -> str:

@@ -22,6 +22,7 @@ _PARTS = (
 )
 _BALANCE = 1e-3  # N·m or N; a sum below it is zero
 _SLOW = 0.01  # rad/s or m/s; a joint below it is at rest or creeps
+_STARTS = 0.02  # rad/s² or m/s²; a joint beyond it is about to move
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> gravity.Gravity:
@@ -109,7 +110,7 @@ def _worst(
     timestep = one.provenance.timestep
     gap = np.abs(runs[0].path - runs[1].path)
     touches = [time for run in runs for time in run.touches.values()]
-    first = round(min(touches, default=np.inf) / timestep) if touches else len(gap)
+    first = round(min(touches) / timestep) if touches else len(gap)
     if touching is False:
         gap = gap[: first + 1]
     elif touching:
@@ -117,7 +118,8 @@ def _worst(
             return "nothing touched"
         gap = np.concatenate([np.zeros(first), gap[first:]])
     worst = int(np.argmax(gap))
-    return f"{angle_or_length(float(gap[worst]), one.slide)} at {worst * timestep:.3f} s"
+    found = angle_or_length(float(gap[worst]), one.slide)
+    return found if found.startswith("below") else f"{found} at {worst * timestep:.3f} s"
 
 
 def _alone(name: str, result: gravity.Gravity) -> list[Table | Text]:
@@ -139,7 +141,7 @@ def _alone(name: str, result: gravity.Gravity) -> list[Table | Text]:
             title=f"The same model as {name}'s own users load it, left alone, at {time:.3g} s",
         )
     ]
-    loaded, held, limp, undamped = result.alone
+    _, held, limp, undamped = result.alone
     if held.motor and abs(held.position) < min(abs(limp.position), abs(undamped.position)) / 10:
         blocks.append(
             Text(
@@ -148,8 +150,8 @@ def _alone(name: str, result: gravity.Gravity) -> list[Table | Text]:
                 "comes with a motor of the engine's own that holds it still, here with "
                 f"{abs(held.motor):.4f} {unit}. With gravity set, the motors off and no joint "
                 f"damping in the URDF, {result.joint} is at "
-                f"{position(undamped.position, result.slide)} then, having started at "
-                f"{position(loaded.position, result.slide)}."
+                f"{position(undamped.position, result.slide)} then, instead of "
+                f"{position(held.position, result.slide)}."
             )
         )
     if limp.explicit > 2:
@@ -189,7 +191,7 @@ def _part(run: gravity.Droop, part: str) -> float | None:
 def _finding(name: str, run: gravity.Droop, first: gravity.Gravity) -> Text | Verdict:
     """Who carries the load, if the joint is at rest and its forces balance."""
     total, load = run.forces.total, _part(run, "bias")
-    if abs(run.velocity) > _SLOW:
+    if abs(run.velocity) > _SLOW or abs(run.acceleration) > _STARTS:
         speed = position(run.velocity, first.slide)
         return Text(f"{name}: {first.joint} still moves, at {speed}/s; nothing holds it yet.")
     if total is None or load is None:

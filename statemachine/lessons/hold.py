@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..experiments import hold
+from ..records import Array
 from ._words import angle_or_length, differences, millimetres, page_of, position, vector, where
 from .page import Code, Page, Table, Text, Verdict
 
@@ -85,17 +86,20 @@ def page(results: Mapping[str, hold.Hold]) -> Page:
         [
             ("any joint, until one touches", lambda a, b: _apart(a, b, False)),
             ("any joint, after that", lambda a, b: _apart(a, b, True)),
-            ("any joint, at the end", lambda a, b: _gap(a, b, -1)),
+            ("any joint, at the end", lambda a, b: _gap(a, np.abs(a.qpos[-1] - b.qpos[-1]))),
             ("at the end, contacts left out", _apart_freely),
         ],
     )
     return page_of(f"Hold {vector(first.target, 1)}", results, blocks)
 
 
-def _gap(one: hold.Hold, two: hold.Hold, step: int) -> str:
-    gaps = np.abs(one.qpos[step] - two.qpos[step])
+def _gap(one: hold.Hold, gaps: Array, time: float | None = None) -> str:
+    """The largest of the joints' gaps, whose it is, and when."""
     joint = int(np.argmax(gaps))
-    return f"{angle_or_length(float(gaps[joint]), one.slides[joint])}  {one.joints[joint]}"
+    found = angle_or_length(float(gaps[joint]), one.slides[joint])
+    if found.startswith("below"):
+        return found
+    return f"{found}  {one.joints[joint]}" + ("" if time is None else f" at {time:.3f} s")
 
 
 def _apart(one: hold.Hold, two: hold.Hold, touching: bool) -> str:
@@ -107,14 +111,12 @@ def _apart(one: hold.Hold, two: hold.Hold, touching: bool) -> str:
         return "nothing touched"
     span = range(first + 1, len(gaps)) if touching else range(first + 1)
     worst = max(span, key=lambda k: gaps[k], default=first)
-    return f"{_gap(one, two, worst)} at {one.time[worst]:.3f} s"
+    return _gap(one, np.abs(one.qpos[worst] - two.qpos[worst]), float(one.time[worst]))
 
 
 def _apart_freely(one: hold.Hold, two: hold.Hold) -> str:
     ends = [r.qpos[-1] if r.without_contacts is None else r.without_contacts for r in (one, two)]
-    gaps = np.abs(ends[0] - ends[1])
-    joint = int(np.argmax(gaps))
-    return f"{angle_or_length(float(gaps[joint]), one.slides[joint])}  {one.joints[joint]}"
+    return _gap(one, np.abs(ends[0] - ends[1]))
 
 
 def _at(result: hold.Hold, value: float, joint: int) -> str:

@@ -58,7 +58,7 @@ def page(results: Mapping[str, replay.Replay]) -> Page:
     blocks += differences(
         results,
         [
-            ("joints at the end, worst", _joints_apart),
+            ("hinges at the end, worst", _joints_apart),
             ("free body at the end", _bodies_apart),
             ("contacts a step, on average", _contacts_apart),
         ],
@@ -99,8 +99,8 @@ def _exactly(difference: float) -> str:
 
 
 def _joints_apart(one: replay.Replay, two: replay.Replay) -> str:
-    n = len(one.ctrl)
-    return degrees(float(np.abs(one.qpos[:n] - two.qpos[:n]).max()), 3)
+    gap = np.abs(one.qpos - two.qpos)[list(one.hinges)]
+    return degrees(float(gap.max()), 3) if len(gap) else "there are none"
 
 
 def _bodies_apart(one: replay.Replay, two: replay.Replay) -> str:
