@@ -12,7 +12,8 @@ from . import _bullet_urdf as urdf
 from ._bullet_surfaces import Surfaces
 
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
-# Of the armature, as inertia of the stepped arm; see `_padding`.
+# Of the armature, as inertia of the stepped arm: 0.003 of the SO-101's 0.028 kg m², with
+# which it grips soon and the eigenvalue of `_padding` is 0.97 at most.
 _SHARE, _BEARABLE, _SAMPLE = 3 / 28, 1.5, 20
 
 
@@ -87,8 +88,7 @@ def _padding_at(raw: mujoco.MjModel, data: mujoco.MjData, share: Array) -> Array
         dof, body = int(raw.jnt_dofadr[j]), int(raw.jnt_bodyid[j])
         turning = np.zeros((3, raw.nv))
         mujoco.mj_jac(raw, data, None, turning, data.xipos[body], body)
-        about = data.xaxis[j] @ turning
-        total += share[dof] * (0.50005 * turning.T @ turning + 0.5 * np.outer(about, about))
+        total += share[dof] * turning.T @ urdf.padding_shape(data.xaxis[j]) @ turning
     for j in np.flatnonzero(raw.jnt_type == _SLIDE):
         dof, body = int(raw.jnt_dofadr[j]), int(raw.jnt_bodyid[j])
         moving = np.zeros((3, raw.nv))

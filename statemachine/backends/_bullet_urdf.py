@@ -40,9 +40,9 @@ class Dialect:
         anchored: Fix the root to a massless link "world", at its place. PyBullet's
             inverse dynamics takes gravity in the principal axes of a fixed base, which
             is gravity in another direction unless the base has no mass.
-        padding: (nv,) J of each degree of freedom. The link that a hinge with axis a
-            carries gets J·(½·1.0001·1 + ½·a·aᵀ) [kg m²] more inertia about its centre
-            of mass, the link that a slide carries J [kg] more mass.
+        padding: (nv,) J of each degree of freedom. The link that a hinge carries gets
+            J times `padding_shape` [kg m²] more inertia about its centre of mass, the
+            link that a slide carries J [kg] more mass.
     """
 
     capsules: bool = False
@@ -141,6 +141,14 @@ def _anchor(raw: mujoco.MjModel, body: int) -> Array:
     return raw.jnt_pos[joints[-1]] if joints else np.zeros(3)
 
 
+def padding_shape(axis: Array) -> Array:
+    """Inertia (3, 3) of a unit of padding about an axis: ½·1.0001·1 + ½·a·aᵀ.
+
+    Turning about the axis alone would be enough, and is refused as no body's inertia.
+    """
+    return 0.50005 * np.eye(3) + 0.5 * np.outer(axis, axis)
+
+
 def _padding(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> tuple[float, Array]:
     """Mass and inertia (3, 3), in the body's axes, on top of what the joint carries."""
     if dialect.padding is None:
@@ -148,7 +156,7 @@ def _padding(raw: mujoco.MjModel, joint: int, dialect: Dialect) -> tuple[float, 
     size, axis = float(dialect.padding[raw.jnt_dofadr[joint]]), raw.jnt_axis[joint]
     if raw.jnt_type[joint] == int(JointType.SLIDE):
         return size, np.zeros((3, 3))
-    return 0.0, size * (0.50005 * np.eye(3) + 0.5 * np.outer(axis, axis))
+    return 0.0, size * padding_shape(axis)
 
 
 def _link(raw: mujoco.MjModel, body: int, dialect: Dialect, names: Names) -> Iterator[str]:
