@@ -269,3 +269,18 @@ def test_friction_of_a_pair_is_the_product(pb: Any, client: int, load: Load) -> 
         pb.stepSimulation(client)
     slowed = (before - pb.getBaseVelocity(body, client)[0][0]) / 0.1
     assert slowed == pytest.approx(0.3 * 10, rel=0.05)
+
+
+def test_a_body_turns_rightly_up_to_45_degrees_a_step(pb: Any, client: int, load: Load) -> None:
+    body = load(BOX.replace('rpy="0 0 0.3"', 'rpy="0 0 0"'), fixed=False)
+    pb.setTimeStep(0.02, client)
+    pb.changeDynamics(body, -1, linearDamping=0, angularDamping=0, physicsClientId=client)
+    turned = []
+    for rate in (39.0, 60.0):  # 0.78 and 1.2 rad a step
+        pb.resetBasePositionAndOrientation(body, (0, 0, 0), (0, 0, 0, 1), client)
+        pb.resetBaseVelocity(body, (0, 0, 0), (0, 0, rate), client)
+        pb.stepSimulation(client)
+        x, y, z, w = pb.getBasePositionAndOrientation(body, client)[1]
+        turned.append(2 * np.arctan2(z, w))
+    assert turned[0] == pytest.approx(0.78, abs=1e-9)
+    assert turned[1] < 1.19

@@ -42,7 +42,8 @@ _EMULATED = {
     "engine's jointDamping is explicit",
     "dry friction": "by the adapter, MuJoCo's soft friction; the engine ignores that of a URDF",
     "joint limits": "by the adapter, MuJoCo's soft limits; the engine's own are off",
-    "free joint conventions": "converted: the engine speaks of the centre of mass, and x y z w",
+    "free joint conventions": "converted: the engine speaks of the centre of mass, and x y z w; "
+    "it turns a body wrongly beyond 45° a step",
     "forces by part": "contact: what a step did beyond all other forces; those as solved",
     "no automatic reset": "the adapter looks at every step; the engine goes on with NaN in silence",
 }
