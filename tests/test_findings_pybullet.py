@@ -280,7 +280,7 @@ def test_a_body_turns_rightly_up_to_45_degrees_a_step(pb: Any, client: int, load
         pb.resetBasePositionAndOrientation(body, (0, 0, 0), (0, 0, 0, 1), client)
         pb.resetBaseVelocity(body, (0, 0, 0), (0, 0, rate), client)
         pb.stepSimulation(client)
-        x, y, z, w = pb.getBasePositionAndOrientation(body, client)[1]
+        _, _, z, w = pb.getBasePositionAndOrientation(body, client)[1]
         turned.append(2 * np.arctan2(z, w))
     assert turned[0] == pytest.approx(0.78, abs=1e-9)
     assert turned[1] < 1.19
