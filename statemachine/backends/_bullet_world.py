@@ -218,10 +218,11 @@ class World:
                 physicsClientId=self.client,
             )
         for (i, j), meet in known.pairs.items():
-            (body_a, link_a), (body_b, link_b) = links[i], links[j]
-            pb.setCollisionFilterPair(
-                body_a, body_b, link_a, link_b, int(meet), physicsClientId=self.client
-            )
+            if not meet:  # the others do, as they were loaded
+                (body_a, link_a), (body_b, link_b) = links[i], links[j]
+                pb.setCollisionFilterPair(
+                    body_a, body_b, link_a, link_b, 0, physicsClientId=self.client
+                )
 
     def place(self, qpos: Array, qvel: Array) -> None:
         """Set the state so that what follows depends on nothing that was before.
