@@ -257,17 +257,17 @@ def _on_each_backend(
         try:
             model = load(options.model, backend=backend, menagerie=options.menagerie)
         except (MissingEngineError, ModelError, UnsupportedError) as error:
-            # A file that is bad for all is no engine's doing.
             if not everyone:
                 raise
             missing.append(error)
             continue
         with progress(f"{what} on {backend}") as report:
             results[backend] = run(model, report)
-    for error in missing:
+    refusals = list({str(error): error for error in missing}.values())  # each text once
+    for error in refusals if results else refusals[:-1]:
         _complain(error, MISSING)
     if not results:
-        raise missing[0]
+        raise refusals[-1]
     return results
 
 

@@ -527,3 +527,13 @@ def test_the_projects_own_urdf_runs_on_both(cli: Cli) -> None:
     done = cli("lesson", "state", "--model", file, "--backend", "all", "--json")
     assert list(json.loads(done.stdout)) == ["mujoco", "pybullet"]
     assert not done.stderr
+
+
+def test_a_file_that_is_bad_for_all_is_said_once(cli: Cli, tmp_path: Path) -> None:
+    need_engine("pybullet")
+    file = tmp_path / "bad.xml"
+    file.write_text("<mujoco><nonsense/></mujoco>")
+    done = cli("lesson", "state", "--model", file, "--backend", "all")
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert "cannot read" in line

@@ -16,6 +16,7 @@ import pytest
 import statemachine as sm
 from statemachine.backends import _bullet_scope as scope
 from statemachine.backends import _bullet_urdf as urdf
+from statemachine.backends._bullet_plan import Plan
 from statemachine.errors import UnsupportedError
 from statemachine.models import models_dir
 from statemachine.rotations import matrix_from_quat, wxyz_from_xyzw
@@ -238,4 +239,4 @@ def test_what_urdf_cannot_say_is_refused(tmp_path: Path, body: str, word: str) -
     file = tmp_path / "x.xml"
     file.write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
     with pytest.raises(UnsupportedError, match=word):
-        scope.check(sm.load(file).raw, "pybullet", file)
+        scope.check(Plan(sm.load(file).raw), "pybullet", file)

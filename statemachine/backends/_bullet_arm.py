@@ -40,20 +40,21 @@ class Arm:
 
     def place(self, qpos: Array, qvel: Array, contact: Array, friction: Array) -> None:
         """Start from a state; contact and friction (n,) are those of the step before it."""
-        self.q, self.v = qpos[self.tree.qpos].tolist(), qvel[self.tree.qvel].tolist()
-        self._x = np.array([*self.q, *self.v, 1.0])
-        self.angles, self.speed = self._x[: len(self.q)], self._x[len(self.q) : -1]
+        self._take(qpos[self.tree.qpos].tolist(), qvel[self.tree.qvel].tolist())
         self._contact, self.friction = contact, friction
         self.last = None
 
     def read(self) -> None:
         """Take over what the engine made of the last step."""
-        self.q, self.v, _, _ = zip(
-            *pb.getJointStates(self._body, self.tree.joints, self._client), strict=True
-        )
-        self._x = np.array([*self.q, *self.v, 1.0])
-        self.angles, self.speed = self._x[: len(self.q)], self._x[len(self.q) : -1]
+        states = pb.getJointStates(self._body, self.tree.joints, self._client)
+        q, v, _, _ = zip(*states, strict=True)
+        self._take(q, v)
         self._contact = None
+
+    def _take(self, q: Sequence[float], v: Sequence[float]) -> None:
+        self.q, self.v = q, v
+        self._x = x = np.array([*q, *v, 1.0])
+        self.angles, self.speed = x[: len(q)], x[len(q) : -1]
 
     @property
     def contact(self) -> Array:
@@ -65,7 +66,7 @@ class Arm:
             needed = pb.calculateInverseDynamics(
                 self._body, last.qpos, last.qvel, rate, 0, self._client
             )
-            self._contact = np.array(needed) - last.torque
+            self._contact = np.array(needed) - self._torque
         return self._contact
 
     def forces(self) -> dict[str, Array]:
@@ -92,19 +93,19 @@ class Arm:
     def drive(self, afresh: bool = False) -> None:
         """Give the engine the torque of the next step."""
         contact = self.contact
-        self.last, acceleration = self.law.solve(
+        self.last = last = self.law.solve(
             self._ghost, self.q, self.v, self._x, self._aim, contact, self.friction, afresh
         )
-        self.friction = self.last.friction
+        self.friction = last.friction
         needed = pb.calculateInverseDynamics(
-            self._body, self.q, self.v, acceleration.tolist(), 0, self._client
+            self._body, self.q, self.v, last.acceleration.tolist(), 0, self._client
         )
-        self.last.torque = torque = np.array(needed) - contact
+        self._torque = np.array(needed) - contact
         pb.setJointMotorControlArray(
             self._body,
             self.tree.joints,
             pb.TORQUE_CONTROL,
-            forces=torque.tolist(),
+            forces=self._torque.tolist(),
             physicsClientId=self._client,
         )
 
@@ -137,7 +138,15 @@ class Motors:
 
     def forces(self) -> dict[str, Array]:
         """What the engine tells: its bias, and the torque of its motors in the last step."""
-        return {"qfrc_bias": self._bias, "qfrc_actuator": self.torque}
+        angles, speed = self._before
+        bias = pb.calculateInverseDynamics(
+            self.tree.body,
+            angles.tolist(),
+            speed.tolist(),
+            self.nothing.tolist(),
+            physicsClientId=self._world.client,
+        )
+        return {"qfrc_bias": np.array(bias), "qfrc_actuator": self.torque}
 
     def command(self, ctrl: Array) -> None:
         """Take a new command (nu,) of the whole model."""
@@ -145,15 +154,7 @@ class Motors:
 
     def drive(self, afresh: bool = False) -> None:
         """Command the motors, as a PyBullet user would; without actuation, nothing is said."""
-        self._bias = np.array(
-            pb.calculateInverseDynamics(
-                self.tree.body,
-                self.angles.tolist(),
-                self.speed.tolist(),
-                self.nothing.tolist(),
-                physicsClientId=self._world.client,
-            )
-        )
+        self._before = self.angles, self.speed
         if self._driven:
             pb.setJointMotorControlArray(
                 self.tree.body,

@@ -52,7 +52,7 @@ class Solution:
     passive: Array
     friction: Array
     limit: Array
-    torque: Array
+    acceleration: Array
 
 
 class Law:
@@ -147,7 +147,7 @@ class Law:
         contact: Array,
         friction: Array,
         afresh: bool = False,
-    ) -> tuple[Solution, Array]:
+    ) -> Solution:
         """The forces of a step and the acceleration (n,) that they give.
 
         Args:
@@ -198,10 +198,7 @@ class Law:
             friction, limit = self._constrained(inverse, others, x, friction)
             others = others + limit
         acceleration = _solved(implicit, others + friction)
-        return (
-            Solution(q, v, speed, bias, mass, actuator, passive, friction, limit, acceleration),
-            acceleration,
-        )
+        return Solution(q, v, speed, bias, mass, actuator, passive, friction, limit, acceleration)
 
     def _constrained(
         self, inverse: Array, others: Array, x: Array, friction: Array

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import mujoco
@@ -23,20 +24,33 @@ class Plan:
     Attributes:
         raw: The compiled model.
         surfaces: What can touch what; nothing where contacts are off.
-        padding: (nv,) what each degree of freedom gets of its armature as inertia of the
-            links of the stepped arm; see `Dialect` and `_bullet_law`.
+        names: What everything is called in a URDF.
     """
 
     def __init__(self, raw: mujoco.MjModel) -> None:
         self.raw = raw
         self.surfaces = Surfaces(raw)
-        self.padding = _padding(raw)
+        self.names = urdf.Names(raw)
+        self._texts: dict[tuple[int, str], str] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Plan, (self.raw,)
 
+    @cached_property
+    def padding(self) -> Array:
+        """(nv,) what each degree of freedom gives of its armature to the stepped arm.
+
+        As inertia of the links; see `Dialect` and `_bullet_law`.
+        """
+        return _padding(self.raw)
+
     def described(self, root: int, kind: str) -> str:
         """URDF of a tree of bodies as a world of that kind reads it."""
+        if (root, kind) not in self._texts:
+            self._texts[root, kind] = self._write(root, kind)
+        return self._texts[root, kind]
+
+    def _write(self, root: int, kind: str) -> str:
         dialect = urdf.Dialect(
             capsules=True,
             looks=False,
@@ -45,7 +59,7 @@ class Plan:
             anchored=bool(root) and not floats(self.raw, root),
             padding=self.padding if kind == "stepped" else None,
         )
-        return urdf.write(self.raw, root, dialect)
+        return urdf.write(self.raw, root, dialect, self.names)
 
 
 def _padding(raw: mujoco.MjModel) -> Array:

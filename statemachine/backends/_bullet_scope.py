@@ -11,7 +11,8 @@ import numpy as np
 
 from ..errors import UnsupportedError
 from ..records import JointType
-from ._bullet_surfaces import NO_CONTACT, Surfaces
+from ._bullet_plan import Plan
+from ._bullet_surfaces import NO_CONTACT, PLANE
 from ._bullet_urdf import axes, tree
 
 # PyBullet has room for 128 numbers of a tree, and goes on without a word beyond it.
@@ -30,20 +31,21 @@ _SOLIDS = [
 ]
 
 
-def check(raw: mujoco.MjModel, backend: str, path: Path | None) -> None:
+def check(plan: Plan, backend: str, path: Path | None) -> None:
     """Raise UnsupportedError, naming all that PyBullet cannot be told of a model.
 
     Args:
-        raw: The compiled model.
+        plan: The compiled model and what can touch what in it.
         backend: For the message.
         path: The file that it was compiled from; None for a variant of what was checked.
     """
+    raw = plan.raw
     found = [*_parts(raw), *_joints(raw), *_bodies(raw), *_actuators(raw)]
     if not raw.opt.disableflags & NO_CONTACT:
         found += [*_geoms(raw), *(_meshes(raw, path) if path else ())]
         found += [
             ("contact masks within a body", f"of {pair} some geoms meet and some do not")
-            for pair in Surfaces(raw).mixed
+            for pair in plan.surfaces.mixed
         ]
     if not found:
         return
@@ -145,7 +147,7 @@ def _geoms(raw: mujoco.MjModel) -> Found:
         name, kind = _name(raw, "geom", g), int(raw.geom_type[g])
         if kind not in _SOLIDS:
             yield "shape of a geom", f"geom {name} is a {mujoco.mjtGeom(kind).name[7:].lower()}"
-        elif kind == _SOLIDS[-1] and raw.geom_bodyid[g]:
+        elif kind == PLANE and raw.geom_bodyid[g]:
             yield "plane on a body", f"geom {name} is not the world's own"
         if raw.geom_margin[g]:
             yield "contact margin", f"geom {name} has one"

@@ -71,7 +71,9 @@ def axes(raw: mujoco.MjModel, body: int) -> list[int]:
     return [j for j in joints if raw.jnt_type[j] in (int(JointType.HINGE), int(JointType.SLIDE))]
 
 
-def write(raw: mujoco.MjModel, root: int, dialect: Dialect = Dialect()) -> str:
+def write(
+    raw: mujoco.MjModel, root: int, dialect: Dialect = Dialect(), names: Names | None = None
+) -> str:
     """URDF of one tree of bodies.
 
     Args:
@@ -80,10 +82,11 @@ def write(raw: mujoco.MjModel, root: int, dialect: Dialect = Dialect()) -> str:
             is free, and stands between a massless link "world" and it otherwise. 0 for
             the geoms of the world itself; planes, which URDF does not know, are left out.
         dialect: What the reader wants.
+        names: Those of the model, where they are known already.
     """
+    names = names or Names(raw)
     name = raw.names[: raw.names.index(b"\0")].decode() or "robot"
     lines = ['<?xml version="1.0"?>', f"<robot name={quoteattr(name)}>"]
-    names = Names(raw)
     on_world = bool(axes(raw, root)) or dialect.anchored
     if on_world:
         lines.append(_bare_link("world", 0.0, np.zeros((3, 3))))

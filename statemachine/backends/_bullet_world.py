@@ -44,12 +44,13 @@ class Tree:
         tips: PyBullet's index of each site's link.
     """
 
-    def __init__(self, raw: mujoco.MjModel, root: int, body: int, client: int) -> None:
+    def __init__(self, plan: Plan, root: int, body: int, client: int) -> None:
+        raw, names = plan.raw, plan.names
         self.root, self.body = root, body
         self.free = floats(raw, root)
         infos = [pb.getJointInfo(body, i, client) for i in range(pb.getNumJoints(body, client))]
         indices = {info[12].decode(): info[0] for info in infos}
-        bodies, names = urdf.tree(raw, root), urdf.Names(raw)
+        bodies = urdf.tree(raw, root)
         self.links = {b: indices.get(names.links[b], -1) for b in bodies}
         sites = [
             s for s in range(raw.nsite) if root and raw.body_rootid[raw.site_bodyid[s]] == root
@@ -115,9 +116,7 @@ class World:
             pb.setPhysicsEngineParameter(
                 deterministicOverlappingPairs=1, physicsClientId=self.client
             )
-            pb.setTimeStep(raw.opt.timestep, self.client)
-        elif raw.opt.timestep != ENGINE_TIMESTEP:
-            pb.setTimeStep(raw.opt.timestep, self.client)
+        pb.setTimeStep(raw.opt.timestep, self.client)
         self._add_planes()
         if kind == "stepped":
             self._take_surfaces()
@@ -146,7 +145,7 @@ class World:
         flags = (
             pb.URDF_USE_INERTIA_FROM_FILE
             | pb.URDF_USE_SELF_COLLISION
-            | pb.URDF_USE_SELF_COLLISION_INCLUDE_PARENT  # which pairs meet, _filter says
+            | pb.URDF_USE_SELF_COLLISION_INCLUDE_PARENT  # which pairs meet, _take_surfaces says
             | pb.URDF_USE_IMPLICIT_CYLINDER  # else a polygon, and a millimetre too large
         )
         with as_file(text) as name, silence() as said:
@@ -162,7 +161,7 @@ class World:
                 said.append(str(error))
         if body < 0:
             raise ModelError(f"PyBullet cannot read the URDF of this model: {'; '.join(said)}")
-        tree = Tree(raw, root, body, self.client)
+        tree = Tree(self._plan, root, body, self.client)
         self.trees.append(tree)
         if kind == "engine":
             return
@@ -204,11 +203,11 @@ class World:
     def _take_surfaces(self) -> None:
         """Friction of links, and which of them meet."""
         known = self._surfaces
-        links = [(body, link) for body, link, _ in self.solids()]
-        for body, link, solid in self.solids():
+        links = []
+        for k, (body, link, solid) in enumerate(self.solids()):
+            links.append((body, link))
             if (self._raw.geom_type[list(solid.geoms)] == _MESH).any():  # else 1 mm too large
                 pb.changeDynamics(body, link, collisionMargin=0, physicsClientId=self.client)
-        for k, (body, link) in enumerate(links):
             pb.changeDynamics(
                 body,
                 link,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import hashlib
 import os
 from typing import Any
 
@@ -10,10 +11,11 @@ import mujoco
 import numpy as np
 
 from ..errors import BadInputError, ModelError
+from ..model import Model
 from ..records import Array, Keyframe
 
 _DISABLE = mujoco.mjtDisableBit
-SWITCHES = {  # option of `replace` -> the flag that turns it off
+_SWITCHES = {  # option of `replace` -> the flag that turns it off
     "actuation": _DISABLE.mjDSBL_ACTUATION,
     "contacts": _DISABLE.mjDSBL_CONTACT,
     "limits": _DISABLE.mjDSBL_LIMIT,
@@ -49,8 +51,8 @@ def edited(raw: mujoco.MjModel, options: dict[str, Any]) -> mujoco.MjModel:
     for name, value in options.items():
         for flag in _HINDRANCES.get(name, ()):  # else the option would be without effect
             raw.opt.disableflags &= ~int(flag)
-        if name in SWITCHES:
-            flag = int(SWITCHES[name])
+        if name in _SWITCHES:
+            flag = int(_SWITCHES[name])
             raw.opt.disableflags = (raw.opt.disableflags & ~flag) | (0 if value else flag)
         elif name == "gravity":
             raw.opt.gravity[:] = value
@@ -127,6 +129,21 @@ def facts(m: mujoco.MjModel) -> dict[str, Any]:
             for i in range(m.nkey)
         ),
     }
+
+
+def with_fingerprint(
+    model: Model, layout: tuple[tuple[str, int], ...]
+) -> tuple[str, tuple[tuple[str, int], ...]]:
+    """The layout of a Model's States, after a digest of it and of what it belongs to."""
+    identity = (
+        model.backend,
+        layout,
+        model.joint_names,
+        model.jnt_type.tolist(),
+        model.jnt_qposadr.tolist(),
+        model.actuator_names,
+    )
+    return hashlib.sha256(repr(identity).encode()).hexdigest()[:16], layout
 
 
 def _ranges(ranges: Array, limited: Any) -> Array:

@@ -7,7 +7,6 @@ its own buffers, seen read-only.
 from __future__ import annotations
 
 import functools
-import hashlib
 import math
 import os
 import re
@@ -34,7 +33,7 @@ from ..records import (
     Contacts,
     State,
 )
-from ._mjcf import compile_file, edited, facts, step_length
+from ._mjcf import compile_file, edited, facts, step_length, with_fingerprint
 
 _DISABLE = mujoco.mjtDisableBit
 # Not RK4: after its step the derived values are neither of the state before nor after.
@@ -382,12 +381,4 @@ def _layout(model: MujocoModel) -> tuple[str, tuple[tuple[str, int], ...]]:
     }
     kept = ("time", *INPUTS)  # even where they are empty
     layout = tuple((name, size) for name, size in sizes.items() if size or name in kept)
-    identity = (
-        "mujoco",
-        layout,
-        model.joint_names,
-        model.jnt_type.tolist(),
-        model.jnt_qposadr.tolist(),
-        model.actuator_names,
-    )
-    return hashlib.sha256(repr(identity).encode()).hexdigest()[:16], layout
+    return with_fingerprint(model, layout)

@@ -7,13 +7,11 @@ when fresh, values that a write leaves alone. The capability record says where.
 
 from __future__ import annotations
 
-import hashlib
 import os
 import warnings
 from pathlib import Path
 from typing import Any, Literal
 
-import mujoco
 import numpy as np
 
 from ..checks import check_entries
@@ -28,7 +26,7 @@ from ._bullet_plan import Plan
 from ._bullet_scope import check, ignored
 from ._bullet_shared import Shared
 from ._bullet_world import ENGINE_TIMESTEP, World
-from ._mjcf import compile_file, edited, facts, step_length
+from ._mjcf import compile_file, edited, facts, step_length, with_fingerprint
 
 _EMULATED = {
     "stale after a write": "by copies of the adapter; the engine's own values follow a write",
@@ -103,13 +101,14 @@ def load(
         UnsupportedError: It has something that PyBullet has no counterpart for.
     """
     raw = compile_file(path)
-    check(raw, "pybullet", Path(path))
     if defaults == "engine":
         raw.opt.gravity[:] = 0
         raw.opt.timestep = ENGINE_TIMESTEP
-    model = PybulletModel(raw, Path(path), 1, defaults)
-    World(model._shared.plan, model._shared.kind).close()  # what PyBullet cannot read shows now
-    differences = [*ignored(raw), *model._shared.plan.surfaces.differences]
+    plan = Plan(raw)
+    check(plan, "pybullet", Path(path))
+    model = PybulletModel(plan, Path(path), 1, defaults)
+    World(plan, model._shared.kind).close()  # what PyBullet cannot read shows now
+    differences = [*ignored(raw), *plan.surfaces.differences]
     if differences and defaults == "model":
         warnings.warn(f"PyBullet: {'; '.join(differences)}", EngineWarning, stacklevel=3)
     return model
@@ -126,19 +125,19 @@ class PybulletModel(Model):
 
     def __init__(
         self,
-        raw: mujoco.MjModel,
+        plan: Plan,
         path: Path,
         substeps: int,
         defaults: Literal["model", "engine"],
     ) -> None:
-        as_it_comes = defaults == "engine"
-        shared = Shared(Plan(raw), "engine" if as_it_comes else "stepped")
+        as_it_comes, raw = defaults == "engine", plan.raw
+        shared = Shared(plan, "engine" if as_it_comes else "stepped")
         super().__init__(
             backend="pybullet",
             engine_version=engine_version("pybullet"),
             path=path,
             raw={
-                raw.body(b).name or f"body {b}": shared.plan.described(b, shared.kind)
+                raw.body(b).name or f"body {b}": plan.described(b, shared.kind)
                 for b in (0, *urdf.roots(raw))
             },
             capabilities=_capabilities(as_it_comes),
@@ -154,11 +153,12 @@ class PybulletModel(Model):
 
     def _replace(self, options: dict[str, Any]) -> PybulletModel:
         raw = edited(self._shared.raw, options)
-        check(raw, "pybullet", None)
         substeps = options.get("substeps", self.substeps)
         raw.opt.timestep = step_length(self.timestep, substeps, options)
         defaults = "engine" if self._shared.kind == "engine" else "model"
-        return PybulletModel(raw, self.path, substeps, defaults)
+        plan = Plan(raw)
+        check(plan, "pybullet", None)
+        return PybulletModel(plan, self.path, substeps, defaults)
 
 
 class PybulletData(Data):
@@ -257,12 +257,4 @@ def _layout(model: PybulletModel) -> tuple[str, tuple[tuple[str, int], ...]]:
     layout = [("time", 1), ("qpos", model.nq), ("qvel", model.nv), ("ctrl", model.nu)]
     if model._shared.kind == "stepped":
         layout += [("contact", model.nv), ("friction", model.nv)]
-    identity = (
-        "pybullet",
-        layout,
-        model.joint_names,
-        model.jnt_type.tolist(),
-        model.jnt_qposadr.tolist(),
-        model.actuator_names,
-    )
-    return hashlib.sha256(repr(identity).encode()).hexdigest()[:16], tuple(layout)
+    return with_fingerprint(model, tuple(layout))

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..backends._bullet_client import pb
 from ..backends._bullet_plan import Plan
-from ..backends._bullet_world import Tree, World
+from ..backends._bullet_world import ENGINE_TIMESTEP, Tree, World
 from ..backends.pybullet_backend import PybulletModel
 from ..interface import Model
 from ..records import Array
@@ -76,8 +76,7 @@ def _all_joints(world: World, tree: Tree) -> range:
 def _free_terms(world: World, tree: Tree, model: Model) -> Iterator[Term]:
     """A quarter turn about z, and a spin about the body's own x."""
     qpos, qvel = np.zeros(model.nq), np.zeros(model.nv)
-    for joint, start in model._quaternions:
-        del joint
+    for _, start in model._quaternions:
         qpos[start : start + 4] = (np.sqrt(0.5), 0, 0, np.sqrt(0.5))
     qvel[tree.qvel] = (0, 0, 0, 1, 0, 0)
     world.put(qpos, qvel)
@@ -124,7 +123,7 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[Alone, ...]:
         seconds: Simulated time, in the engine's own timestep.
         joint: Id of a hinge or slide.
     """
-    steps = max(1, round(seconds * 240))
+    steps = max(1, round(seconds / ENGINE_TIMESTEP))
     found = []
     for label, gravity, motors, damping in (
         ("as loadURDF leaves it", False, True, True),
@@ -134,7 +133,7 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[Alone, ...]:
     ):
         with _raw(model, gravity, damping) as world:
             # The engine's own timestep, whatever the model's file says.
-            pb.setTimeStep(1 / 240, world.client)
+            pb.setTimeStep(ENGINE_TIMESTEP, world.client)
             tree, index = _joint(world, model, joint)
             if not motors:
                 for each in tree.joints:
@@ -145,7 +144,9 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[Alone, ...]:
             for _ in range(steps):
                 pb.stepSimulation(world.client)
             state = pb.getJointState(tree.body, index, world.client)
-            found.append(Alone(label, steps / 240, float(state[0]), float(state[3]), ratio))
+            found.append(
+                Alone(label, steps * ENGINE_TIMESTEP, float(state[0]), float(state[3]), ratio)
+            )
     return tuple(found)
 
 
@@ -155,7 +156,9 @@ def _explicit(world: World, tree: Tree) -> float:
     places = [state[0] for state in states]
     mass = np.array(pb.calculateMassMatrix(tree.body, places, physicsClientId=world.client))
     damping = [pb.getJointInfo(tree.body, i, world.client)[6] for i in tree.joints]
-    return float(np.linalg.eigvals(np.linalg.solve(mass, np.diag(damping))).real.max() / 240)
+    return float(
+        np.linalg.eigvals(np.linalg.solve(mass, np.diag(damping))).real.max() * ENGINE_TIMESTEP
+    )
 
 
 def _joint(world: World, model: Model, joint: int) -> tuple[Tree, int]:
@@ -254,8 +257,7 @@ def _joints(world: World) -> list[float]:
 
 def _state(world: World, model: Model) -> tuple[Array, Array]:
     qpos, qvel = np.zeros(model.nq), np.zeros(model.nv)
-    for joint, start in model._quaternions:
-        del joint
+    for _, start in model._quaternions:
         qpos[start] = 1.0
     for tree in world.trees:
         if tree.joints:
