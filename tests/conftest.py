@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from statemachine import backends
 from statemachine.backends import backend_engine, backend_names
 from statemachine.engines import ENGINES, require
 from statemachine.errors import MissingEngineError
@@ -50,6 +52,16 @@ def pytest_configure(config: pytest.Config) -> None:
 def _plain_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("MENAGERIE", "COLUMNS", "FORCE_COLOR", "NO_COLOR"):
         monkeypatch.delenv(name, raising=False)
+
+
+@contextmanager
+def registered(name: str, loader: str) -> Iterator[str]:
+    """A backend of another package, known under a name for a while."""
+    backends.register(name, loader)
+    try:
+        yield name
+    finally:
+        backends._BACKENDS.pop(name)
 
 
 @pytest.fixture(params=backend_names())

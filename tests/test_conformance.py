@@ -8,10 +8,10 @@ from collections.abc import Iterator
 import pytest
 
 import statemachine
-from statemachine import backends, conformance
+from statemachine import conformance
 from statemachine.errors import UnknownNameError, UnsupportedError
 
-from .conftest import need_engine
+from .conftest import need_engine, registered
 
 
 @pytest.fixture
@@ -37,10 +37,9 @@ def test_run_reports_every_check(backend: str) -> None:
 
 @pytest.fixture
 def hidden() -> Iterator[conformance.Lab]:
-    backends.register("hidden", "tests.hidden_world:load")
-    with conformance.Lab("hidden") as lab:
+    loader = "tests.hidden_world:load"
+    with registered("hidden", loader) as name, conformance.Lab(name) as lab:
         yield lab
-    backends._BACKENDS.pop("hidden")
 
 
 @pytest.mark.parametrize("check", conformance.CHECKS)
@@ -59,11 +58,8 @@ def test_a_backend_that_refuses_everything_does_not_pass(monkeypatch: pytest.Mon
     monkeypatch.setattr(
         MujocoModel, "_make_data", lambda self: (_ for _ in ()).throw(self._unsupported("data"))
     )
-    backends.register("lazy", "statemachine.backends.mujoco_backend:load")
-    try:
-        results = [outcome.result for outcome in conformance.run("lazy")]
-    finally:
-        backends._BACKENDS.pop("lazy")
+    with registered("lazy", "statemachine.backends.mujoco_backend:load") as name:
+        results = [outcome.result for outcome in conformance.run(name)]
     assert results.count("failed") > 40
     assert "skipped" not in results
 

@@ -13,6 +13,8 @@ import statemachine as sm
 from statemachine import backends, errors
 from statemachine.models import models_dir, resolve
 
+from .conftest import registered
+
 
 def test_names() -> None:
     arm = models_dir() / "so101" / "so101.xml"
@@ -157,12 +159,9 @@ def test_what_is_no_position_servo_has_no_gains(tmp_path: Path) -> None:
 
 
 def test_backends_can_be_registered() -> None:
-    backends.register("other", "statemachine.backends.mujoco_backend:load")
-    try:
+    with registered("other", "statemachine.backends.mujoco_backend:load"):
         assert sm.load("so101", backend="other").nq == 6
         assert "other" in backends.backend_names()
-    finally:
-        backends._BACKENDS.pop("other")
     with pytest.raises(errors.BadInputError):
         backends.register("other", "no colon")
 

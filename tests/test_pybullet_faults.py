@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from statemachine import backends, conformance
+from statemachine import conformance
 from statemachine.records import POSES
 from statemachine.rotations import matrix_from_quat
 
 from . import test_pybullet_backend as ours
-from .conftest import need_engine
+from .conftest import need_engine, registered
 
 Patch = Callable[[pytest.MonkeyPatch], None]
 
@@ -240,9 +240,8 @@ FAULTS: dict[str, tuple[Patch, set[str], tuple[Callable[..., None], ...]]] = {
 
 @pytest.fixture
 def faulty() -> Iterator[str]:
-    backends.register("faulty", "statemachine.backends.pybullet_backend:load")
-    yield "faulty"
-    backends._BACKENDS.pop("faulty")
+    with registered("faulty", "statemachine.backends.pybullet_backend:load") as name:
+        yield name
 
 
 @pytest.mark.parametrize("fault", FAULTS)

@@ -14,11 +14,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from statemachine import backends, conformance
+from statemachine import conformance
 from statemachine.backends import _mjcf, mujoco_backend
 from statemachine.backends.mujoco_backend import MujocoData, MujocoModel
 from statemachine.interface import Model
 from statemachine.records import DERIVED, State
+
+from .conftest import registered
 
 Patch = Callable[[pytest.MonkeyPatch], None]
 
@@ -360,9 +362,8 @@ FAULTS: dict[str, tuple[Patch, set[str]]] = {
 
 @pytest.fixture
 def faulty() -> Iterator[str]:
-    backends.register("faulty", "statemachine.backends.mujoco_backend:load")
-    yield "faulty"
-    backends._BACKENDS.pop("faulty")
+    with registered("faulty", "statemachine.backends.mujoco_backend:load") as name:
+        yield name
 
 
 @pytest.mark.parametrize("fault", FAULTS)
