@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from .page import Page, Table
+from ..page import Page, Table
 
 
 def origin(results: Mapping[str, Any]) -> str:

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..experiments import fingertip
+from ..page import Page, Table, Text, Verdict
 from ._words import differences, millimetres, page_of, vector, where
-from .page import Page, Table, Text, Verdict
 
 
 def page(results: Mapping[str, fingertip.Certificate]) -> Page:

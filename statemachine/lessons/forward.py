@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..experiments import forward
+from ..page import Code, Page, Table, Text, Verdict
 from ._words import differences, millimetres, page_of, vector, where
-from .page import Code, Page, Table, Text, Verdict
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> forward.Forward:

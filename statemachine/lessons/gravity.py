@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..experiments import gravity
+from ..page import Code, Page, Table, Text, Verdict
 from ._words import angle_or_length, differences, page_of, position, signed, where
-from .page import Code, Page, Table, Text, Verdict
 
 _PARTS = (
     ("gravity (−bias)", "bias"),

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..experiments import hold
+from ..page import Code, Page, Table, Text, Verdict
 from ..records import Array
 from ._words import angle_or_length, differences, millimetres, page_of, position, vector, where
-from .page import Code, Page, Table, Text, Verdict
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
 _SAME = 1e-12  # metres

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..experiments import replay
+from ..page import Code, Page, Table, Text, Verdict
 from ._words import count, degrees, differences, millimetres, page_of, vector, where
-from .page import Code, Page, Table, Text, Verdict
 
 _STEPS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 300, 600, 1000, 2000, 5000, 10_000, 20_000)
 _BROKEN = {

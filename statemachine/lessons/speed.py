@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..experiments import speed
+from ..page import Page, Table, Text
 from ._words import count, differences, page_of
-from .page import Page, Table, Text
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> speed.Speed:

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..experiments import state
+from ..page import Code, Page, Table, Text
 from ._words import differences, page_of
-from .page import Code, Page, Table, Text
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> state.Layout:

@@ -11,7 +11,7 @@ import sys
 from dataclasses import dataclass
 
 from ..engines import ENGINES, engine_version
-from ..lessons.page import Page, Table, Text, Verdict
+from ..page import Page, Table, Text, Verdict
 
 _RENDER = """
 import mujoco

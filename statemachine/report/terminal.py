@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from ..lessons.page import Code, Page, Table, Text, Verdict
+from ..page import Code, Page, Table, Text, Verdict
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -1,6 +1,6 @@
 """A page: what a lesson has to say, free of how it is shown.
 
-Lessons return pages; `report` turns them into text for a terminal and, later, into
+Lessons, probes and gradings make pages; `report` turns them into text for a terminal and into
 other media.
 """
 

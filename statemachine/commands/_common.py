@@ -1,0 +1,90 @@
+"""What the commands share: options of a model, runs on each backend, how a page is shown."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from ..errors import MissingEngineError, ModelError, StateMachineError, UnsupportedError
+
+PROGRAM = "statemachine"
+# Exit codes: the result says no; bad input; an engine is missing; nowhere to write.
+SAYS_NO, BAD_INPUT, MISSING, NO_OUTPUT = 1, 2, 3, 74
+
+
+def complain(error: Exception | str, code: int) -> int:
+    """Say it in one line on standard error; returns `code`."""
+    print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
+    return code
+
+
+def add_json(parser: argparse.ArgumentParser, what: str = "result") -> None:
+    """The option --json."""
+    parser.add_argument("--json", action="store_true", help=f"print the {what} as JSON")
+
+
+def add_backend(parser: argparse.ArgumentParser, everyone: bool = True) -> None:
+    """The option --backend."""
+    text = "an engine, or all" if everyone else "an engine"
+    parser.add_argument(
+        "--backend", default="mujoco", metavar="NAME", help=f"{text} (default mujoco)"
+    )
+
+
+def add_model(parser: argparse.ArgumentParser, model: str) -> None:
+    """The options --backend, --model, --menagerie and --json."""
+    add_backend(parser)
+    parser.add_argument(
+        "--model", default=model, metavar="NAME|FILE", help=f"the model (default {model})"
+    )
+    parser.add_argument(
+        "--menagerie",
+        default=os.environ.get("MENAGERIE") or None,
+        metavar="DIR",
+        help="look the model up in this folder of public models (default $MENAGERIE)",
+    )
+    add_json(parser)
+
+
+def on_each_backend(
+    options: argparse.Namespace, what: str, run: Callable[[Any, Any], Any]
+) -> dict[str, Any]:
+    """Results by backend; an engine that is missing is named and left out of `all`."""
+    from ..backends import backend_names, load
+    from ..report.progress import progress
+
+    everyone = options.backend == "all"
+    results: dict[str, Any] = {}
+    missing: list[StateMachineError] = []
+    for backend in backend_names() if everyone else [options.backend]:
+        try:
+            model = load(options.model, backend=backend, menagerie=options.menagerie)
+        except (MissingEngineError, ModelError, UnsupportedError) as error:
+            if not everyone:
+                raise
+            missing.append(error)
+            continue
+        with progress(f"{what} on {backend}") as report:
+            results[backend] = run(model, report)
+    refusals = list({str(error): error for error in missing}.values())  # each text once
+    for error in refusals if results else refusals[:-1]:
+        complain(error, MISSING)
+    if not results:
+        raise refusals[-1]
+    return results
+
+
+def show(page: Any, result: Any, as_json: bool, footer: str = "") -> int:
+    """Print a page, or what it was made from as JSON; the exit code."""
+    if as_json:
+        from ..report.as_json import dumps
+
+        print(dumps(result))
+    else:
+        from ..report import terminal
+
+        terminal.show(page, footer)
+    return 0 if page.holds else SAYS_NO

@@ -1,0 +1,23 @@
+"""`statemachine doctor`: what this machine has, and what to do."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from ._common import MISSING, add_json, show
+
+
+def add(commands: Any) -> None:
+    """The subparser."""
+    parser = commands.add_parser("doctor", help="what this machine has, and what to do")
+    add_json(parser, "findings")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Examine, and show."""
+    from ..report import doctor
+
+    diagnosis = doctor.examine()
+    return MISSING if show(doctor.page(diagnosis), diagnosis, options.json) else 0

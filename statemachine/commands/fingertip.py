@@ -1,0 +1,49 @@
+"""`statemachine fingertip`: an engine's fingertip against an independent witness."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from ._common import add_model, on_each_backend, show
+
+
+def add(commands: Any) -> None:
+    """The subparser."""
+    parser = commands.add_parser(
+        "fingertip",
+        help="the engine's fingertip against an independent witness",
+        description="Compare a site's pose on an engine with Pinocchio's, over many poses.",
+    )
+    add_model(parser, "so101")
+    parser.add_argument("--poses", type=int, default=200, metavar="N", help="how many (200)")
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the poses (0)")
+    parser.add_argument("--site", default="gripperframe", help="the frame (gripperframe)")
+    parser.add_argument(
+        "--witness", default=None, metavar="FILE", help="what Pinocchio reads (default: the model)"
+    )
+    parser.add_argument(
+        "--witness-frame", default=None, metavar="NAME", help="the frame's name there"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compare, and show."""
+    from ..experiments import fingertip
+    from ..lessons import fingertip as words
+
+    results = on_each_backend(
+        options,
+        "fingertip",
+        lambda model, report: fingertip.run(
+            model,
+            poses=options.poses,
+            seed=options.seed,
+            site=options.site,
+            witness=options.witness,
+            witness_frame=options.witness_frame,
+            progress=report,
+        ),
+    )
+    return show(words.page(results), results, options.json)

@@ -1,0 +1,1 @@
+"""Exercises judged by what they do: `statemachine check`."""
