@@ -6,7 +6,7 @@ other media.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 
@@ -22,6 +22,74 @@ class Code:
     """Lines as the reader would type them."""
 
     lines: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Printed:
+    """What the code above it printed, by engine."""
+
+    by_engine: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Question:
+    """A prediction to make before one reads on.
+
+    Attributes:
+        text: What is asked.
+        choices: Possible answers.
+        right: Number of the one that the run gave; None if it gave another.
+        because: What the run showed, in a sentence.
+    """
+
+    text: str
+    choices: Sequence[str]
+    right: int | None
+    because: str
+
+
+@dataclass(frozen=True)
+class Traces:
+    """Curves over one axis; shown where pictures can be.
+
+    Attributes:
+        title: What they show.
+        across: What the horizontal axis is, with its unit; up: the vertical one.
+        curves: (x, y) by name, each a sequence of numbers.
+    """
+
+    title: str
+    across: str
+    up: str
+    curves: Mapping[str, tuple[Sequence[float], Sequence[float]]]
+
+
+@dataclass(frozen=True)
+class Slots:
+    """Two rows of numbered slots and who owns them; shown where pictures can be.
+
+    Attributes:
+        title: What they show.
+        rows: For each row its name and the (owner, start, stop) of its slots.
+    """
+
+    title: str
+    rows: Mapping[str, Sequence[tuple[str, int, int]]]
+
+
+@dataclass(frozen=True)
+class Pipeline:
+    """Stages from left to right, and what covers which; shown where pictures can be.
+
+    Attributes:
+        title: What it shows.
+        stages: Heading and content of each stage.
+        spans: Name of each call, with the first and last stage that it covers.
+    """
+
+    title: str
+    stages: Sequence[tuple[str, Sequence[str]]]
+    spans: Sequence[tuple[str, int, int]]
 
 
 @dataclass(frozen=True)
@@ -51,7 +119,8 @@ class Verdict:
     holds: bool
 
 
-Block = Text | Code | Table | Verdict
+Picture = Traces | Slots | Pipeline
+Block = Text | Code | Printed | Question | Table | Verdict | Traces | Slots | Pipeline
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import hashlib
 import platform
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
@@ -15,9 +16,10 @@ import numpy as np
 from .. import __version__
 from ..errors import BadInputError, UnsupportedError
 from ..interface import Data, Model
-from ..records import Array, Contacts, JointType
+from ..records import DERIVED, Array, Contacts, JointType
 
 Progress = Callable[[float], None]  # told the fraction that is done
+TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)  # a command to the arm [rad]
 
 
 def silent(_fraction: float) -> None:
@@ -125,6 +127,19 @@ def forces_on(data: Data, dof: int) -> Forces:
         limit=part("limit"),
         equality=part("equality"),
     )
+
+
+def read_derived(data: Data) -> dict[str, bytes]:
+    """The bytes of every derived array that this engine gives, contacts among them."""
+    found = {}
+    for name in DERIVED:
+        with suppress(UnsupportedError):
+            found[name] = np.asarray(getattr(data, name)).tobytes()
+    contacts = data.contacts
+    found["contacts"] = b"".join(
+        array.tobytes() for array in (contacts.geom, contacts.dist, contacts.pos, contacts.force)
+    )
+    return found
 
 
 def body_pairs(model: Model, contacts: Contacts) -> Counter[str]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import UnsupportedError
 from ..interface import Model
 from ..probes import Alone, probe
 from ..records import Array, JointType
@@ -59,6 +61,8 @@ class Gravity:
     Attributes:
         joint: The joint that was watched; slide: whether it is one, and no hinge.
         servo: Whether a position servo drives it.
+        longer: The actuators off for longer, under the names "floor" (with contacts) and
+            "no floor" (nothing can touch anything).
         alone: The joint on the engine as it comes, where that differs from the contract.
     """
 
@@ -67,6 +71,7 @@ class Gravity:
     servo: bool
     servos_on: Droop
     servos_off: Droop
+    longer: dict[str, Droop]
     alone: tuple[Alone, ...]
     provenance: Provenance
 
@@ -75,6 +80,7 @@ def run(
     model: Model,
     seconds: float = 4.0,
     joint: str = "shoulder_lift",
+    longer: float = 100.0,
     progress: Progress = silent,
 ) -> Gravity:
     """Let gravity act for a while, ctrl untouched, actuators on and then off.
@@ -82,6 +88,8 @@ def run(
     Args:
         model: Any model with the joint.
         seconds: Simulated time.
+        longer: Simulated time of two more runs with the actuators off, one of them with
+            contacts left out, where the backend can; 0 for none.
         joint: The joint to watch; a hinge or slide.
         progress: Told the fraction that is done.
 
@@ -91,8 +99,16 @@ def run(
         UnsupportedError: The backend cannot switch the actuators off.
     """
     limp = model.replace(actuation=False)
-    on = _droop(model, seconds, joint, lambda part: progress(part / 2))
-    off = _droop(limp, seconds, joint, lambda part: progress((1 + part) / 2))
+    runs = {"on": (model, seconds), "off": (limp, seconds)}
+    if longer:
+        runs["floor"] = limp, longer
+        with suppress(UnsupportedError):
+            runs["no floor"] = limp.replace(contacts=False), longer
+    total, done, droops = sum(time for _, time in runs.values()), 0.0, {}
+    for name, (each, time) in runs.items():
+        droops[name] = _droop(each, time, joint, _part_of(progress, done / total, time / total))
+        done += time
+    on, off = droops.pop("on"), droops.pop("off")
     which = model.joint_id(joint)
     own = probe(model)
     return Gravity(
@@ -101,9 +117,15 @@ def run(
         servo=bool(np.isfinite(model.actuator_kp[model.actuator_jntid == which]).any()),
         servos_on=on,
         servos_off=off,
+        longer=droops,
         alone=own.left_alone(model, seconds, which) if own else (),
         provenance=provenance(model),
     )
+
+
+def _part_of(progress: Progress, start: float, share: float) -> Progress:
+    """The progress of a run that is a share of the whole."""
+    return lambda part: progress(start + share * part)
 
 
 def _droop(model: Model, seconds: float, joint: str, progress: Progress) -> Droop:

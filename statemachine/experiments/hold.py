@@ -1,4 +1,4 @@
-"""Command one pose and hold it: how the servos get there, and how old `site_xpos` is."""
+"""Command one pose and hold it: how the servos get there, and what is in the way."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from ..interface import Model
 from ..records import Array, Ints, JointType
 from ..verbs import forward, make_data, step
 from ._common import (
+    TARGET,
     Progress,
     Provenance,
     command,
@@ -23,8 +24,6 @@ from ._common import (
     touching,
 )
 
-TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
-
 
 @dataclass(frozen=True, eq=False)
 class Hold:
@@ -35,10 +34,6 @@ class Hold:
         goal: (nu,) the command within ctrlrange, which is what the actuators see.
         time: (n+1,) [s].
         qpos: (n+1, nu) the actuated joints.
-        lag: (n,) distance [m] between the fingertip that a step leaves in
-            `site_xpos` and the one that `forward` computes right after it.
-        previous: Largest distance [m] between the fingertip that a step leaves and
-            the one that `forward` computed before that step.
         first_contact: When the robot first touched something [s], or None.
         touched: What touched what then; contact_steps: how many steps found a contact.
         touching: What it touches at the end.
@@ -53,8 +48,6 @@ class Hold:
     goal: Array
     time: Array
     qpos: Array
-    lag: Array
-    previous: float
     first_contact: float | None
     touched: tuple[str, ...]
     contact_steps: int
@@ -76,7 +69,6 @@ def run(
     model: Model,
     target: Sequence[float] | None = None,
     seconds: float = 2.0,
-    site: str = "gripperframe",
     progress: Progress = silent,
 ) -> Hold:
     """Hold a pose from the default one on.
@@ -85,29 +77,25 @@ def run(
         model: Any model whose actuators drive hinge or slide joints.
         target: The command (nu,) [rad or m]; by default `TARGET`, for six actuators.
         seconds: Simulated time.
-        site: The fingertip.
         progress: Told the fraction that is done.
 
     Raises:
         BadInputError: `target` has the wrong length, or `seconds` is not above 0.
-        UnknownNameError: No such site.
     """
     if target is None and model.nu != len(TARGET):
         raise BadInputError(f"{model.path.name} has {model.nu} actuators: say where to, by target")
-    goal, tip = command(model, TARGET if target is None else target, "target"), model.site_id(site)
+    goal = command(model, TARGET if target is None else target, "target")
     names = [model.joint_names[i] if i >= 0 else "" for i in model.actuator_jntid]
     if not all(names) or not names:
         raise BadInputError(f"{model.path.name} has no actuators, or some that drive no joint")
     addresses = np.array([scalar_joint(model, name) for name in names], dtype=np.int64)
     robot, total = moved_by_actuators(model), steps_in(model, seconds)
-    times, poses, lags, first, previous = [0.0], [], [], None, 0.0
+    times, poses, first = [0.0], [], None
     touched: tuple[str, ...] = ()
     contact_steps = 0
     with make_data(model) as data:
         poses.append(data.qpos[addresses[:, 0]])
         data.ctrl = goal
-        forward(model, data)
-        fresh = np.array(data.site_xpos[tip])
         for k in range(total):
             began = data.time
             step(model, data)
@@ -115,15 +103,11 @@ def run(
             contact_steps += bool(found)
             if found and first is None:
                 first, touched = began, found
-            stale = np.array(data.site_xpos[tip])
-            previous = max(previous, float(np.linalg.norm(stale - fresh)))
-            forward(model, data)
-            fresh = np.array(data.site_xpos[tip])
-            lags.append(float(np.linalg.norm(fresh - stale)))
             times.append(data.time)
             poses.append(data.qpos[addresses[:, 0]])
             if k % 100 == 0:
                 progress(k / total)
+        forward(model, data)
         at_end = touching(model, data.contacts, robot)
         if first is None and at_end:
             first, touched = data.time, at_end
@@ -132,8 +116,6 @@ def run(
             goal=np.clip(goal, *model.actuator_ctrlrange.T),
             time=np.array(times),
             qpos=np.array(poses),
-            lag=np.array(lags),
-            previous=previous,
             first_contact=first,
             touched=touched,
             contact_steps=contact_steps,

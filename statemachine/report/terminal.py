@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from ..page import Code, Page, Table, Text, Verdict
+from ..page import Block, Code, Page, Printed, Question, Table, Text, Verdict
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -19,25 +19,60 @@ _WIDTH_PIPED = 80
 _WIDTH_MOST = 100
 
 
-def show(page: Page, footer: str = "") -> None:
-    """Print a page on standard output, and a last line under it."""
+def show(page: Page, footer: str = "", ask: Callable[[Question], int | None] | None = None) -> None:
+    """Print a page on standard output, and a last line under it.
+
+    Args:
+        page: The page.
+        footer: The last line.
+        ask: Puts a question to the reader and returns the number of the choice; the rest of
+            the page waits for it. Without, questions are left out.
+    """
+    _write([], heading=page)
+    said: tuple[Question, int] | None = None
+    for block in page.blocks:
+        if isinstance(block, Question):
+            if ask is not None:
+                choice = ask(block)
+                said = None if choice is None else (block, choice)
+            continue
+        _write([block])
+        if said and isinstance(block, Printed):  # first the run, then who was right
+            _write([_judged(*said)])
+            said = None
+    if said:
+        _write([_judged(*said)])
+    if footer:
+        _write([], footer=footer)
+    else:
+        print(flush=True)
+
+
+def _judged(question: Question, choice: int) -> Verdict:
+    """What became of a prediction."""
+    if choice == question.right:
+        return Verdict(f"as you said. {question.because}", True)
+    letters = "abcdefgh"
+    right = "none of them" if question.right is None else letters[question.right]
+    return Verdict(f"you said {letters[choice]}; it is {right}. {question.because}", False)
+
+
+def _write(blocks: Sequence[Block], heading: Page | None = None, footer: str = "") -> None:
     from rich.console import Console
 
     console = Console(highlight=False, emoji=False)
     piped = not console.is_terminal
     console.width = _WIDTH_PIPED if piped else min(console.width, _WIDTH_MOST)
     with console.capture() as captured:
-        _print(console, page)
-        if footer:
-            console.print(f"[dim]{footer}[/]\n")
+        _print(console, blocks, heading, footer)
     text = captured.get()
-    if piped:  # cells are padded with blanks that only a terminal needs
+    if piped and text:  # cells are padded with blanks that only a terminal needs
         text = "\n".join(line.rstrip() for line in text.splitlines()) + "\n"
     sys.stdout.write(text)
     sys.stdout.flush()
 
 
-def _print(console: Console, page: Page) -> None:
+def _print(console: Console, blocks: Sequence[Block], heading: Page | None, footer: str) -> None:
     from rich.markup import escape as escaped
 
     plain = _plain()
@@ -46,10 +81,11 @@ def _print(console: Console, page: Page) -> None:
         return escaped(text.translate(_ASCII) if plain else text)
 
     good, bad = ("yes", "NO ") if plain else ("✓", "✗")
-    console.print()
-    console.print(f"[bold]{escape(page.title)}[/]")
-    console.print(f"[dim]{escape(page.origin)}[/]")
-    for block in page.blocks:
+    if heading:
+        console.print()
+        console.print(f"[bold]{escape(heading.title)}[/]")
+        console.print(f"[dim]{escape(heading.origin)}[/]")
+    for block in blocks:
         match block:
             case Text(text):
                 console.print()
@@ -58,6 +94,13 @@ def _print(console: Console, page: Page) -> None:
                 console.print()
                 for line in lines:
                     console.print(f"    [cyan]{escape(line)}[/]", soft_wrap=True)
+            case Printed(by_engine):
+                for names, text in together(by_engine):
+                    console.print()
+                    verb = "prints" if len(names) == 1 else "print"
+                    console.print(f"[dim]{escape(', '.join(names))} {verb}[/]")
+                    for line in text.splitlines() or ["(nothing)"]:
+                        console.print(f"    {escape(line)}", soft_wrap=True)
             case Table():
                 console.print()
                 if block.title:
@@ -67,7 +110,19 @@ def _print(console: Console, page: Page) -> None:
                 console.print()
                 mark = f"[green]{good}[/]" if holds else f"[red]{bad}[/]"
                 console.print(_hanging(mark, escape(text)))
-    console.print()
+            case _:  # a picture
+                pass
+    if footer:
+        console.print()
+        console.print(f"[dim]{escape(footer)}[/]\n")
+
+
+def together(by_engine: Mapping[str, str]) -> list[tuple[list[str], str]]:
+    """Engines that printed the same, once: their names and the text."""
+    groups: dict[str, list[str]] = {}
+    for name, text in by_engine.items():
+        groups.setdefault(text, []).append(name)
+    return [(names, text) for text, names in groups.items()]
 
 
 def _plain() -> bool:
