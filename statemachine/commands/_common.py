@@ -21,38 +21,51 @@ def complain(error: Exception | str, code: int) -> int:
     return code
 
 
-def add_json(parser: argparse.ArgumentParser, what: str = "result") -> None:
+def add_json(parser: argparse.ArgumentParser, what: str = "result", default: Any = False) -> None:
     """The option --json."""
-    parser.add_argument("--json", action="store_true", help=f"print the {what} as JSON")
+    parser.add_argument(
+        "--json", action="store_true", default=default, help=f"print the {what} as JSON"
+    )
 
 
-def add_backend(parser: argparse.ArgumentParser, everyone: bool = True) -> None:
+def add_backend(
+    parser: argparse.ArgumentParser, everyone: bool = True, default: str = "mujoco"
+) -> None:
     """The option --backend."""
     text = "an engine, or all" if everyone else "an engine"
     parser.add_argument(
-        "--backend", default="mujoco", metavar="NAME", help=f"{text} (default mujoco)"
+        "--backend", default=default, metavar="NAME", help=f"{text} (default mujoco)"
+    )
+
+
+def add_menagerie(parser: argparse.ArgumentParser, default: str | None = None) -> None:
+    """The option --menagerie."""
+    parser.add_argument(
+        "--menagerie",
+        default=default or os.environ.get("MENAGERIE") or None,
+        metavar="DIR",
+        help="look the model up in this folder of public models (default $MENAGERIE)",
     )
 
 
 def add_model(parser: argparse.ArgumentParser, model: str) -> None:
-    """The options --backend, --model, --menagerie and --json."""
-    add_backend(parser)
+    """The option --model."""
     parser.add_argument(
         "--model", default=model, metavar="NAME|FILE", help=f"the model (default {model})"
     )
-    parser.add_argument(
-        "--menagerie",
-        default=os.environ.get("MENAGERIE") or None,
-        metavar="DIR",
-        help="look the model up in this folder of public models (default $MENAGERIE)",
-    )
-    add_json(parser)
 
 
 def on_each_backend(
-    options: argparse.Namespace, what: str, run: Callable[[Any, Any], Any]
+    options: argparse.Namespace, what: str, model: str, run: Callable[[Any, str, Any], Any]
 ) -> dict[str, Any]:
-    """Results by backend; an engine that is missing is named and left out of `all`."""
+    """Results by backend; an engine that is missing is named and left out of `all`.
+
+    Args:
+        options: Its `backend` and `menagerie` are read.
+        what: Shown beside the progress.
+        model: A model's name or file.
+        run: Called with the Model, the backend's name and a Report.
+    """
     from ..backends import backend_names, load
     from ..report.progress import progress
 
@@ -61,14 +74,14 @@ def on_each_backend(
     missing: list[StateMachineError] = []
     for backend in backend_names() if everyone else [options.backend]:
         try:
-            model = load(options.model, backend=backend, menagerie=options.menagerie)
+            loaded = load(model, backend=backend, menagerie=options.menagerie)
         except (MissingEngineError, ModelError, UnsupportedError) as error:
             if not everyone:
                 raise
             missing.append(error)
             continue
         with progress(f"{what} on {backend}") as report:
-            results[backend] = run(model, report)
+            results[backend] = run(loaded, backend, report)
     refusals = list({str(error): error for error in missing}.values())  # each text once
     for error in refusals if results else refusals[:-1]:
         complain(error, MISSING)
@@ -77,7 +90,7 @@ def on_each_backend(
     return results
 
 
-def show(page: Any, result: Any, as_json: bool, footer: str = "") -> int:
+def show(page: Any, result: Any, as_json: bool, footer: str = "", ask: Any = None) -> int:
     """Print a page, or what it was made from as JSON; the exit code."""
     if as_json:
         from ..report.as_json import dumps
@@ -86,5 +99,5 @@ def show(page: Any, result: Any, as_json: bool, footer: str = "") -> int:
     else:
         from ..report import terminal
 
-        terminal.show(page, footer)
+        terminal.show(page, footer, ask)
     return 0 if page.holds else SAYS_NO

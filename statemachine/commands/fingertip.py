@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ._common import add_model, on_each_backend, show
+from ._common import add_backend, add_json, add_menagerie, add_model, on_each_backend, show
 
 
 def add(commands: Any) -> None:
@@ -15,7 +15,10 @@ def add(commands: Any) -> None:
         help="the engine's fingertip against an independent witness",
         description="Compare a site's pose on an engine with Pinocchio's, over many poses.",
     )
+    add_backend(parser)
     add_model(parser, "so101")
+    add_menagerie(parser)
+    add_json(parser)
     parser.add_argument("--poses", type=int, default=200, metavar="N", help="how many (200)")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the poses (0)")
     parser.add_argument("--site", default="gripperframe", help="the frame (gripperframe)")
@@ -36,7 +39,8 @@ def run(options: argparse.Namespace) -> int:
     results = on_each_backend(
         options,
         "fingertip",
-        lambda model, report: fingertip.run(
+        options.model,
+        lambda model, _backend, report: fingertip.run(
             model,
             poses=options.poses,
             seed=options.seed,

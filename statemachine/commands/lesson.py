@@ -1,4 +1,4 @@
-"""`statemachine lesson`: the lessons, in the order of the course."""
+"""`statemachine lesson`: the guided path, and each of its stations."""
 
 from __future__ import annotations
 
@@ -6,24 +6,54 @@ import argparse
 from typing import Any
 
 from ..lessons import LESSONS, Lesson, module
-from ._common import PROGRAM, add_model, on_each_backend, show
+from ._common import (
+    PROGRAM,
+    SAYS_NO,
+    add_backend,
+    add_json,
+    add_menagerie,
+    add_model,
+    on_each_backend,
+    show,
+)
 
 
 def add(commands: Any) -> None:
-    """The subparser, with one of its own for each lesson."""
-    lessons = commands.add_parser(
-        "lesson", help="run a lesson", description="The lessons, in the order of the course."
+    """The subparser, with one of its own for each station."""
+    path = commands.add_parser(
+        "lesson",
+        help="the guided path, or one station of it",
+        description="Without a name: all stations, one after the other.",
+        epilog="In a terminal each station asks for a prediction before it shows the answer.",
     )
-    lessons.set_defaults(run=overview)
-    named = lessons.add_subparsers(metavar="name")
+    _add_shared(path)
+    path.set_defaults(run=run_path)
+    named = path.add_subparsers(metavar="name")
     for lesson in LESSONS.values():
         _add_lesson(named, lesson)
 
 
+def _add_shared(parser: argparse.ArgumentParser, default: Any = None) -> None:
+    """Options that come before a station's name or after it; the later one counts."""
+    add_backend(parser, default=default or "mujoco")
+    add_menagerie(parser, default)
+    add_json(parser, default=default or False)
+    parser.add_argument(
+        "--no-questions",
+        action="store_true",
+        default=default or False,
+        help="do not ask for predictions, do not wait",
+    )
+
+
 def _add_lesson(named: Any, lesson: Lesson) -> None:
     parser = named.add_parser(lesson.name, help=lesson.question, description=lesson.question)
+    _add_shared(parser, default=argparse.SUPPRESS)
     add_model(parser, lesson.model)
     for option in lesson.options:
+        if option.kind is bool:
+            parser.add_argument(option.flag, dest=option.key, action="store_true", help=option.help)
+            continue
         default = "" if option.default is None else f" (default {option.default})"
         parser.add_argument(
             option.flag,
@@ -50,28 +80,78 @@ def overview(_options: argparse.Namespace) -> int:
     lines = [
         "A physics simulator is a state machine that you advance.",
         "",
-        "The lessons, in the order of the course:",
+        f"  {PROGRAM} lesson           the guided path: ten stations, about 35 minutes",
+        "",
+        "Its stations, each to be had alone:",
         *(f"  {PROGRAM} lesson {name:<9} {lesson.question}" for name, lesson in LESSONS.items()),
         "",
         "And beside them:",
         f"  {PROGRAM} fingertip        the engine against an independent witness",
         f"  {PROGRAM} doctor           what this machine has, and what to do",
         "",
-        f"Each takes --help. Start with: {PROGRAM} lesson state",
+        f"Each takes --help. Start with: {PROGRAM} lesson",
     ]
     print("\n".join(lines))
     return 0
 
 
 def run(options: argparse.Namespace) -> int:
-    """One lesson, on one backend or all."""
+    """One station, on one backend or all."""
     lesson: Lesson = options.lesson
-    code = module(lesson.name)
     values = {option.key: getattr(options, option.key) for option in lesson.options}
-    results = on_each_backend(
-        options, lesson.name, lambda model, report: code.run(model, values, report)
-    )
+    page, results = _compute(options, lesson, options.model, values)
     names = list(LESSONS)
     later = names[names.index(lesson.name) + 1 :]
     following = f"lesson {later[0]}" if later else "fingertip"
-    return show(code.page(results), results, options.json, f"Next: {PROGRAM} {following}")
+    return show(page, results, options.json, f"Next: {PROGRAM} {following}", _asking(options))
+
+
+def run_path(options: argparse.Namespace) -> int:
+    """All stations, one after the other."""
+    from ..report import terminal
+    from ..report.quiz import go_on
+
+    ask, code, everything = _asking(options), 0, {}
+    for number, lesson in enumerate(LESSONS.values(), start=1):
+        if ask and number > 1 and not go_on(f"station {number}: {lesson.question}"):
+            break
+        values = {option.key: option.default for option in lesson.options}
+        page, results = _compute(options, lesson, lesson.model, values)
+        everything[lesson.name] = results
+        code = code if page.holds else SAYS_NO
+        if not options.json:
+            page = type(page)(f"{number} of {len(LESSONS)}: {page.title}", page.origin, page.blocks)
+            terminal.show(page, ask=ask)
+    if options.json:
+        from ..report.as_json import dumps
+
+        print(dumps(everything))
+    return code
+
+
+def _compute(
+    options: argparse.Namespace, lesson: Lesson, model: str, values: dict[str, Any]
+) -> tuple[Any, dict[str, Any]]:
+    """The page of a station, and the results that it was made from, by backend."""
+    from ..lessons.session import Session, load_line, play
+
+    station = module(lesson.name)
+    typed: dict[str, str] = {}
+
+    def on(loaded: Any, backend: str, report: Any) -> Any:
+        result = station.run(loaded, values, report)
+        typed[backend] = station.code(values, load_line(model, backend, options.menagerie))
+        return result, play(typed[backend])
+
+    both = on_each_backend(options, lesson.name, model, on)
+    results = {name: result for name, (result, _) in both.items()}
+    printed = {name: text for name, (_, text) in both.items()}
+    session = Session(next(iter(typed.values())), printed)
+    return station.page(results, session), results
+
+
+def _asking(options: argparse.Namespace) -> Any:
+    """What puts a question to the reader; None where nobody would answer."""
+    from ..report.quiz import ask, can_ask
+
+    return ask if can_ask() and not (options.json or options.no_questions) else None

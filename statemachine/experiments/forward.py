@@ -9,7 +9,8 @@ import numpy as np
 from ..interface import Model
 from ..records import Array
 from ..verbs import forward, make_data
-from ._common import Provenance, provenance, scalar_joint
+from . import stages
+from ._common import Progress, Provenance, provenance, scalar_joint, silent
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +29,7 @@ class Forward:
     Attributes:
         equal: Pairs (i, j), i < j, of readings that are equal bit by bit.
         moved: Distance [m] that the write and the second `forward` moved the fingertip.
+        stages: What each call changes, and of which moment derived values are.
     """
 
     joint: str
@@ -35,6 +37,7 @@ class Forward:
     readings: tuple[Reading, ...]
     equal: tuple[tuple[int, int], ...]
     moved: float
+    stages: stages.Stages
     provenance: Provenance
 
 
@@ -43,6 +46,8 @@ def run(
     joint: str = "shoulder_lift",
     value: float = 0.8,
     site: str = "gripperframe",
+    seconds: float = 2.0,
+    progress: Progress = silent,
 ) -> Forward:
     """Write one joint into a fresh Data and watch when the fingertip notices.
 
@@ -51,6 +56,8 @@ def run(
         joint: The joint to write; a hinge or slide.
         value: What to write [rad or m].
         site: The fingertip.
+        seconds: Simulated time over which moments are compared; see `stages`.
+        progress: Told the fraction that is done.
 
     Raises:
         UnknownNameError: No such joint or site.
@@ -76,4 +83,5 @@ def run(
         if np.array_equal(readings[i].fingertip, readings[j].fingertip)
     )
     moved = float(np.linalg.norm(readings[3].fingertip - readings[2].fingertip))
-    return Forward(joint, value, tuple(readings), equal, moved, provenance(model))
+    looked = stages.run(model, joint, value, site, seconds, progress)
+    return Forward(joint, value, tuple(readings), equal, moved, looked, provenance(model))

@@ -37,7 +37,8 @@ class Droop:
         qpos: (nq,) at the end.
         forces: On the joint at the end, after `forward`.
         velocity, acceleration: Of the joint at the end [rad/s, rad/s²; or with m].
-        touches: When each contact of what the joint carries was first found [s].
+        touches: When each contact of what the joint carries was first found [s]; the longer
+            runs look at their end only.
         touching: Those that are there at the end.
         ctrl_is_zero: Whether ctrl still is, at the end.
     """
@@ -106,7 +107,8 @@ def run(
             runs["no floor"] = limp.replace(contacts=False), longer
     total, done, droops = sum(time for _, time in runs.values()), 0.0, {}
     for name, (each, time) in runs.items():
-        droops[name] = _droop(each, time, joint, _part_of(progress, done / total, time / total))
+        part = _part_of(progress, done / total, time / total)
+        droops[name] = _droop(each, time, joint, part, watch=name in ("on", "off"))
         done += time
     on, off = droops.pop("on"), droops.pop("off")
     which = model.joint_id(joint)
@@ -128,7 +130,7 @@ def _part_of(progress: Progress, start: float, share: float) -> Progress:
     return lambda part: progress(start + share * part)
 
 
-def _droop(model: Model, seconds: float, joint: str, progress: Progress) -> Droop:
+def _droop(model: Model, seconds: float, joint: str, progress: Progress, watch: bool) -> Droop:
     place, dof = scalar_joint(model, joint)
     bodies = carried_by(model, [int(model.jnt_bodyid[model.joint_id(joint)])])
     total = steps_in(model, seconds)
@@ -145,9 +147,9 @@ def _droop(model: Model, seconds: float, joint: str, progress: Progress) -> Droo
             if k < total:
                 began = data.time
                 step(model, data)
-                # The contacts of a step are those of the state that it started from.
-                for touch in touching(model, data.contacts, bodies):
-                    touches.setdefault(touch, began)
+                if watch:  # the contacts of a step are those of the state that it started from
+                    for touch in touching(model, data.contacts, bodies):
+                        touches.setdefault(touch, began)
         forward(model, data)
         at_end = touching(model, data.contacts, bodies)
         for touch in at_end:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from ..checks import as_count
-from ..errors import BadInputError, unknown_name
+from ..errors import BadInputError, UnsupportedError, unknown_name
 from ..interface import Data, Model
 from ..probes import WayBack, probe
 from ..records import Array, Ints, JointType
@@ -21,6 +21,39 @@ Break = Literal["extra-step", "late-ctrl"]
 BREAKS: tuple[Break, ...] = ("extra-step", "late-ctrl")
 # Added to the keyframe's own ctrl: pan and lift, so that the arm visibly moves.
 MOVE = (0.4, -0.2)
+
+
+@dataclass(frozen=True)
+class Broken:
+    """What became of a second run that was made to differ.
+
+    Attributes:
+        way: One of `BREAKS`.
+        close: Whether `np.allclose` calls the ends equal.
+        peak, peak_step: The largest |qpos difference| on the way, and after which step.
+        end: That at the end.
+    """
+
+    way: str
+    close: bool
+    peak: float
+    peak_step: int
+    end: float
+
+
+@dataclass(frozen=True)
+class Finer:
+    """The same movement with half the timestep, twice.
+
+    Attributes:
+        timestep: Of these runs [s].
+        identical: Whether the two of them end in the same bits.
+        difference: Largest |qpos difference| of their end to that of the usual timestep.
+    """
+
+    timestep: float
+    identical: bool
+    difference: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +74,8 @@ class Replay:
         contacts: (n,) contacts that each step of the first run found.
         pairs: For each pair of bodies, in how many steps it touched.
         keyframe: Name of the keyframe; its time was set to zero.
+        breaks: Second runs that were made to differ, if this one was not.
+        finer: The same with half the timestep; None where the backend cannot set it.
         ways: Ways to go back through this interface, tried.
         own_ways: The engine's own ways, tried on the raw engine where that differs.
     """
@@ -58,6 +93,8 @@ class Replay:
     contacts: Ints
     pairs: dict[str, int]
     keyframe: str
+    breaks: tuple[Broken, ...]
+    finer: Finer | None
     ways: tuple[WayBack, ...]
     own_ways: tuple[WayBack, ...]
     provenance: Provenance
@@ -94,8 +131,19 @@ def run(
         goal[: len(MOVE)] += MOVE[: model.nu]
     else:
         goal = command(model, ctrl)
-    first, contacts, pairs = _once(model, goal, nstep, None, lambda part: progress(part / 2))
-    second, _, _ = _once(model, goal, nstep, break_with, lambda part: progress((1 + part) / 2))
+    shares = 2 if break_with else 7  # of the runs below, about
+
+    def part_of(number: int) -> Progress:
+        return lambda part: progress((number + part) / shares)
+
+    first, contacts, pairs = _once(model, goal, nstep, None, part_of(0))
+    second, _, _ = _once(model, goal, nstep, break_with, part_of(1))
+    broken, finer = [], None
+    if not break_with:
+        for number, way in enumerate(BREAKS):
+            other, _, _ = _once(model, goal, nstep, way, part_of(2 + number))
+            broken.append(_broken(way, first, other))
+        finer = _finer(model, goal, nstep, first, part_of)
     free = [
         int(place)
         for kind, place in zip(model.jnt_type, model.jnt_qposadr, strict=True)
@@ -118,10 +166,32 @@ def run(
         contacts=contacts,
         pairs=pairs,
         keyframe=model.keyframes[0].name,
+        breaks=tuple(broken),
+        finer=finer,
         ways=ways_back(model, goal),
         own_ways=own.ways_back(model) if own else (),
         provenance=provenance(model),
     )
+
+
+def _broken(way: str, first: Array, other: Array) -> Broken:
+    gap = np.abs(first - other).max(axis=1)
+    peak = int(np.argmax(gap))
+    close = bool(np.allclose(first[-1], other[-1]))
+    return Broken(way, close, float(gap[peak]), peak, float(gap[-1]))
+
+
+def _finer(
+    model: Model, goal: Array, nstep: int, first: Array, part_of: Callable[[int], Progress]
+) -> Finer | None:
+    """Determinism is not truth: half the timestep replays as exactly, and ends elsewhere."""
+    try:
+        finer = model.replace(timestep=model.timestep / 2)
+    except UnsupportedError:
+        return None
+    ends = [_once(finer, goal, 2 * nstep, None, part_of(4 + k))[0][-1] for k in range(2)]
+    apart = float(np.abs(ends[0] - first[-1]).max())
+    return Finer(finer.timestep, bool(np.array_equal(*ends)), apart)
 
 
 def ways_back(model: Model, ctrl: Array, steps: int = 100) -> tuple[WayBack, ...]:

@@ -21,6 +21,7 @@ from ._common import (
 )
 
 STORED = (*INPUTS, "time")
+_Looks = list[dict[str, bytes]]  # the bytes of every array, before and after each call
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,6 @@ def run(
     with make_data(model) as data, make_data(model) as other:
         ends = {}
         for call, each in ((forward, data), (step, other)):
-            _command(model, each)
             forward(model, each)
             looks = [_look(each)]
             each.qpos[place] = value
@@ -100,7 +100,8 @@ def run(
             call(model, each)
             ends[call] = [*looks, _look(each)]
     with make_data(model) as data:
-        _command(model, data)
+        if model.nu == len(TARGET):
+            data.ctrl = TARGET
         forward(model, data)
         fresh, times, lags = read_derived(data), [], []
         of_before, of_after = dict.fromkeys(fresh, 0), dict.fromkeys(fresh, 0)
@@ -135,14 +136,7 @@ def _look(data: Data) -> dict[str, bytes]:
     return {**stored, **read_derived(data)}
 
 
-def _changes(
-    name: str, forwarded: list[dict[str, bytes]], stepped: list[dict[str, bytes]]
-) -> Changes:
+def _changes(name: str, forwarded: _Looks, stepped: _Looks) -> Changes:
     start, written, computed = (look[name] for look in forwarded)
     _, before, after = (look[name] for look in stepped)
     return Changes(name, name in STORED, start != written, written != computed, before != after)
-
-
-def _command(model: Model, data: Data) -> None:
-    if model.nu == len(TARGET):
-        data.ctrl = TARGET

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import StateMachineError
 from ..interface import Data, Model
-from ..records import DERIVED, INPUTS
+from ..records import DERIVED, INPUTS, JointType
 from ..verbs import forward, get_state, make_data, reset, set_state, step
 from ._common import Provenance, provenance, read_derived, scalar_joint
 
@@ -18,7 +18,8 @@ class Write:
     """What a write does, and what it does not.
 
     Attributes:
-        joint, place, value: qpos[place] of the joint was written [rad or m].
+        joint, place, value: qpos[place] of the joint was written [rad; of a slide, m].
+        slide: Whether the joint is one.
         view, copy: What a name for the array, and a copy made before, say afterwards.
         kept: Inputs that were the same array after each of `calls`.
         calls: What was called between.
@@ -32,6 +33,7 @@ class Write:
     """
 
     joint: str
+    slide: bool
     place: int
     value: float
     view: float
@@ -86,6 +88,7 @@ def run(model: Model, joint: str = "shoulder_lift", value: float = 0.8) -> Write
         data.qpos = copy
         return Write(
             joint=joint,
+            slide=int(model.jnt_type[model.joint_id(joint)]) == int(JointType.SLIDE),
             place=place,
             value=value,
             view=said[0],

@@ -1,7 +1,9 @@
 """The lessons: what each is called, asks and takes. Importing this loads no engine.
 
-A lesson is a module with two functions: `run(model, options, progress)` computes its
-result on one backend, `page(results)` says what the results, by backend, mean.
+A lesson is a module with three functions: `code(options, load)` is what a student would
+type, `run(model, options, progress)` computes the lesson's result on one backend, and
+`page(results, session)` says what the results, by backend, mean. Terminal, documentation
+and notebook are made from the same three.
 """
 
 from __future__ import annotations
@@ -9,7 +11,11 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
+
+if TYPE_CHECKING:
+    from ..page import Page
+    from .session import Session
 
 
 @dataclass(frozen=True)
@@ -46,28 +52,48 @@ class Module(Protocol):
         """Compute the lesson's result on one backend."""
         ...
 
-    def page(self, results: Mapping[str, Any]) -> Any:
-        """Say what the results, by backend, mean."""
+    def code(self, options: Mapping[str, Any], load: str) -> str:
+        """The code as a student would type it; `load` is the call that loads the model."""
+        ...
+
+    def page(self, results: Mapping[str, Any], session: Session) -> Page:
+        """Say what the results, by backend, mean; `session` is the code and what it printed."""
         ...
 
 
-# In the order of the course.
+_JOINT = Option("--joint", "shoulder_lift", "joint to write")
+_VALUE = Option("--value", 0.8, "what to write [rad]", float)
+
+# The stations of the path, in order.
 LESSONS = {
     lesson.name: lesson
     for lesson in (
+        Lesson(
+            "objects",
+            "What never changes, and what does?",
+            "so101/scene",
+            (Option("--worlds", 10, "how many Data of one Model", int),),
+        ),
         Lesson(
             "state",
             "Which numbers are the state?",
             "so101/scene_box",
         ),
         Lesson(
+            "write",
+            "You wrote into qpos. Who noticed?",
+            "so101/scene",
+            (_JOINT, _VALUE),
+        ),
+        Lesson(
             "forward",
             "Why is a fresh arm's fingertip at the origin?",
             "so101/scene",
             (
-                Option("--joint", "shoulder_lift", "joint to write"),
-                Option("--value", 0.8, "what to write [rad]", float),
+                _JOINT,
+                _VALUE,
                 Option("--site", "gripperframe", "the fingertip"),
+                Option("--seconds", 2.0, "simulated time under a command", float),
             ),
         ),
         Lesson(
@@ -77,7 +103,6 @@ LESSONS = {
             (
                 Option("--seconds", 2.0, "simulated time", float),
                 Option("--target", None, "command, one number an actuator", float, many=True),
-                Option("--site", "gripperframe", "the fingertip"),
             ),
         ),
         Lesson(
@@ -87,7 +112,13 @@ LESSONS = {
             (
                 Option("--seconds", 4.0, "simulated time", float),
                 Option("--joint", "shoulder_lift", "joint to watch"),
+                Option("--longer", 100.0, "simulated time of the fall; 0 for none", float),
             ),
+        ),
+        Lesson(
+            "reset",
+            "Back to a known state: what is in it?",
+            "so101/scene_box",
         ),
         Lesson(
             "replay",
@@ -102,6 +133,15 @@ LESSONS = {
                     "make the second run differ",
                     choices=("extra-step", "late-ctrl"),
                 ),
+            ),
+        ),
+        Lesson(
+            "time",
+            "What time is it in a simulator?",
+            "so101/scene",
+            (
+                Option("--realtime", False, "wait for the clock", bool),
+                Option("--seconds", 4.0, "simulated time with --realtime", float),
             ),
         ),
         Lesson(

@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from ..page import Page, Table
+from ..page import Code, Page, Printed, Question, Table
+from .session import Session
 
 
 def origin(results: Mapping[str, Any]) -> str:
@@ -21,6 +22,20 @@ def origin(results: Mapping[str, Any]) -> str:
 def page_of(title: str, results: Mapping[str, Any], blocks: Sequence[Any]) -> Page:
     """A page with its origin."""
     return Page(title, origin(results), list(blocks))
+
+
+def typed(session: Session, question: Question | None = None) -> list[Code | Question | Printed]:
+    """The code of a lesson, a prediction, and what it printed."""
+    code = Code(session.code.splitlines())
+    return [code, *([question] if question else []), Printed(session.printed)]
+
+
+def duration(seconds: float) -> str:
+    """A wall time in the unit that reads best."""
+    for factor, unit in ((1e6, "µs"), (1e3, "ms")):
+        if seconds * factor < 1000:
+            return f"{seconds * factor:.3g} {unit}"
+    return f"{seconds:.3g} s"
 
 
 def differences(

@@ -1,4 +1,4 @@
-"""Writing into the state writes into the simulator: immediately, and not at all."""
+"""Stored, derived, integrated: what forward and step recompute, and of which moment it is."""
 
 from __future__ import annotations
 
@@ -6,33 +6,66 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+
 from ..experiments import forward
-from ..page import Code, Page, Table, Text, Verdict
-from ._words import differences, millimetres, page_of, vector, where
+from ..page import Page, Pipeline, Question, Table, Text, Traces, Verdict
+from ._words import count, differences, millimetres, page_of, typed, vector, where
+from .session import Session
+
+_MOMENTS = ("xpos", "site_xpos", "contacts", "qacc")  # shown of what a step leaves behind
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> forward.Forward:
     """Four readings."""
-    return forward.run(model, joint=options["joint"], value=options["value"], site=options["site"])
+    return forward.run(
+        model,
+        joint=options["joint"],
+        value=options["value"],
+        site=options["site"],
+        seconds=options["seconds"],
+        progress=progress,
+    )
 
 
-def page(results: Mapping[str, forward.Forward]) -> Page:
-    """The readings, which are equal, and that no time passed."""
+def code(options: Mapping[str, Any], load: str) -> str:
+    """The four readings."""
+    return f"""\
+import statemachine as sm
+
+model = {load}
+tip = model.site_id({options["site"]!r})
+slot = model.jnt_qposadr[model.joint_id({options["joint"]!r})]
+data = sm.make_data(model)
+print(1, data.site_xpos[tip].round(4))
+sm.forward(model, data)
+print(2, data.site_xpos[tip].round(4))
+data.qpos[slot] = {options["value"]:g}
+print(3, data.site_xpos[tip].round(4))
+sm.forward(model, data)
+print(4, data.site_xpos[tip].round(4))
+"""
+
+
+def page(results: Mapping[str, forward.Forward], session: Session) -> Page:
+    """The readings, which are equal, what each call changes, and of which moment it is."""
     first = next(iter(results.values()))
-    write = first.readings[2].after
     blocks: list[Any] = [
         Text(
-            "qpos is an input; the fingertip is derived from it. Nothing derived is computed "
-            "until you ask: a write to qpos marks nothing as out of date, and what you read "
-            "keeps saying what it said before. forward recomputes all of it, and takes no time."
+            "qpos, qvel, ctrl and time are stored. Where the fingertip is, what touches what, "
+            "which forces act: that is derived from them. Nothing derived is computed until you "
+            "ask: a write to qpos marks nothing as out of date, and what you read keeps saying "
+            "what it said before. forward recomputes all of it, and takes no time. step does "
+            "the same, and then integrates: it makes the next qpos and qvel."
         ),
-        Code(
-            (
-                "data = sm.make_data(model)   # 1",
-                "sm.forward(model, data)      # 2",
-                f"data.{write:<24}# 3",
-                "sm.forward(model, data)      # 4",
-            )
+        *typed(
+            session,
+            Question(
+                f"two of the four readings of {first.stages.site} are equal. Which?",
+                ("1 and 2", "2 and 3", "3 and 4", "2 and 4"),
+                _CHOICES.get(first.equal),
+                "The write changed qpos at once, and nothing that is derived from it.",
+            ),
         ),
     ]
     twins = {index for result in results.values() for pair in result.equal for index in pair}
@@ -77,9 +110,117 @@ def page(results: Mapping[str, forward.Forward]) -> Page:
         blocks.append(
             Verdict(f"{where(results, name)}data.time is the same in all four readings", unmoved)
         )
+    blocks += _what_changes(results)
+    blocks += _moments(results)
     rows = [(f"fingertip, reading {i + 1}", _apart(i)) for i in range(len(first.readings))]
     blocks += differences(results, rows)
-    return page_of("The arm that is nowhere", results, blocks)
+    return page_of("Stored, derived, integrated", results, blocks)
+
+
+_CHOICES = {((0, 1),): 0, ((1, 2),): 1, ((2, 3),): 2, ((1, 3),): 3}
+
+
+def _what_changes(results: Mapping[str, forward.Forward]) -> list[Any]:
+    """Arrays whose bytes a write, forward and step changed, in groups that behave alike."""
+    blocks: list[Any] = []
+    first = next(iter(results.values())).stages
+    alike = {result.stages.changes: [] for result in results.values()}
+    for name, result in results.items():
+        alike[result.stages.changes].append(name)
+    for changes, names in alike.items():
+        groups: dict[tuple[bool, ...], list[str]] = {}
+        for each in changes:
+            key = (each.stored, each.write, each.forward, each.step)
+            groups.setdefault(key, []).append(each.name)
+        prefix = f"{', '.join(names)}: " if len(results) > 1 else ""
+        blocks.append(
+            Table(
+                ("", "a write", "forward", "step"),
+                [
+                    (_list(members, stored), *("changes" if flag else "–" for flag in flags))
+                    for (stored, *flags), members in groups.items()
+                ],
+                title=f"{prefix}Whose bytes change, after a write to qpos[…] and then one call",
+                words=frozenset({0, 1, 2, 3}),
+            )
+        )
+    stored = [each.name for each in first.changes if each.stored]
+    derived = [each.name for each in first.changes if not each.stored and each.forward]
+    moved = [each.name for each in first.changes if each.stored and each.step]
+    blocks.append(
+        Pipeline(
+            "What forward and step cover, as found by comparing bytes",
+            (("stored", stored), ("derived", derived), ("integrated", moved)),
+            (("forward", 0, 1), ("step", 0, 2)),
+        )
+    )
+    return blocks
+
+
+def _list(names: list[str], stored: bool) -> str:
+    kind = "stored" if stored else "derived"
+    lines = [f"{kind}: "]
+    for name in names:
+        if len(lines[-1]) + len(name) > _COLUMN:
+            lines.append("  ")
+        lines[-1] += name + ("" if name == names[-1] else ", ")
+    return "\n".join(line.rstrip() for line in lines)
+
+
+_COLUMN = 44
+
+
+def _moments(results: Mapping[str, forward.Forward]) -> list[Any]:
+    """To which moment belongs what a step leaves behind."""
+    first = next(iter(results.values())).stages
+    steps = len(first.lag)
+    blocks: list[Any] = [
+        Text(
+            "And after a step, of which moment is what you read? step computes first and moves "
+            f"afterwards. A command moves the arm for {count(steps, 'step')}; after each, what "
+            "the step left is compared with what forward says before and after it, bit by bit."
+        ),
+        Table(
+            ("after a step", *(f"{name}: of {m}" for name in results for m in ("before", "after"))),
+            [
+                (
+                    name,
+                    *(
+                        str(table.get(name, "–"))
+                        for result in results.values()
+                        for table in (result.stages.of_before, result.stages.of_after)
+                    ),
+                )
+                for name in _MOMENTS
+            ],
+            title=f"In how many of {count(steps, 'step')} it is that of the state before, or after",
+        ),
+    ]
+    for name, result in results.items():
+        stages = result.stages
+        worst = int(np.argmax(stages.lag))
+        blocks.append(
+            Verdict(
+                f"{where(results, name)}after each step site_xpos and contacts are those of the "
+                f"state before it: the fingertip is {millimetres(stages.lag[worst])} behind at "
+                f"worst (in the step from {stages.time[worst]:.3f} s). A picture in which step "
+                "delivers the next state's xpos and contacts is wrong: call forward before you "
+                "read",
+                all(stages.of_before[each] == steps for each in ("site_xpos", "contacts")),
+            )
+        )
+    blocks.append(
+        Traces(
+            "How far site_xpos is behind after each step",
+            "time [s]",
+            "distance [mm]",
+            {
+                name: (result.stages.time.tolist(), (result.stages.lag * 1e3).tolist())
+                for name, result in results.items()
+            },
+        )
+    )
+    return blocks
 
 
 def _apart(reading: int) -> Callable[[Any, Any], str]:

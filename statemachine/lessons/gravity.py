@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..experiments import gravity
-from ..page import Code, Page, Table, Text, Verdict
-from ._words import angle_or_length, differences, page_of, position, signed, where
+from ..page import Page, Question, Table, Text, Traces, Verdict
+from ._words import angle_or_length, differences, page_of, position, signed, typed, where
+from .session import Session
 
 _PARTS = (
     ("gravity (−bias)", "bias"),
@@ -22,15 +23,40 @@ _PARTS = (
 )
 _BALANCE = 1e-3  # N·m or N; a sum below it is zero
 _SLOW = 0.01  # rad/s or m/s; a joint below it is at rest or creeps
+_CREEP = 0.05  # of the way; a joint that goes on by more has not settled
 _STARTS = 0.02  # rad/s² or m/s²; a joint beyond it is about to move
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> gravity.Gravity:
     """Servos on, servos off."""
-    return gravity.run(model, seconds=options["seconds"], joint=options["joint"], progress=progress)
+    return gravity.run(
+        model,
+        seconds=options["seconds"],
+        joint=options["joint"],
+        longer=options["longer"],
+        progress=progress,
+    )
 
 
-def page(results: Mapping[str, gravity.Gravity]) -> Page:
+def code(options: Mapping[str, Any], load: str) -> str:
+    """The same seconds with the servos on and off; ctrl is never written."""
+    return f"""\
+import numpy as np
+import statemachine as sm
+
+model = {load}
+limp = model.replace(actuation=False)  # another Model: servos off
+slot = model.jnt_qposadr[model.joint_id({options["joint"]!r})]
+for each in (model, limp):
+    data = sm.make_data(each)
+    for second in range(4):
+        sm.step(each, data, round(1 / each.timestep))
+        print(np.degrees(data.qpos[slot]).round(3), end="  ")
+    print()
+"""
+
+
+def page(results: Mapping[str, gravity.Gravity], session: Session) -> Page:
     """The table of the course, and the balance of forces at its end."""
     first = next(iter(results.values()))
     columns = {
@@ -41,7 +67,6 @@ def page(results: Mapping[str, gravity.Gravity]) -> Page:
     headers = [name.replace(": ", "\n") for name in columns]
     digits = {name: 3 if name.endswith("on") else 2 for name in columns}
     end = float(first.servos_on.time[-1])
-    steps = f"{round(end / first.provenance.timestep)})"
     parts = [
         (label, part)
         for label, part in _PARTS
@@ -49,13 +74,7 @@ def page(results: Mapping[str, gravity.Gravity]) -> Page:
     ]
     blocks: list[Any] = [
         Text(_introduction(first)),
-        Code(
-            (
-                f"sm.step(model, data, {steps:<6}             # ctrl was never written",
-                "limp = model.replace(actuation=False)    # another Model: servos off",
-                "sm.forward(model, data)                  # then read data.qfrc_bias, …",
-            )
-        ),
+        *typed(session, _question(first)),
         Table(
             ("time", *headers),
             [
@@ -88,6 +107,7 @@ def page(results: Mapping[str, gravity.Gravity]) -> Page:
         if run.touching:
             touches = (f"{touch} (since {run.touches[touch]:.3f} s)" for touch in run.touching)
             blocks.append(Text(f"{name}: touching at the end: {', '.join(touches)}."))
+    blocks += _longer(results)
     for name, result in results.items():
         if result.alone:
             blocks += _alone(name, result)
@@ -100,6 +120,95 @@ def page(results: Mapping[str, gravity.Gravity]) -> Page:
         ],
     )
     return page_of("You never wrote ctrl", results, blocks)
+
+
+def _question(first: gravity.Gravity) -> Question | None:
+    if first.slide or not first.servo:
+        return None
+    droop = abs(float(first.servos_on.position[-1]))
+    return Question(
+        f"nobody writes ctrl. Where is {first.joint} after {first.servos_on.time[-1]:g} s "
+        "with the servos on?",
+        ("it has fallen", "it has sagged by less than a degree", "at 0, exactly"),
+        0 if droop >= np.radians(1) else 2 if droop == 0 else 1,
+        "ctrl is zero, and zero is a target: the servo holds the joint there, with the small "
+        "error that it needs to push.",
+    )
+
+
+def _longer(results: Mapping[str, gravity.Gravity]) -> list[Any]:
+    """What catches the falling joint: with and without a floor, and for longer."""
+    columns = {
+        f"{where(results, name)}{label}": run
+        for name, result in results.items()
+        for label, run in result.longer.items()
+    }
+    if not columns:
+        return []
+    first = next(iter(results.values()))
+    times = next(iter(columns.values())).time
+    blocks: list[Any] = [
+        Text(
+            "What caught it? Here are two longer runs with the servos off: one as before, and "
+            "one in which nothing can touch anything."
+        ),
+        Table(
+            ("time", *(name.replace(": ", "\n") for name in columns)),
+            [
+                (
+                    f"{time:.2f} s",
+                    *(position(run.position[k], first.slide) for run in columns.values()),
+                )
+                for k, time in enumerate(times)
+            ],
+            title=f"{first.joint}, servos off, for longer",
+        ),
+    ]
+    for name, result in results.items():
+        prefix = where(results, name)
+        floor, free = result.longer.get("floor"), result.longer.get("no floor")
+        if floor is not None and free is not None and result.servos_off.touching:
+            blocks.append(_caught(prefix, result, floor, free))
+    blocks.append(
+        Traces(
+            f"{first.joint} with the servos off",
+            "time [s]",
+            "m" if first.slide else "angle [°]",
+            {
+                name: (
+                    (np.arange(len(run.path)) * first.provenance.timestep)[::20].tolist(),
+                    (run.path if first.slide else np.degrees(run.path))[::20].tolist(),
+                )
+                for name, run in columns.items()
+            },
+        )
+    )
+    return blocks
+
+
+def _caught(
+    prefix: str, result: gravity.Gravity, floor: gravity.Droop, free: gravity.Droop
+) -> Text | Verdict:
+    """Whether it is the contact that catches the joint, and whether it comes to rest."""
+    slide, end = result.slide, float(floor.time[-1])
+    short = float(result.servos_off.time[-1])
+    then = float(result.servos_off.position[-1])
+    gap = abs(float(free.position[-1]) - then)
+    text = (
+        f"{prefix}it is the contact that catches {result.joint}, not damping or friction: without "
+        f"contacts it runs on to {position(free.position[-1], slide)}"
+    )
+    if abs(free.forces.limit or 0.0) > _BALANCE:
+        text += f", where its limit stops it with {abs(free.forces.limit or 0):.4f} {_unit(result)}"
+    drift = float(floor.position[-1]) - then
+    if abs(drift) > abs(then) * _CREEP:
+        text += (
+            f". And it does not settle on what caught it: from {short:g} s to {end:g} s it creeps "
+            f"on, from {position(then, slide)} to {position(floor.position[-1], slide)}"
+        )
+    if gap < abs(then) * _CREEP:
+        return Text(f"{prefix}without contacts {result.joint} ends nearly where it ends with them.")
+    return Verdict(text, True)
 
 
 def _worst(

@@ -1,4 +1,4 @@
-"""Six numbers in: a command, the way there, and the age of what a step leaves behind."""
+"""Six numbers in: a command, the way there, and what is in the way."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from ..experiments import hold
-from ..page import Code, Page, Table, Text, Verdict
+from ..experiments._common import TARGET
+from ..page import Page, Question, Table, Text, Traces
 from ..records import Array
-from ._words import angle_or_length, differences, millimetres, page_of, position, vector, where
+from ._words import angle_or_length, differences, page_of, position, typed, vector, where
+from .session import Session
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
-_SAME = 1e-12  # metres
 _STILL = 1e-6  # rad/s or m/s
 
 
@@ -23,13 +24,27 @@ def run(model: Any, options: Mapping[str, Any], progress: Any) -> hold.Hold:
         model,
         target=options["target"],
         seconds=options["seconds"],
-        site=options["site"],
         progress=progress,
     )
 
 
-def page(results: Mapping[str, hold.Hold]) -> Page:
-    """Error over time, pose at the end, fingertip lag."""
+def code(options: Mapping[str, Any], load: str) -> str:
+    """One command, and where the arm is then."""
+    target = [float(x) for x in options["target"] or TARGET]
+    return f"""\
+import statemachine as sm
+
+model = {load}
+data = sm.make_data(model)
+data.ctrl[:] = {target}
+for _ in range(4):
+    sm.step(model, data, 20)
+    print(round(data.time, 3), data.qpos.round(3))
+"""
+
+
+def page(results: Mapping[str, hold.Hold], session: Session) -> Page:
+    """Error over time, pose at the end, what is in the way."""
     first = next(iter(results.values()))
     end = float(first.time[-1])
     times = [t for t in _TIMES if t < end] + [end]
@@ -37,11 +52,12 @@ def page(results: Mapping[str, hold.Hold]) -> Page:
     if first.servo:
         text += (
             " Each is a position servo: it pushes with kp·(ctrl − q) − kv·q̇, within its force "
-            "limit, and the arm follows."
+            "limit, and the arm follows. Whatever you build, a script, a teleoperation, a "
+            "trained policy, it ends at this assignment."
         )
     blocks: list[Any] = [
         Text(text),
-        Code((f"data.ctrl[:] = {[float(x) for x in first.target]}", "sm.step(model, data)")),
+        *typed(session, _question(first)),
     ]
     for k in np.flatnonzero(first.goal != first.target).tolist():
         blocks.append(
@@ -71,16 +87,7 @@ def page(results: Mapping[str, hold.Hold]) -> Page:
     ]
     for name, result in results.items():
         blocks.append(Text(f"{where(results, name)}{_end(result)}"))
-        worst = int(np.argmax(result.lag))
-        blocks.append(
-            Verdict(
-                f"{where(results, name)}after each step site_xpos is the fingertip before that "
-                f"step: {millimetres(result.lag[worst])} behind at worst (at "
-                f"{result.time[worst + 1]:.3f} s), {millimetres(result.lag[-1], 4)} at the end. "
-                "step computes poses first and moves afterwards; call forward before you read",
-                result.previous <= _SAME,
-            )
-        )
+    blocks.append(_traces(results))
     blocks += differences(
         results,
         [
@@ -91,6 +98,34 @@ def page(results: Mapping[str, hold.Hold]) -> Page:
         ],
     )
     return page_of(f"Hold {vector(first.target, 1)}", results, blocks)
+
+
+def _question(first: hold.Hold) -> Question:
+    worst = float(first.error[-1])
+    bounds = (1e-6, 0.02, 0.2)
+    right = next((k for k, bound in enumerate(bounds) if worst < bound), len(bounds))
+    unit = "mm" if all(first.slides) else "degree"
+    return Question(
+        f"how far from its goal is the worst joint after {first.time[-1]:g} s?",
+        (
+            "it is there",
+            f"about a {unit} or less",
+            "some, visibly",
+            "it fell",
+        ),
+        right,
+        f"It is {_at(first, worst, int(np.argmax(np.abs(first.qpos[-1] - first.goal))))} away: a "
+        "servo pushes only where there is an error, and here something else pushes too.",
+    )
+
+
+def _traces(results: Mapping[str, hold.Hold]) -> Traces:
+    curves = {}
+    for name, result in results.items():
+        for k, joint in enumerate(result.joints):
+            gap = np.degrees(result.qpos[:, k] - result.goal[k])
+            curves[f"{where(results, name)}{joint}"] = (result.time.tolist(), gap.tolist())
+    return Traces("The way to the goal", "time [s]", "distance to the goal [°]", curves)
 
 
 def _gap(one: hold.Hold, gaps: Array, time: float | None = None) -> str:
@@ -132,8 +167,8 @@ def _end(result: hold.Hold) -> str:
     if result.first_contact is None:
         return text + " The robot touched nothing."
     text += (
-        f" The robot touches something in {result.contact_steps} of {len(result.lag)} steps, first "
-        f"at {result.first_contact:.3f} s: {', '.join(result.touched)}; at the end: "
+        f" The robot touches something in {result.contact_steps} of {len(result.time) - 1} steps, "
+        f"first at {result.first_contact:.3f} s: {', '.join(result.touched)}; at the end: "
         f"{', '.join(result.touching) or 'nothing'}"
     )
     if result.without_contacts is not None:

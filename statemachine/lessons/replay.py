@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from ..experiments import replay
-from ..page import Code, Page, Table, Text, Verdict
-from ._words import count, degrees, differences, millimetres, page_of, vector, where
+from ..page import Page, Question, Table, Text, Traces, Verdict
+from ._words import count, degrees, differences, millimetres, page_of, typed, vector, where
+from .session import Session
 
 _STEPS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 300, 600, 1000, 2000, 5000, 10_000, 20_000)
+_SHORT = {"extra-step": "one step more", "late-ctrl": "ctrl one step late"}
 _BROKEN = {
     "extra-step": "The second run takes one step more before the count begins.",
     "late-ctrl": "The second run writes its command one step later.",
@@ -29,7 +31,44 @@ def run(model: Any, options: Mapping[str, Any], progress: Any) -> replay.Replay:
     )
 
 
-def page(results: Mapping[str, replay.Replay]) -> Page:
+def code(options: Mapping[str, Any], load: str) -> str:
+    """Two runs from the keyframe, compared."""
+    write = "data.ctrl[:2] += (0.4, -0.2)  # pan and lift"
+    if options["ctrl"]:
+        write = f"data.ctrl[:] = {[float(x) for x in options['ctrl']]}"
+    steps = options["steps"]
+    body = {
+        None: [write, f"sm.step(model, data, {steps})"],
+        "extra-step": [write, f"sm.step(model, data, {steps} + broken)"],
+        "late-ctrl": [
+            "if broken:",
+            "    sm.step(model, data)  # the command comes one step late",
+            write,
+            f"sm.step(model, data, {steps} - broken)",
+        ],
+    }[options["break"]]
+    lines = "\n".join(f"    {line}" for line in body)
+    argument, second = ("", "") if options["break"] is None else ("broken", "True")
+    first = "False" if second else ""
+    return f"""\
+import numpy as np
+import statemachine as sm
+
+model = {load}
+
+def run({argument}):
+    data = sm.make_data(model)
+    sm.reset(model, data, keyframe=0)
+    data.time = 0
+{lines}
+    return data.qpos.copy()
+
+one, two = run({first}), run({second})
+print(np.array_equal(one, two), abs(one - two).max())
+"""
+
+
+def page(results: Mapping[str, replay.Replay], session: Session) -> Page:
     """Equal or not, and what touched on the way."""
     first = next(iter(results.values()))
     nstep = len(first.contacts)
@@ -40,7 +79,7 @@ def page(results: Mapping[str, replay.Replay]) -> Page:
             "np.array_equal on all of qpos: every bit, not nearly. Differences are the largest "
             "over all numbers of qpos: radians, metres and parts of a quaternion."
         ),
-        Code((f"data.ctrl[:] = {[round(float(x), 6) for x in first.ctrl]}",)),
+        *typed(session, _question(first)),
     ]
     if first.broken_by:
         blocks.append(Text(_BROKEN[first.broken_by]))
@@ -48,13 +87,16 @@ def page(results: Mapping[str, replay.Replay]) -> Page:
     blocks.append(_contacts(results))
     if first.broken_by:
         blocks.append(_growth(results, nstep))
+        blocks.append(_traces(results))
     for name, result in results.items():
         blocks.append(_finding(where(results, name), result))
     if not first.broken_by:
         blocks.append(_ways(results))
         for name, result in results.items():
             blocks += _own_ways(name, result)
-        blocks.append(Text("Break it on purpose: --break extra-step, or --break late-ctrl."))
+        blocks += _broken(results)
+        for name, result in results.items():
+            blocks += _truth(where(results, name), result)
     blocks += differences(
         results,
         [
@@ -64,6 +106,86 @@ def page(results: Mapping[str, replay.Replay]) -> Page:
         ],
     )
     return page_of("The same start, the same commands", results, blocks)
+
+
+def _question(first: replay.Replay) -> Question:
+    if first.broken_by:
+        return Question(
+            "one step differs. What becomes of the difference by the end?",
+            ("it grows and grows", "it shrinks again", "it stays as large as its peak"),
+            _course(first.difference),
+            f"It peaks at {first.difference.max():.1e} and ends at {first.difference[-1]:.1e}.",
+        )
+    return Question(
+        f"how large is the largest difference after {count(len(first.contacts), 'step')}?",
+        ("0.0, to the last bit", "about 1e-16, rounding", "it depends on the contacts"),
+        0 if first.identical else None,
+        "The same state and the same commands give the same next state, bit by bit.",
+    )
+
+
+def _course(difference: Any) -> int:
+    """Number of the choice: grown to the end, shrunk, or stayed near its peak."""
+    peak, end = float(difference.max()), float(difference[-1])
+    if end < peak / 3:
+        return 1
+    return 0 if int(np.argmax(difference)) == len(difference) - 1 else 2
+
+
+def _broken(results: Mapping[str, replay.Replay]) -> list[Any]:
+    """Second runs that were made to differ, in short."""
+    rows = []
+    for name, result in results.items():
+        for each in result.breaks:
+            rows.append(
+                (
+                    f"{where(results, name)}{_SHORT[each.way]}",
+                    f"{each.peak:.1e}, step {each.peak_step}",
+                    f"{each.end:.1e}",
+                    "equal" if each.close else "not equal",
+                    "not equal" if each.end else "equal",
+                )
+            )
+    if not rows:
+        return []
+    return [
+        Table(
+            ("broken on purpose", "largest", "at the end", "allclose", "array_equal"),
+            rows,
+            title="And if the second run is made to differ by one step",
+        ),
+        Text(
+            "A comparison that forgives small differences may miss such a bug; np.array_equal "
+            "does not. How the difference comes and goes: --break extra-step, --break late-ctrl."
+        ),
+    ]
+
+
+def _truth(prefix: str, result: replay.Replay) -> list[Any]:
+    """Determinism is not truth."""
+    finer = result.finer
+    if finer is None or not finer.identical or finer.difference == 0:
+        return []
+    return [
+        Verdict(
+            f"{prefix}reproducible is not right: with half the timestep, {finer.timestep * 1e3:g} "
+            "ms, two runs are bit for bit the same too, and end somewhere else, off by "
+            f"{finer.difference:.1e}",
+            True,
+        )
+    ]
+
+
+def _traces(results: Mapping[str, replay.Replay]) -> Traces:
+    return Traces(
+        "How far the two runs are apart",
+        "step",
+        "largest |Δqpos|",
+        {
+            name: (list(range(len(r.difference))), r.difference.tolist())
+            for name, r in results.items()
+        },
+    )
 
 
 def _ways(results: Mapping[str, replay.Replay]) -> Table:

@@ -5,10 +5,26 @@ from __future__ import annotations
 import contextlib
 import io
 import linecache
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 from ..errors import StateMachineError
 
 _NAME = "<lesson>"
+
+
+@dataclass(frozen=True)
+class Session:
+    """Code as one types it, for the first of the engines, and what it printed on each."""
+
+    code: str
+    printed: Mapping[str, str]
+
+
+def load_line(model: str, backend: str, menagerie: str | None = None) -> str:
+    """The call that loads a model, as one types it."""
+    folder = f", menagerie={menagerie!r}" if menagerie else ""
+    return f"sm.load({_quoted(model)}, backend={_quoted(backend)}{folder})"
 
 
 def play(code: str) -> str:
@@ -24,3 +40,7 @@ def play(code: str) -> str:
         except StateMachineError as error:
             print(f"{type(error).__name__}: {error}")
     return out.getvalue()
+
+
+def _quoted(text: str) -> str:
+    return f'"{text}"' if '"' not in text and "\\" not in text else repr(text)

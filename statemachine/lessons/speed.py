@@ -1,4 +1,4 @@
-"""Time is just another number in the state; the rest is what your machine buys."""
+"""The speed budget: how much simulated time does this machine buy?"""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..experiments import speed
-from ..page import Page, Table, Text
-from ._words import count, differences, page_of
+from ..page import Page, Question, Table, Text
+from ._words import count, differences, page_of, typed
+from .session import Session
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> speed.Speed:
@@ -15,7 +16,22 @@ def run(model: Any, options: Mapping[str, Any], progress: Any) -> speed.Speed:
     return speed.run(model, steps=options["steps"], progress=progress)
 
 
-def page(results: Mapping[str, speed.Speed]) -> Page:
+def code(options: Mapping[str, Any], load: str) -> str:
+    """Steps by the clock."""
+    return f"""\
+import time
+import statemachine as sm
+
+model = {load}
+data = sm.make_data(model)
+began = time.perf_counter()
+sm.step(model, data, 2000)
+wall = time.perf_counter() - began
+print(round(data.time / wall), "times real time")
+"""
+
+
+def page(results: Mapping[str, speed.Speed], session: Session) -> Page:
     """Times and factors; they are this machine's, now."""
     first = next(iter(results.values()))
     emulated: list[Text] = []
@@ -40,12 +56,12 @@ def page(results: Mapping[str, speed.Speed]) -> Page:
         results,
         [
             Text(
-                f"{count(first.nstep, 'step')} of {first.provenance.timestep:g} s. Nothing in the "
-                "simulator reads a clock, and nothing waits: data.time grows because step adds "
-                "the timestep to it. If a person is to watch, the waiting belongs in your loop. "
-                "In bulk: one call for many steps. Step by step: a Python loop of single calls, as "
-                "a controller needs it."
+                f"{count(first.nstep, 'step')} of {first.provenance.timestep:g} s, as fast as they "
+                "come. In bulk: one call for many steps. Step by step: a Python loop of single "
+                "calls, as a controller needs it. The ratio of simulated to real time is the "
+                "budget that every experiment of yours is drawn against."
             ),
+            *typed(session, _question(first)),
             Table(("", *results), rows, title="Wall time, and × real time, on this machine, now"),
             *emulated,
             *differences(
@@ -59,6 +75,17 @@ def page(results: Mapping[str, speed.Speed]) -> Page:
                 ],
             ),
         ],
+    )
+
+
+def _question(first: speed.Speed) -> Question:
+    bounds = (2, 20, 200)
+    factor = first.bulk_factor
+    return Question(
+        "how many seconds of simulation does one second of this machine buy?",
+        ("about one", "two to twenty", "twenty to two hundred", "more"),
+        next((k for k, bound in enumerate(bounds) if factor < bound), len(bounds)),
+        f"{factor:.0f} in bulk, here and now; another machine has another figure.",
     )
 
 

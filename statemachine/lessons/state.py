@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..experiments import state
-from ..page import Code, Page, Table, Text
-from ._words import differences, page_of
+from ..page import Page, Question, Slots, Table, Text
+from ._words import differences, page_of, typed
+from .session import Session
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> state.Layout:
@@ -15,7 +16,20 @@ def run(model: Any, options: Mapping[str, Any], progress: Any) -> state.Layout:
     return state.run(model)
 
 
-def page(results: Mapping[str, state.Layout]) -> Page:
+def code(options: Mapping[str, Any], load: str) -> str:
+    """Sizes, and the slots of each joint."""
+    return f"""\
+import statemachine as sm
+
+model = {load}
+print(model.nq, model.nv, model.nu)
+for name in model.joint_names:
+    j = model.joint_id(name)
+    print(model.jnt_qposadr[j], model.jnt_dofadr[j], name)
+"""
+
+
+def page(results: Mapping[str, state.Layout], session: Session) -> Page:
     """Sizes, slots, the keyframe's time."""
     first = next(iter(results.values()))
     blocks: list[Any] = [
@@ -24,8 +38,10 @@ def page(results: Mapping[str, state.Layout]) -> Page:
             "joint is, qvel how fast it moves. A hinge takes one number in each. A free body "
             "takes seven in qpos (three of position, four of a quaternion) and six in qvel "
             "(three linear, three angular), because four numbers of a quaternion describe "
-            "only three ways to turn."
+            "only three ways to turn. jnt_qposadr says where in qpos a joint begins, jnt_dofadr "
+            "where in qvel."
         ),
+        *typed(session, _question(first)),
         Table(
             ("", "nq", "nv", "nu", "nbody"),
             [
@@ -52,17 +68,15 @@ def page(results: Mapping[str, state.Layout]) -> Page:
                 words=frozenset({0, 1}),
             )
         )
-    last = first.joints[-1] if first.joints else None
-    if last is not None:
-        blocks.append(
-            Code(
-                (
-                    f"j = model.joint_id({last.name!r})",
-                    _line("qpos", "q", last.qpos_stop - last.qpos_start),
-                    _line("qvel", "dof", last.qvel_stop - last.qvel_start),
-                )
-            )
+    blocks.append(
+        Slots(
+            "Who owns which slots",
+            {
+                "qpos": [(j.name, j.qpos_start, j.qpos_stop) for j in first.joints],
+                "qvel": [(j.name, j.qvel_start, j.qvel_stop) for j in first.joints],
+            },
         )
+    )
     apart = [
         joint.name or "(no name)"
         for joint in first.joints
@@ -72,7 +86,8 @@ def page(results: Mapping[str, state.Layout]) -> Page:
         blocks.append(
             Text(
                 f"qpos has {first.nq} numbers and qvel {first.nv}. Of {', '.join(apart)} the slots "
-                "differ: take them from jnt_qposadr and jnt_dofadr, never by arithmetic."
+                "differ. Whatever stands behind such a joint is shifted: take addresses from "
+                "jnt_qposadr and jnt_dofadr, never by arithmetic."
             )
         )
     else:
@@ -121,10 +136,15 @@ def _layouts(one: state.Layout, two: state.Layout) -> str:
     return "none" if sizes[0] == sizes[1] else "they differ: see above"
 
 
-def _line(array: str, kind: str, size: int) -> str:
-    address = f"model.jnt_{'qpos' if kind == 'q' else 'dof'}adr[j]"
-    slots = address if size == 1 else f"{address} : {address} + {size}"
-    return f"data.{array}[{slots}]"
+def _question(first: state.Layout) -> Question:
+    return Question(
+        f"qpos has nq = {first.nq} numbers. How many has qvel?",
+        (f"{first.nq}: one velocity for each position", f"{first.nv}", f"{first.nu}, as ctrl has"),
+        {first.nq: 0}.get(first.nv, 1),
+        f"nv = {first.nv}: a free body has seven positions and six velocities."
+        if first.nv != first.nq
+        else "Here no joint has more positions than velocities; a free body would.",
+    )
 
 
 def _slots(start: int, stop: int) -> str:

@@ -95,12 +95,7 @@ def _print(console: Console, blocks: Sequence[Block], heading: Page | None, foot
                 for line in lines:
                     console.print(f"    [cyan]{escape(line)}[/]", soft_wrap=True)
             case Printed(by_engine):
-                for names, text in together(by_engine):
-                    console.print()
-                    verb = "prints" if len(names) == 1 else "print"
-                    console.print(f"[dim]{escape(', '.join(names))} {verb}[/]")
-                    for line in text.splitlines() or ["(nothing)"]:
-                        console.print(f"    {escape(line)}", soft_wrap=True)
+                _print_outputs(console, by_engine, escape)
             case Table():
                 console.print()
                 if block.title:
@@ -110,11 +105,20 @@ def _print(console: Console, blocks: Sequence[Block], heading: Page | None, foot
                 console.print()
                 mark = f"[green]{good}[/]" if holds else f"[red]{bad}[/]"
                 console.print(_hanging(mark, escape(text)))
-            case _:  # a picture
-                pass
     if footer:
         console.print()
         console.print(f"[dim]{escape(footer)}[/]\n")
+
+
+def _print_outputs(
+    console: Console, by_engine: Mapping[str, str], escape: Callable[[str], str]
+) -> None:
+    for names, text in together(by_engine):
+        console.print()
+        verb = "prints" if len(names) == 1 else "print"
+        console.print(f"[dim]{escape(', '.join(names))} {verb}[/]")
+        for line in text.splitlines() or ["(nothing)"]:
+            console.print(f"    {escape(line)}", soft_wrap=True)
 
 
 def together(by_engine: Mapping[str, str]) -> list[tuple[list[str], str]]:

@@ -1,0 +1,101 @@
+"""Two objects and one function: a Model that never changes, a Data that does, and step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..experiments import objects
+from ..page import Page, Question, Table, Text, Verdict
+from ._words import count, differences, duration, page_of, typed, where
+from .session import Session
+
+
+def run(model: Any, options: Mapping[str, Any], progress: Any) -> objects.Objects:
+    """Costs, and several Data of one Model."""
+    return objects.run(model, worlds=options["worlds"], progress=progress)
+
+
+def code(options: Mapping[str, Any], load: str) -> str:
+    """Two Data of one Model, of which one is stepped."""
+    return f"""\
+import statemachine as sm
+
+model = {load}
+one = sm.make_data(model)
+two = sm.make_data(model)
+sm.step(model, one, 100)
+print(model)
+print(one.time, two.time)
+"""
+
+
+def page(results: Mapping[str, objects.Objects], session: Session) -> Page:
+    """What costs, what is shared, what goes its own way."""
+    first = next(iter(results.values()))
+    stepped = first.provenance.timestep * 100
+    blocks: list[Any] = [
+        Text(
+            "A Model is everything that never changes while a simulation runs: shapes, masses, "
+            "limits, gains, the length of a timestep. A Data is everything that does change: "
+            "positions, velocities, your command, the time, and what follows from them. step "
+            "reads both and overwrites the Data with the next state. That is all; nothing runs "
+            "in the background."
+        ),
+        *typed(
+            session,
+            Question(
+                "only `one` was stepped. What is two.time?",
+                (f"{stepped:g} s, like one.time", "0 s", "an error: a Model has one Data"),
+                1 if first.alone else 0,
+                f"Each of {first.worlds} Data, stepped in turn, ended where it ends alone.",
+            ),
+        ),
+        Table(
+            ("", *results),
+            [
+                ("load: the file, once", *(duration(r.loading) for r in results.values())),
+                ("make_data: memory", *(duration(r.making) for r in results.values())),
+                ("step: one timestep", *(duration(r.stepping) for r in results.values())),
+                ("a load costs as much as", *(_steps(r) for r in results.values())),
+            ],
+            title="What each costs on this machine, now (median of five)",
+        ),
+        Text(
+            "So what is slow is done once, and many Data can use it. That is how many worlds "
+            "are simulated at the same time."
+        ),
+    ]
+    for name, result in results.items():
+        prefix = where(results, name)
+        blocks += [
+            Verdict(
+                f"{prefix}{result.worlds} Data of one Model, each under a command of its own, took "
+                f"{count(result.nstep, 'step')} in turn: each ended bit for bit where it ends "
+                f"alone, at {result.different} different ends",
+                result.alone,
+            ),
+            Verdict(
+                f"{prefix}the Model's {result.arrays} arrays have the same bytes as before",
+                result.constant,
+            ),
+            Text(
+                f"{prefix}the Data of a Model share one compiled model in memory."
+                if result.shared
+                else f"{prefix}each Data is a world of its own here, which holds its own copy of "
+                "the compiled model: the engine has no two objects. The split is ours."
+            ),
+        ]
+    blocks += differences(
+        results,
+        [
+            ("a load takes", lambda a, b: f"{b.loading / a.loading:.1f} ×"),
+            ("a Data takes", lambda a, b: f"{b.making / a.making:.1f} ×"),
+            ("a step takes", lambda a, b: f"{b.stepping / a.stepping:.1f} ×"),
+        ],
+    )
+    return page_of("Two objects and one function", results, blocks)
+
+
+def _steps(result: objects.Objects) -> str:
+    return f"{result.ratio:,.0f} steps"
