@@ -40,12 +40,14 @@ class Question:
         choices: Possible answers.
         right: Number of the one that the run gave; None if it gave another.
         because: What the run showed, in a sentence.
+        always: Whether its text is shown even where nobody can answer.
     """
 
     text: str
     choices: Sequence[str]
     right: int | None
     because: str
+    always: bool = False
 
 
 @dataclass(frozen=True)
@@ -56,12 +58,14 @@ class Traces:
         title: What they show.
         across: What the horizontal axis is, with its unit; up: the vertical one.
         curves: (x, y) by name, each a sequence of numbers.
+        log: Whether the vertical axis is logarithmic; what is zero is left out then.
     """
 
     title: str
     across: str
     up: str
     curves: Mapping[str, tuple[Sequence[float], Sequence[float]]]
+    log: bool = False
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from typing import Any
 
-from ..lessons import LESSONS, Lesson, module
+from ..lessons import LESSONS, STATIONS, Lesson
 from ._common import (
     PROGRAM,
     SAYS_NO,
@@ -102,8 +103,11 @@ def run(options: argparse.Namespace) -> int:
     page, results = _compute(options, lesson, options.model, values)
     names = list(LESSONS)
     later = names[names.index(lesson.name) + 1 :]
-    following = f"lesson {later[0]}" if later else "fingertip"
+    following = f"lesson {later[0]}" if later else "check exercises/step_loop.py"
     return show(page, results, options.json, f"Next: {PROGRAM} {following}", _asking(options))
+
+
+_AFTER = f"Check yourself: {PROGRAM} lesson questions. Then write your own: exercises/step_loop.py"
 
 
 def run_path(options: argparse.Namespace) -> int:
@@ -112,7 +116,7 @@ def run_path(options: argparse.Namespace) -> int:
     from ..report.quiz import go_on
 
     ask, code, everything = _asking(options), 0, {}
-    for number, lesson in enumerate(LESSONS.values(), start=1):
+    for number, lesson in enumerate(STATIONS, start=1):
         if ask and number > 1 and not go_on(f"station {number}: {lesson.question}"):
             break
         values = {option.key: option.default for option in lesson.options}
@@ -120,8 +124,9 @@ def run_path(options: argparse.Namespace) -> int:
         everything[lesson.name] = results
         code = code if page.holds else SAYS_NO
         if not options.json:
-            page = type(page)(f"{number} of {len(LESSONS)}: {page.title}", page.origin, page.blocks)
-            terminal.show(page, ask=ask)
+            title = f"{number} of {len(STATIONS)}: {page.title}"
+            last = number == len(STATIONS)
+            terminal.show(replace(page, title=title), _AFTER if last else "", ask)
     if options.json:
         from ..report.as_json import dumps
 
@@ -133,21 +138,17 @@ def _compute(
     options: argparse.Namespace, lesson: Lesson, model: str, values: dict[str, Any]
 ) -> tuple[Any, dict[str, Any]]:
     """The page of a station, and the results that it was made from, by backend."""
-    from ..lessons.session import Session, load_line, play
+    from ..lessons.session import page_of_lesson, take
 
-    station = module(lesson.name)
-    typed: dict[str, str] = {}
-
-    def on(loaded: Any, backend: str, report: Any) -> Any:
-        result = station.run(loaded, values, report)
-        typed[backend] = station.code(values, load_line(model, backend, options.menagerie))
-        return result, play(typed[backend])
-
-    both = on_each_backend(options, lesson.name, model, on)
-    results = {name: result for name, (result, _) in both.items()}
-    printed = {name: text for name, (_, text) in both.items()}
-    session = Session(next(iter(typed.values())), printed)
-    return station.page(results, session), results
+    taken = on_each_backend(
+        options,
+        lesson.name,
+        model,
+        lambda loaded, backend, report: take(
+            lesson, loaded, backend, values, model, options.menagerie, report
+        ),
+    )
+    return page_of_lesson(lesson, taken), {name: each.result for name, each in taken.items()}
 
 
 def _asking(options: argparse.Namespace) -> Any:

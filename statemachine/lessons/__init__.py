@@ -43,6 +43,7 @@ class Lesson:
     question: str
     model: str
     options: tuple[Option, ...] = ()
+    station: bool = True  # of the path
 
 
 class Module(Protocol):
@@ -64,7 +65,7 @@ class Module(Protocol):
 _JOINT = Option("--joint", "shoulder_lift", "joint to write")
 _VALUE = Option("--value", 0.8, "what to write [rad]", float)
 
-# The stations of the path, in order.
+# The stations of the path, in order, and what comes after it.
 LESSONS = {
     lesson.name: lesson
     for lesson in (
@@ -150,8 +151,10 @@ LESSONS = {
             "so101/scene_box",
             (Option("--steps", 20_000, "steps of each run", int),),
         ),
+        Lesson("questions", "Check yourself: six questions.", "so101/scene_box", station=False),
     )
 }
+STATIONS = tuple(lesson for lesson in LESSONS.values() if lesson.station)
 
 
 def module(name: str) -> Module:

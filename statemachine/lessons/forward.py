@@ -117,7 +117,12 @@ def page(results: Mapping[str, forward.Forward], session: Session) -> Page:
     return page_of("Stored, derived, integrated", results, blocks)
 
 
-_CHOICES = {((0, 1),): 0, ((1, 2),): 1, ((2, 3),): 2, ((1, 3),): 3}
+_CHOICES: dict[tuple[tuple[int, int], ...], int] = {
+    ((0, 1),): 0,
+    ((1, 2),): 1,
+    ((2, 3),): 2,
+    ((1, 3),): 3,
+}
 
 
 def _what_changes(results: Mapping[str, forward.Forward]) -> list[Any]:

@@ -182,9 +182,10 @@ def _traces(results: Mapping[str, replay.Replay]) -> Traces:
         "step",
         "largest |Δqpos|",
         {
-            name: (list(range(len(r.difference))), r.difference.tolist())
-            for name, r in results.items()
+            name: (list(range(len(result.difference))), result.difference.tolist())
+            for name, result in results.items()
         },
+        log=True,
     )
 
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 import contextlib
 import io
 import linecache
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ..errors import StateMachineError
+from ..interface import Model
+from ..page import Page
+from . import Lesson, module
 
 _NAME = "<lesson>"
 
@@ -19,6 +23,50 @@ class Session:
 
     code: str
     printed: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A lesson on one backend: its result, and the code with what it printed."""
+
+    result: Any
+    code: str
+    printed: str
+
+
+def take(
+    lesson: Lesson,
+    model: Model,
+    backend: str,
+    options: Mapping[str, Any] | None = None,
+    name: str | None = None,
+    menagerie: str | None = None,
+    progress: Callable[[float], None] = lambda _fraction: None,
+) -> Taken:
+    """Run a lesson and its code.
+
+    Args:
+        lesson: An entry of the table of lessons.
+        model: The Model to run it on.
+        backend: What `load` was given for it.
+        options: Values of the lesson's options by key; by default its own.
+        name: What `load` was given as the model, if not the lesson's.
+        menagerie: What it was given as that.
+        progress: Told the fraction that is done.
+    """
+    values = {option.key: option.default for option in lesson.options} | dict(options or {})
+    station = module(lesson.name)
+    result = station.run(model, values, progress)
+    code = station.code(values, load_line(name or lesson.model, backend, menagerie))
+    return Taken(result, code, play(code))
+
+
+def page_of_lesson(lesson: Lesson, taken: Mapping[str, Taken]) -> Page:
+    """The page of a lesson that was taken on one backend or several."""
+    session = Session(
+        next(iter(taken.values())).code, {name: each.printed for name, each in taken.items()}
+    )
+    return module(lesson.name).page({name: t.result for name, t in taken.items()}, session)
 
 
 def load_line(model: str, backend: str, menagerie: str | None = None) -> str:

@@ -32,16 +32,16 @@ def show(page: Page, footer: str = "", ask: Callable[[Question], int | None] | N
     said: tuple[Question, int] | None = None
     for block in page.blocks:
         if isinstance(block, Question):
-            if ask is not None:
-                choice = ask(block)
-                said = None if choice is None else (block, choice)
+            choice = ask(block) if ask else None
+            said = None if choice is None else (block, choice)
+            if ask is None and block.always:
+                right = "none of the above" if block.right is None else block.choices[block.right]
+                _write([Text(block.text), Text(f"{right[0].upper()}{right[1:]}. {block.because}")])
             continue
         _write([block])
-        if said and isinstance(block, Printed):  # first the run, then who was right
+        if said:  # first what the run says, then who was right
             _write([_judged(*said)])
             said = None
-    if said:
-        _write([_judged(*said)])
     if footer:
         _write([], footer=footer)
     else:

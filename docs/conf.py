@@ -1,0 +1,35 @@
+"""The documentation: pages by hand, and the path's stations made from runs."""
+
+import os
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE.parent))
+
+import statemachine  # noqa: E402
+
+project = "statemachine"
+author = "the statemachine maintainers"
+copyright = author
+release = version = statemachine.__version__
+extensions = ["myst_parser"]
+myst_enable_extensions = ["colon_fence"]
+html_theme = "furo"
+html_title = f"statemachine {version}"
+# Nothing is fetched from elsewhere when a page is read.
+html_theme_options = {"source_repository": ""}
+smartquotes = False  # --realtime is no dash
+exclude_patterns = ["_build"]
+
+
+def _make_pages(_app) -> None:
+    from statemachine.report.site import make_path
+
+    backends = os.environ.get("STATEMACHINE_DOCS_BACKENDS", "").split(",")
+    make_path(HERE / "path", [name for name in backends if name] or None)
+
+
+def setup(app) -> None:
+    """Make the generated pages before the others are read."""
+    app.connect("builder-inited", _make_pages)

@@ -1,0 +1,44 @@
+"""The runs that answer the six questions at the end of the path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..interface import Model
+from . import forward, gravity, objects, pace, replay, state
+from ._common import Progress, Provenance, provenance, silent
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """What each question is answered by."""
+
+    forward: forward.Forward
+    state: state.Layout
+    replay: replay.Replay
+    gravity: gravity.Gravity
+    objects: objects.Objects
+    pace: pace.Pace
+    provenance: Provenance
+
+
+def run(model: Model, progress: Progress = silent) -> Answers:
+    """Run each of the experiments once, with little to do.
+
+    Args:
+        model: The arm in a scene with a free body and a keyframe.
+        progress: Told the fraction that is done.
+    """
+
+    def part_of(number: int) -> Progress:
+        return lambda part: progress((number + part) / 5)
+
+    return Answers(
+        forward=forward.run(model, seconds=0.1, progress=part_of(0)),
+        state=state.run(model),
+        replay=replay.run(model, progress=part_of(1)),
+        gravity=gravity.run(model, seconds=10.0, longer=0.0, progress=part_of(2)),
+        objects=objects.run(model, worlds=3, progress=part_of(3)),
+        pace=pace.run(model, seconds=0.2, progress=part_of(4)),
+        provenance=provenance(model),
+    )

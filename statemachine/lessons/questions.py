@@ -1,0 +1,206 @@
+"""Check yourself: six questions, each answered by a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..experiments import questions
+from ..page import Page, Question, Text, Verdict
+from ._words import count, degrees, duration, millimetres, page_of, where
+from .session import Session
+
+_Results = Mapping[str, questions.Answers]
+
+
+def run(model: Any, options: Mapping[str, Any], progress: Any) -> questions.Answers:
+    """All six."""
+    return questions.run(model, progress=progress)
+
+
+def code(options: Mapping[str, Any], load: str) -> str:
+    """None: the code of the stations has been shown."""
+    return ""
+
+
+def page(results: _Results, session: Session) -> Page:
+    """Question, answer, and the figures behind it."""
+    first = next(iter(results.values()))
+    blocks: list[Any] = [
+        Text("Think first, then read: under each question stands what the run says about it.")
+    ]
+    for number, ask in enumerate((_stale, _slots, _truth, _held, _two, _fast), start=1):
+        asked, answers = ask(first), []
+        for name, result in results.items():
+            text, holds = _ANSWERS[ask](result)
+            answers.append(Verdict(f"{where(results, name)}{text}", holds))
+        right = asked.right if answers[0].holds else None
+        blocks.append(
+            Question(f"{number}. {asked.text}", asked.choices, right, asked.because, always=True)
+        )
+        blocks += answers
+    return page_of("Check yourself", results, blocks)
+
+
+def _stale(answers: questions.Answers) -> Question:
+    return Question(
+        "You write data.qpos[1] = 0.8 and read the fingertip from data.site_xpos. It has not "
+        "moved. Why?",
+        (
+            "data.qpos is a copy; the simulator did not get the number",
+            "site_xpos holds what was computed before; nothing has computed it since",
+            "the servos hold the arm where it was",
+        ),
+        1,
+        "Call forward to see the consequences of a state, step to let time pass as well.",
+    )
+
+
+def _stale_answer(answers: questions.Answers) -> tuple[str, bool]:
+    found = answers.forward
+    return (
+        "before and after the write site_xpos has the same bits; forward then moves it by "
+        f"{millimetres(found.moved, 1)}, and data.time stays at {found.readings[3].time:g} s",
+        (1, 2) in found.equal and found.moved > 0,
+    )
+
+
+def _slots(answers: questions.Answers) -> Question:
+    layout = answers.state
+    return Question(
+        f"nq is {layout.nq} and nv is {layout.nv}. What must you not do?",
+        (
+            "use one index for both qpos and qvel",
+            "write into qvel",
+            "have a quaternion in qpos",
+        ),
+        0,
+        "Take qpos addresses from jnt_qposadr and qvel addresses from jnt_dofadr.",
+    )
+
+
+def _slots_answer(answers: questions.Answers) -> tuple[str, bool]:
+    apart = [
+        j
+        for j in answers.state.joints
+        if (j.qpos_start, j.qpos_stop) != (j.qvel_start, j.qvel_stop)
+    ]
+    names = "; ".join(
+        f"{j.name} has qpos[{j.qpos_start}:{j.qpos_stop}] and qvel[{j.qvel_start}:{j.qvel_stop}]"
+        for j in apart
+    )
+    return f"{names}: seven numbers of position, six of velocity", bool(apart)
+
+
+def _truth(answers: questions.Answers) -> Question:
+    return Question(
+        "Two runs end in the same bits. What does that not tell you?",
+        (
+            "whether a later change of your controller changes the result",
+            "whether the result is right",
+            "whether both runs had the same commands",
+        ),
+        1,
+        "Determinism makes a test of a robot's behaviour possible; it does not make it true.",
+    )
+
+
+def _truth_answer(answers: questions.Answers) -> tuple[str, bool]:
+    found = answers.replay
+    text = f"after {count(len(found.contacts), 'step')} the largest difference is "
+    text += f"{found.difference.max():.1e}"
+    if found.finer is None:
+        return text, found.identical
+    return (
+        f"{text}; with half the timestep two runs agree bit for bit as well, and end off by "
+        f"{found.finer.difference:.1e}. Both cannot be right",
+        found.identical and found.finer.identical and found.finer.difference > 0,
+    )
+
+
+def _held(answers: questions.Answers) -> Question:
+    end = answers.gravity.servos_on.time[-1]
+    return Question(
+        f"A colleague makes a Data, steps it for {end:g} s without writing ctrl, sees the arm stay "
+        "up, and says that gravity is off. What is going on?",
+        (
+            "gravity has to be switched on first",
+            "ctrl is zero, and the servos hold the arm at zero",
+            "the arm rests on its joint limits",
+        ),
+        1,
+        "There is no neutral value of ctrl for a position servo.",
+    )
+
+
+def _held_answer(answers: questions.Answers) -> tuple[str, bool]:
+    found = answers.gravity
+    on, off = found.servos_on, found.servos_off
+    servo, load = on.forces.actuator or 0.0, on.forces.bias or 0.0
+    text = (
+        f"gravity pulls with {abs(load):.4f} N·m, the servo holds with {abs(servo):.4f} N·m and "
+        f"lets {found.joint} sag by {degrees(on.position[-1], 3)}; with the servos off it is at "
+        f"{degrees(off.position[-1])}"
+    )
+    if found.alone:
+        text += (
+            ". (As the engine itself comes, the colleague is right, and for another reason: see "
+            "statemachine lesson gravity)"
+        )
+    held = abs(servo - load) < 1e-3 < abs(load)
+    return text, held and abs(off.position[-1]) > abs(on.position[-1])
+
+
+def _two(answers: questions.Answers) -> Question:
+    return Question(
+        "Why two objects, a Model and a Data, and not one?",
+        (
+            "a Model is for reading files, a Data for writing them",
+            "the costly and constant part is made once, and many Data use it",
+            "step would otherwise not know its timestep",
+        ),
+        1,
+        "And it is a clean line: what is in the Model is a fact about the robot, what is in the "
+        "Data a fact about now.",
+    )
+
+
+def _two_answer(answers: questions.Answers) -> tuple[str, bool]:
+    found = answers.objects
+    return (
+        f"load takes {duration(found.loading)}, as long as {found.ratio:,.0f} steps; "
+        f"{found.worlds} Data of one Model went {found.different} ways, each as if it were alone",
+        found.ratio > 1 and found.alone and found.constant,
+    )
+
+
+def _fast(answers: questions.Answers) -> Question:
+    return Question(
+        "Your loop brings data.time to 100 s in 5 s by the clock. Is the simulation too fast?",
+        (
+            "yes: the physics is wrong at that speed",
+            "no: data.time is a number that step adds to; nothing reads a clock",
+            "only if it runs on more than one core",
+        ),
+        1,
+        "Wait in your loop if somebody watches; the physics is the same.",
+    )
+
+
+def _fast_answer(answers: questions.Answers) -> tuple[str, bool]:
+    found = answers.pace
+    return (
+        f"{found.simulated:g} s took {duration(found.free)} without waiting and {found.paced:.3f} "
+        "s paced by the clock, and both runs end in the same bits",
+        found.identical and found.passed == 0,
+    )
+
+
+_ANSWERS = {
+    _stale: _stale_answer,
+    _slots: _slots_answer,
+    _truth: _truth_answer,
+    _held: _held_answer,
+    _two: _two_answer,
+    _fast: _fast_answer,
+}

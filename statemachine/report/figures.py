@@ -1,0 +1,125 @@
+"""Pictures of a page, drawn by matplotlib from the figures of a run."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from typing import Any, cast
+
+from ..errors import MissingEngineError
+from ..page import Picture, Pipeline, Slots, Traces
+
+_COLOURS = ("#1f5fa8", "#c2571a", "#2f8f4e", "#8a4fa0", "#b03a48", "#6b6b6b")
+_INK, _PAPER = "#222222", "#ffffff"
+
+
+def svg(picture: Picture) -> str:
+    """A picture as SVG; the same figures give the same text.
+
+    Raises:
+        MissingEngineError: matplotlib is not installed.
+    """
+    try:
+        import matplotlib
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise MissingEngineError(
+            "pictures need matplotlib: pip install 'statemachine-sim[docs]'", engine="matplotlib"
+        ) from error
+    # Text as paths would be twice as large; without a salt and a date each run differs.
+    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "statemachine"}):
+        figure = Figure(figsize=_SIZES[type(picture)](picture), facecolor=_PAPER)
+        axes = figure.add_subplot()
+        cast("Callable[[Any, Any], None]", _DRAW[type(picture)])(axes, picture)
+        out = io.StringIO()
+        figure.savefig(out, format="svg", bbox_inches="tight", metadata={"Date": None})
+    return out.getvalue()
+
+
+def _traces(axes: Any, picture: Traces) -> None:
+    for k, (name, (x, y)) in enumerate(picture.curves.items()):
+        style = "-" if k < len(_COLOURS) else "--"
+        shown = [(a, b) for a, b in zip(x, y, strict=True) if b > 0 or not picture.log]
+        axes.plot(*zip(*shown, strict=True), style, color=_COLOURS[k % len(_COLOURS)], label=name)
+    if picture.log:
+        axes.set_yscale("log")
+    axes.set_xlabel(picture.across)
+    axes.set_ylabel(picture.up)
+    axes.grid(alpha=0.3)
+    axes.spines[["top", "right"]].set_visible(False)
+    if len(picture.curves) > 1:
+        axes.legend(fontsize="small", frameon=False)
+
+
+def _slots(axes: Any, picture: Slots) -> None:
+    """Rows of numbered boxes, one above the other, coloured by owner."""
+    owners = list(dict.fromkeys(owner for row in picture.rows.values() for owner, _, _ in row))
+    widest = max(stop for row in picture.rows.values() for _, _, stop in row)
+    for level, (name, row) in enumerate(picture.rows.items()):
+        y = -2.0 * level
+        axes.text(-0.3, y + 0.5, name, ha="right", va="center", family="monospace", color=_INK)
+        for owner, start, stop in row:
+            colour = _COLOURS[owners.index(owner) % len(_COLOURS)]
+            for slot in range(start, stop):
+                axes.add_patch(_box(slot, y, 1, 1, colour))
+                axes.text(slot + 0.5, y + 0.5, str(slot), ha="center", va="center", color=_INK)
+            if level == 0:
+                alone = stop == start + 1  # a name does not fit over one slot
+                axes.text(
+                    (start + stop) / 2,
+                    y + 1.15,
+                    owner,
+                    ha="left" if alone else "center",
+                    va="bottom",
+                    rotation=35 if alone else 0,
+                    fontsize="small",
+                    color=_INK,
+                )
+    axes.set_xlim(-1.5, widest + 0.5)
+    axes.set_ylim(-2.0 * len(picture.rows) + 1.7, 3.2)
+    axes.set_aspect("equal")
+    axes.axis("off")
+
+
+def _pipeline(axes: Any, picture: Pipeline) -> None:
+    """Boxes from left to right; under them, what each call covers."""
+    deepest = max(len(content) for _, content in picture.stages)
+    top = deepest * 0.32 + 0.9
+    for k, (heading, content) in enumerate(picture.stages):
+        x = 3.2 * k
+        axes.add_patch(_box(x, 0, 2.6, top, _COLOURS[k % len(_COLOURS)]))
+        axes.text(x + 1.3, top - 0.35, heading, ha="center", va="center", weight="bold", color=_INK)
+        for line, text in enumerate(content):
+            y = top - 0.85 - 0.32 * line
+            axes.text(x + 0.2, y, text, va="center", family="monospace", fontsize=8, color=_INK)
+        if k:
+            axes.annotate(
+                "", (x - 0.05, top / 2), (x - 0.55, top / 2),
+                arrowprops={"arrowstyle": "->", "color": _INK},
+            )  # fmt: skip
+    for k, (name, first, last) in enumerate(picture.spans):
+        y, left, right = -0.5 - 0.6 * k, 3.2 * first, 3.2 * last + 2.6
+        axes.annotate(
+            "", (right, y), (left, y), arrowprops={"arrowstyle": "|-|, widthA=.3, widthB=.3"}
+        )
+        axes.text(
+            (left + right) / 2, y, name, ha="center", va="center", family="monospace",
+            bbox={"facecolor": _PAPER, "edgecolor": "none", "pad": 2}, color=_INK,
+        )  # fmt: skip
+    axes.set_xlim(-0.2, 3.2 * len(picture.stages) - 0.4)
+    axes.set_ylim(-0.6 * len(picture.spans) - 0.5, top + 0.1)
+    axes.axis("off")
+
+
+def _box(x: float, y: float, width: float, height: float, colour: str) -> Any:
+    from matplotlib.patches import Rectangle
+
+    return Rectangle((x, y), width, height, facecolor=colour + "30", edgecolor=colour)
+
+
+_DRAW = {Traces: _traces, Slots: _slots, Pipeline: _pipeline}
+_SIZES: dict[type, Callable[[Any], tuple[float, float]]] = {
+    Traces: lambda _: (7.0, 3.4),
+    Slots: lambda _: (7.5, 2.6),
+    Pipeline: lambda p: (7.5, 0.26 * max(len(content) for _, content in p.stages) + 1.6),
+}
