@@ -13,7 +13,7 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13 python3.14; 
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null \
 	&& { echo $$p; break; }; done)
 
-.PHONY: help lesson test test-fast test-newest check format hooks bench picture urdf clean
+.PHONY: help lesson test test-fast test-newest check format hooks bench picture urdf docs notebook clean
 
 help:
 	@sed -n 's/^# make /  make /p' Makefile
@@ -70,9 +70,18 @@ picture: $(VENV)/test.stamp
 urdf: $(VENV)/run.stamp
 	@$(BIN)/python models/so101/make_urdf.py
 
+# make docs         the path as pages, made from runs: docs/_build/html/index.html
+docs: $(VENV)/test.stamp
+	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	@echo "docs/_build/html/index.html"
+
+# make notebook     write notebooks/path.ipynb anew from the lessons
+notebook: $(VENV)/test.stamp
+	@$(BIN)/python notebooks/make_notebook.py
+
 # make clean        remove what the others made
 clean:
-	rm -rf .venv .venv-newest build dist .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-newest build dist docs/_build docs/path .pytest_cache .ruff_cache .hypothesis
 
 CONSTRAINTS ?= -c constraints.txt
 

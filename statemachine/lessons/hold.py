@@ -11,7 +11,7 @@ from ..experiments import hold
 from ..experiments._common import TARGET
 from ..page import Page, Question, Table, Text, Traces
 from ..records import Array
-from ._words import angle_or_length, differences, page_of, position, typed, vector, where
+from ._words import angle_or_length, differences, page_of, position, typed, where
 from .session import Session
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -97,7 +97,7 @@ def page(results: Mapping[str, hold.Hold], session: Session) -> Page:
             ("at the end, contacts left out", _apart_freely),
         ],
     )
-    return page_of(f"Hold {vector(first.target, 1)}", results, blocks)
+    return page_of("Six numbers in", results, blocks)
 
 
 def _question(first: hold.Hold) -> Question:

@@ -52,11 +52,12 @@ def page(results: Mapping[str, speed.Speed], session: Session) -> Page:
             )
         )
     return page_of(
-        f"{first.simulated:g} simulated seconds",
+        "The speed budget",
         results,
         [
             Text(
-                f"{count(first.nstep, 'step')} of {first.provenance.timestep:g} s, as fast as they "
+                f"{first.simulated:g} simulated seconds, {count(first.nstep, 'step')} of "
+                f"{first.provenance.timestep:g} s, as fast as they "
                 "come. In bulk: one call for many steps. Step by step: a Python loop of single "
                 "calls, as a controller needs it. The ratio of simulated to real time is the "
                 "budget that every experiment of yours is drawn against."

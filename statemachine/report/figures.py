@@ -9,7 +9,7 @@ from typing import Any, cast
 from ..errors import MissingEngineError
 from ..page import Picture, Pipeline, Slots, Traces
 
-_COLOURS = ("#1f5fa8", "#c2571a", "#2f8f4e", "#8a4fa0", "#b03a48", "#6b6b6b")
+_COLOURS = ("#1f5fa8", "#c2571a", "#2f8f4e", "#8a4fa0", "#b03a48", "#6b6b6b", "#3aa6a6")
 _INK, _PAPER = "#222222", "#ffffff"
 
 

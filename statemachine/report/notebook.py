@@ -1,0 +1,135 @@
+"""The path as one Jupyter notebook, and what a notebook shows of a station.
+
+Jupyter, not marimo: the lesson is about an object that is changed in place, line by line,
+across cells. marimo's cells run by the variables that they assign, and a change inside an
+object is none; Jupyter runs what the reader runs, and is what courses and hosts have.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from dataclasses import replace
+from typing import Any
+
+from ..backends import load
+from ..errors import MissingEngineError, unknown_name
+from ..lessons import LESSONS, Lesson, module
+from ..lessons.session import page_of_lesson, take
+from ..page import Code, Page, Picture, Printed, Question, Text
+from .figures import svg
+from .markdown import block_as_markdown, body
+
+_START = """\
+from statemachine.report.notebook import station
+
+BACKEND = "mujoco"  # or "pybullet": the only word that changes
+"""
+_INTRODUCTION = """\
+# A physics simulator is a state machine that you advance
+
+Ten stations. Each has a few sentences, code to run and to change, and a question: **make your
+prediction before you run the cell.** The cell after it measures the same on your engine, now.
+"""
+
+
+class Shown:
+    """A page in a notebook, without the code that a cell above it has run."""
+
+    def __init__(self, page: Page) -> None:
+        self.page = page
+
+    def _repr_markdown_(self) -> str:
+        blocks: list[Any] = []
+        for block in self.page.blocks:
+            if isinstance(block, Question):
+                right = "None of them" if block.right is None else block.choices[block.right]
+                if block.always:
+                    blocks.append(Text(block.text))
+                blocks.append(Text(f"The run says: {right}. {block.because}"))
+            elif not isinstance(block, (Code, Printed)):
+                blocks.append(block)
+        # The first text stands in the notebook already.
+        return "\n\n".join(body(replace(self.page, blocks=blocks[1:]), _inline))
+
+    def __repr__(self) -> str:
+        return f"<Shown {self.page.title!r}: a notebook renders it>"
+
+
+def station(name: str, backend: str = "mujoco", **options: Any) -> Shown:
+    """Run a lesson and show what it says.
+
+    Args:
+        name: Of the lesson.
+        backend: The engine to run it on.
+        **options: Of the lesson, by key, as `seconds=2.0`.
+
+    Raises:
+        UnknownNameError: There is no such lesson, backend or option.
+        MissingEngineError: The engine is not installed here.
+    """
+    if name not in LESSONS:
+        raise unknown_name("lesson", name, LESSONS)
+    lesson = LESSONS[name]
+    known = [option.key for option in lesson.options]
+    for key in options:
+        if key not in known:
+            raise unknown_name("option", key, known)
+    return Shown(_page(lesson, backend, options))
+
+
+def build() -> str:
+    """The notebook as JSON, without outputs; its questions come from a run on MuJoCo."""
+    cells = [_cell("start", "markdown", _INTRODUCTION), _cell("setup", "code", _START)]
+    for number, lesson in enumerate(LESSONS.values(), start=1):
+        page = _page(lesson, "mujoco", {})
+        title = f"## {number}. {page.title}\n\n" if lesson.station else f"## {page.title}\n\n"
+        cells.append(_cell(f"{lesson.name}-text", "markdown", title + _opening(page)))
+        values = {option.key: option.default for option in lesson.options}
+        code = module(lesson.name).code(values, f'sm.load("{lesson.model}", backend=BACKEND)')
+        if code:
+            cells.append(_cell(f"{lesson.name}-code", "code", code))
+        cells.append(_cell(f"{lesson.name}-run", "code", f'station("{lesson.name}", BACKEND)'))
+    notebook = {
+        "cells": cells,
+        "metadata": {
+            "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
+            "language_info": {"name": "python"},
+        },
+        "nbformat": 4,
+        "nbformat_minor": 5,
+    }
+    return json.dumps(notebook, indent=1, ensure_ascii=False) + "\n"
+
+
+def _page(lesson: Lesson, backend: str, options: dict[str, Any]) -> Page:
+    taken = take(lesson, load(lesson.model, backend=backend), backend, options)
+    return page_of_lesson(lesson, {backend: taken})
+
+
+def _opening(page: Page) -> str:
+    """The first text and the question, without what answers it."""
+    parts = [block_as_markdown(page.blocks[0], _inline)]
+    for block in page.blocks:
+        if isinstance(block, Question) and not block.always:
+            choices = "\n".join(f"- {choice}" for choice in block.choices)
+            parts.append(f"**Before you run it:** {block.text}\n\n{choices}")
+            break
+    return "\n\n".join(parts)
+
+
+def _inline(picture: Picture) -> str:
+    """A picture as a data address; none without matplotlib."""
+    try:
+        encoded = base64.b64encode(svg(picture).encode()).decode()
+    except MissingEngineError:
+        return ""
+    return f"data:image/svg+xml;base64,{encoded}"
+
+
+def _cell(name: str, kind: str, source: str) -> dict[str, Any]:
+    cell: dict[str, Any] = {"cell_type": kind, "id": name, "metadata": {}}
+    if kind == "code":
+        cell |= {"execution_count": None, "outputs": []}
+    cell["source"] = source.rstrip("\n").splitlines(keepends=True)
+    return cell
