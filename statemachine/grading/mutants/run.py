@@ -1,0 +1,256 @@
+"""A test file against the healthy arm, then against every mutant, each in a process of its own."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ...backends import backend_names
+from ...engines import engine_version, require
+from ...errors import BadInputError, MissingEngineError, ModelFileError, unknown_name
+from .. import sandbox
+from . import BACKENDS, MUTANTS, Mutant
+
+_SECONDS = 60.0  # for the tests on the healthy arm
+# Under a fault they may take longer, and the machine may be busy with others.
+_TIMES, _AND = 5.0, 15.0
+_OWN = ("PYTEST_ADDOPTS", "PYTEST_PLUGINS", "PYTEST_DEBUG")  # settings of another pytest
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A test that did not pass, and what it said in one line."""
+
+    test: str
+    why: str
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A mutant, and the tests that caught it."""
+
+    mutant: Mutant
+    caught_by: tuple[Failure, ...]
+
+    @property
+    def caught(self) -> bool:
+        """Whether any test did."""
+        return bool(self.caught_by)
+
+
+@dataclass(frozen=True)
+class Examination:
+    """What a test file is worth.
+
+    Attributes:
+        file: Its name.
+        backend, engine_version: What it ran on.
+        tests: Those that ran on the healthy arm.
+        failures: Those that failed there; then there are no trials.
+        trials: One for each mutant.
+    """
+
+    file: str
+    backend: str
+    engine_version: str
+    tests: tuple[str, ...]
+    failures: tuple[Failure, ...]
+    trials: tuple[Trial, ...]
+
+    @property
+    def caught(self) -> int:
+        """How many mutants were caught."""
+        return sum(trial.caught for trial in self.trials)
+
+    @property
+    def survivors(self) -> tuple[Mutant, ...]:
+        """The mutants that no test caught."""
+        return tuple(trial.mutant for trial in self.trials if not trial.caught)
+
+    @property
+    def idle(self) -> tuple[str, ...]:
+        """Tests that caught no mutant."""
+        busy = {failure.test for trial in self.trials for failure in trial.caught_by}
+        return tuple(test for test in self.tests if test not in busy)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the tests pass on the healthy arm and catch all mutants."""
+        return not self.failures and not self.survivors
+
+
+def examine(
+    file: str | os.PathLike[str],
+    backend: str = "mujoco",
+    only: Sequence[str] = (),
+    seconds: float = _SECONDS,
+    progress: Callable[[float], None] = lambda _fraction: None,
+) -> Examination:
+    """Run a student's tests on the healthy arm and on every mutant.
+
+    Args:
+        file: Tests as pytest takes them.
+        backend: What the fixture `model` is loaded on.
+        only: Names of mutants; none for all.
+        seconds: What the tests may take on the healthy arm.
+        progress: Told the fraction that is done.
+
+    Raises:
+        ModelFileError: There is no such file.
+        BadInputError: It cannot be imported, or there are no tests in it.
+        UnknownNameError: There is no such mutant or backend.
+        MissingEngineError: The engine, or pytest, is not here.
+    """
+    path = _test_file(file)
+    mutants = [_mutant(name) for name in only or MUTANTS]
+    version = _ready(backend)
+    healthy = _run(path, backend, None, seconds)
+    if healthy.broken:
+        raise BadInputError(f"{path.name} cannot be imported: {healthy.broken}")
+    if not healthy.ran and not healthy.failures:
+        reason = "every test in it was skipped" if healthy.tests else "a test is a function test_…"
+        raise BadInputError(f"there are no tests in {path.name}: {reason}")
+    trials: dict[str, Trial] = {}
+    if not healthy.failures:
+        progress(1 / (len(mutants) + 1))
+        patience = _TIMES * healthy.wall + _AND
+        pool = ThreadPoolExecutor(os.cpu_count() or 1)
+        try:
+            running = {pool.submit(_run, path, backend, m.name, patience): m for m in mutants}
+            for done in as_completed(running):
+                mutant = running[done]
+                trials[mutant.name] = Trial(mutant, done.result().failures)
+                progress((len(trials) + 1) / (len(mutants) + 1))
+        finally:  # those that have not begun, after an interrupt, never will
+            pool.shutdown(cancel_futures=True)
+    return Examination(
+        file=path.name,
+        backend=backend,
+        engine_version=version,
+        tests=healthy.ran,
+        failures=healthy.failures,
+        trials=tuple(trials[mutant.name] for mutant in mutants if trials),
+    )
+
+
+def _test_file(file: str | os.PathLike[str]) -> Path:
+    path = Path(file).absolute()
+    if not path.is_file():
+        raise ModelFileError(f"no file {os.fspath(file)}: --mutants takes a file of tests")
+    if path.suffix != ".py":
+        raise BadInputError(f"{path.name} is no Python file: --mutants takes a file of tests")
+    return path
+
+
+def _mutant(name: str) -> Mutant:
+    if name not in MUTANTS:
+        raise unknown_name("mutant", name, MUTANTS)
+    return MUTANTS[name]
+
+
+def _ready(backend: str) -> str:
+    """The version of the backend's engine; raises where the tests could not even begin."""
+    if backend not in backend_names():
+        raise unknown_name("backend", backend, BACKENDS)
+    if backend not in BACKENDS:
+        raise BadInputError(
+            f"the faults are made for {' and '.join(BACKENDS)}, not for backend {backend!r}"
+        )
+    require(backend)
+    if importlib.util.find_spec("pytest") is None:
+        raise MissingEngineError(
+            "pytest is not installed here: pip install 'statemachine-sim[mutants]'",
+            engine="pytest",
+        )
+    return engine_version(backend)
+
+
+@dataclass(frozen=True)
+class _Record:
+    """What one run of pytest came to."""
+
+    tests: tuple[str, ...]
+    ran: tuple[str, ...]
+    failures: tuple[Failure, ...]
+    broken: str
+    wall: float
+
+
+def _run(path: Path, backend: str, fault: str | None, seconds: float) -> _Record:
+    with tempfile.TemporaryDirectory() as folder:
+        here = Path(folder)
+        settings, record = here / "pytest.ini", here / "record"
+        settings.write_text("[pytest]\n", encoding="utf-8")
+        record.touch()
+        command = [sys.executable, "-m", "pytest", "-c", str(settings), "--rootdir", folder]
+        command += ["--noconftest", "--tb=no", "-q", "-p", "no:cacheprovider"]
+        command += ["-p", f"{__package__}.plugin", "--engine", backend, "--record", str(record)]
+        command += ["--fault", fault] if fault else []
+        outcome = sandbox.run(
+            [*command, str(path)], seconds=seconds, cwd=folder, env=_environment()
+        )
+        return _read(record, outcome, seconds)
+
+
+def _environment() -> dict[str, str]:
+    """Ours, without what is meant for another pytest, and with this package to be found."""
+    env = {name: value for name, value in os.environ.items() if name not in _OWN}
+    home = str(Path(__file__).parents[3])
+    paths = [home, *filter(None, [env.get("PYTHONPATH")])]
+    return {
+        **env,
+        "PYTHONPATH": os.pathsep.join(paths),
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "PYTHONUTF8": "1",
+        "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
+    }
+
+
+def _read(record: Path, outcome: sandbox.Outcome, seconds: float) -> _Record:
+    lines: list[dict[str, Any]] = []
+    for line in record.read_text(encoding="utf-8").splitlines():
+        lines.append(json.loads(line))
+    merged: dict[str, Any] = {}
+    for line in lines:
+        merged |= line
+    tests: list[str] = merged.get("tests", [])
+    failures = {line["failed"]: line["why"] for line in reversed(lines) if "failed" in line}
+    skipped = {line["skipped"] for line in lines if "skipped" in line}
+    began = [line["began"] for line in lines if "began" in line]
+    ended = {line["ended"] for line in lines if "ended" in line}
+    broken = merged.get("broken", "")
+    if "tests" not in merged and not broken:
+        broken = f"it {_end(outcome, seconds)}"
+    unended = [test for test in tests if test not in ended]
+    if unended and not broken:
+        # The one that was running, or after which pytest itself was told to stop.
+        guilty = began[-1] if began else unended[0]
+        failures.setdefault(guilty, _end(outcome, seconds))
+    if broken:
+        failures = {"the import of the file": broken}
+    return _Record(
+        tests=tuple(tests),
+        ran=tuple(test for test in tests if test in ended and test not in skipped),
+        failures=tuple(Failure(test, why) for test, why in failures.items()),
+        broken=broken,
+        wall=outcome.wall,
+    )
+
+
+def _end(outcome: sandbox.Outcome, seconds: float) -> str:
+    """How a run ended that did not come to its end."""
+    if outcome.timed_out:
+        return f"took longer than {seconds:.0f} s"
+    if outcome.out_of_memory:
+        return "took more memory than it may"
+    if outcome.signal is not None:
+        return f"ended the process by signal {outcome.signal}"
+    return f"ended the process with code {outcome.returncode}"
