@@ -70,7 +70,7 @@ class Recorder:
     """Writes down what was found, what began and how it ended.
 
     Lines: {"tests": names}, {"began": name}, {"failed": name, "why": …}, {"skipped": name},
-    {"ended": name}, {"broken": why} for a file that cannot be imported, {"finished": true}.
+    {"ended": name}, {"broken": why} for a file that cannot be imported.
     """
 
     def __init__(self, path: Path) -> None:
@@ -105,10 +105,6 @@ class Recorder:
 
     def pytest_runtest_logfinish(self, nodeid: str) -> None:
         self._write(ended=_name(nodeid))
-
-    @pytest.hookimpl(trylast=True)
-    def pytest_sessionfinish(self) -> None:
-        self._write(finished=True)
 
 
 def _name(nodeid: str) -> str:

@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from ...backends import backend_names
 from ...engines import engine_version, require
@@ -22,6 +21,7 @@ from . import BACKENDS, MUTANTS, Mutant
 _SECONDS = 60.0  # for the tests on the healthy arm
 # Under a fault they may take longer, and the machine may be busy with others.
 _TIMES, _AND = 5.0, 15.0
+_IMPORT = "the import of the file"
 _OWN = ("PYTEST_ADDOPTS", "PYTEST_PLUGINS", "PYTEST_DEBUG")  # settings of another pytest
 
 
@@ -116,7 +116,7 @@ def examine(
     if healthy.broken:
         raise BadInputError(f"{path.name} cannot be imported: {healthy.broken}")
     if not healthy.ran and not healthy.failures:
-        reason = "every test in it was skipped" if healthy.tests else "a test is a function test_…"
+        reason = "each was skipped" if healthy.skipped else "a test is a function test_…"
         raise BadInputError(f"there are no tests in {path.name}: {reason}")
     trials: dict[str, Trial] = {}
     if not healthy.failures:
@@ -177,8 +177,8 @@ def _ready(backend: str) -> str:
 class _Record:
     """What one run of pytest came to."""
 
-    tests: tuple[str, ...]
     ran: tuple[str, ...]
+    skipped: int
     failures: tuple[Failure, ...]
     broken: str
     wall: float
@@ -215,30 +215,33 @@ def _environment() -> dict[str, str]:
 
 
 def _read(record: Path, outcome: sandbox.Outcome, seconds: float) -> _Record:
-    lines: list[dict[str, Any]] = []
+    tests: list[str] | None = None
+    running, broken = "", ""
+    ended: list[str] = []
+    skipped: set[str] = set()
+    failures: dict[str, str] = {}
     for line in record.read_text(encoding="utf-8").splitlines():
-        lines.append(json.loads(line))
-    merged: dict[str, Any] = {}
-    for line in lines:
-        merged |= line
-    tests: list[str] = merged.get("tests", [])
-    failures = {line["failed"]: line["why"] for line in reversed(lines) if "failed" in line}
-    skipped = {line["skipped"] for line in lines if "skipped" in line}
-    began = [line["began"] for line in lines if "began" in line]
-    ended = {line["ended"] for line in lines if "ended" in line}
-    broken = merged.get("broken", "")
-    if "tests" not in merged and not broken:
-        broken = f"it {_end(outcome, seconds)}"
-    unended = [test for test in tests if test not in ended]
-    if unended and not broken:
-        # The one that was running, or after which pytest itself was told to stop.
-        guilty = began[-1] if began else unended[0]
-        failures.setdefault(guilty, _end(outcome, seconds))
-    if broken:
-        failures = {"the import of the file": broken}
+        match json.loads(line):
+            case {"tests": names}:
+                tests = names
+            case {"began": name}:
+                running = name
+            case {"failed": name, "why": why}:
+                failures.setdefault(name, why)  # the test itself, before its teardown
+            case {"skipped": name}:
+                skipped.add(name)
+            case {"ended": name}:
+                ended.append(name)
+            case {"broken": why}:
+                broken = why
+    if tests is None:
+        broken = broken or f"it {_end(outcome, seconds)}"
+        failures[_IMPORT] = broken
+    elif len(ended) < len(tests):  # one ended them all
+        failures.setdefault(running or tests[0], _end(outcome, seconds))
     return _Record(
-        tests=tuple(tests),
-        ran=tuple(test for test in tests if test in ended and test not in skipped),
+        ran=tuple(test for test in ended if test not in skipped),
+        skipped=len(skipped),
         failures=tuple(Failure(test, why) for test, why in failures.items()),
         broken=broken,
         wall=outcome.wall,
