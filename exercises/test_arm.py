@@ -18,6 +18,7 @@ What to test against? Not what the arm gave you yesterday: what you know without
 import math
 
 import numpy as np
+
 import statemachine as sm
 
 

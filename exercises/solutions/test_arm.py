@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 import pytest
+
 import statemachine as sm
 
 HALF = math.sqrt(0.5)  # cosine and sine of 45 degrees: half of a quarter turn

@@ -52,9 +52,7 @@ def reading(name: str) -> Callable[[Callable[[Data, Array], Array]], Fault]:
     def decorate(function: Callable[[Data, Array], Array]) -> Fault:
         def fault(patch: Patcher) -> None:
             right = vars(Data)[name].fget
-            patch.setattr(
-                Data, name, property(lambda data: read_only(function(data, right(data))))
-            )
+            patch.setattr(Data, name, property(lambda data: read_only(function(data, right(data)))))
 
         return fault
 
@@ -242,9 +240,7 @@ def _scale_friction(raw: Any, by: float) -> None:
 
 
 joints_shifted = misreading(partial(_shift, by=1), partial(_shift, by=-1))
-degrees = misreading(
-    partial(_scale_angles, by=np.pi / 180), partial(_scale_angles, by=180 / np.pi)
-)
+degrees = misreading(partial(_scale_angles, by=np.pi / 180), partial(_scale_angles, by=180 / np.pi))
 spin_in_world = misreading(
     partial(_turn_spin, from_world=True), partial(_turn_spin, from_world=False)
 )

@@ -50,7 +50,7 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.fixture(scope="session")
 def backend(request: pytest.FixtureRequest) -> str:
     """The backend under test."""
-    return request.config.getoption("engine")
+    return str(request.config.getoption("engine"))
 
 
 @pytest.fixture(scope="session")
