@@ -28,23 +28,23 @@ class Mutant:
 _ALL = (
     Mutant(
         "xyzw",
-        "xquat has its numbers as x y z w",
+        "quaternions read x y z w",
         "nothing compares a quaternion with a turn that you know by hand",
     ),
     Mutant(
         "com-for-frame",
-        "xpos is the centre of mass, not the frame",
+        "xpos is the centre of mass",
         "nothing compares xpos of a link with a place from the model's file, or asks whether "
         "turning a joint leaves the origin of its own link where it is",
     ),
     Mutant(
         "joints-shifted",
-        "what is meant for a joint goes to its neighbour",
+        "numbers go to the next joint",
         "nothing turns one joint and asks whether the fingertip moves as that joint moves it",
     ),
     Mutant(
         "degrees",
-        "joint angles in qpos are taken for degrees",
+        "angles are taken for degrees",
         "nothing writes a known angle into qpos and measures how far the arm turned",
     ),
     Mutant(
@@ -54,27 +54,27 @@ _ALL = (
     ),
     Mutant(
         "forward-steps",
-        "forward takes a step of time",
+        "forward takes a step",
         "nothing asks whether forward leaves time, qpos and qvel as they were",
     ),
     Mutant(
         "step-and-forward",
-        "step ends with a forward of its own",
+        "step ends with a forward",
         "nothing asks to which moment the fingertip belongs that is read right after a step",
     ),
     Mutant(
         "one-step-short",
-        "step(model, data, n) takes n - 1 steps",
+        "step(…, n) takes n − 1 steps",
         "nothing compares one call of n steps with n calls of one; the clock alone does not tell",
     ),
     Mutant(
         "motor-left-on",
-        "a motor resists every joint all the time",
+        "a motor resists every joint",
         "nothing turns the servos off (model.replace(actuation=False)) and lets the arm fall",
     ),
     Mutant(
         "gains-doubled",
-        "the servos' kp is twice what the model says",
+        "servos pull twice as hard",
         "nothing looks at how far the arm sags under its own weight, or how hard a servo pulls",
     ),
     Mutant(
@@ -84,17 +84,17 @@ _ALL = (
     ),
     Mutant(
         "spin-in-world",
-        "a free body's spin in qvel is about world axes",
+        "a box spins about world axes",
         "nothing spins a box that is already turned, and asks about which axis it goes round",
     ),
     Mutant(
         "reset-keeps-ctrl",
-        "reset leaves the old command in ctrl",
+        "reset keeps the old ctrl",
         "nothing writes ctrl, resets, and looks at ctrl",
     ),
     Mutant(
         "no-replay",
-        "a hidden counter moves ctrl by a billionth",
+        "a hidden number moves ctrl",
         "nothing runs the same commands twice from the same start and asks for the same bits",
     ),
 )

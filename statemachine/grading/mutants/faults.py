@@ -6,6 +6,7 @@ the arm does; what the Model tells of itself (gravity, gains, friction) stays ri
 
 from __future__ import annotations
 
+import copy
 import importlib
 import random
 from collections.abc import Callable
@@ -19,7 +20,7 @@ import numpy as np
 from ...engines import require
 from ...errors import MissingEngineError
 from ...interface import Data
-from ...records import Array, JointType, read_only
+from ...records import INPUTS, Array, JointType, read_only
 from ...rotations import matrix_from_quat, xyzw_from_wxyz
 from . import BACKENDS
 
@@ -91,18 +92,32 @@ def advancing(instead: Instead) -> Fault:
 
 
 def misreading(into: Callable[[Data], None], back: Callable[[Data], None]) -> Fault:
-    """Inputs that the engine takes for other numbers: changed before each verb, and back after."""
+    """Inputs that the engine takes for other numbers: changed before each verb, and back after.
 
-    def instead(data: Data, right: Callable[..., None], *arguments: Any) -> None:
+    Rounding must not give it away: each step goes there and back, and forward gives back bits.
+    """
+
+    def stepping(data: Data, right: Callable[[int], None], nstep: int) -> None:
+        for _ in range(nstep):
+            into(data)
+            try:
+                right(1)
+            finally:
+                back(data)
+
+    def looking(data: Data, right: Callable[[], None]) -> None:
+        arrays = [getattr(data, name) for name in INPUTS]
+        kept = [array.copy() for array in arrays]
         into(data)
         try:
-            right(*arguments)
+            right()
         finally:
-            back(data)
+            for array, values in zip(arrays, kept, strict=True):
+                array[:] = values
 
     def fault(patch: Patcher) -> None:
-        advancing(instead)(patch)
-        hook("_recompute")(instead)(patch)
+        advancing(stepping)(patch)
+        hook("_recompute")(looking)(patch)
 
     return fault
 
@@ -131,10 +146,13 @@ def compiled(change: Callable[[Any], None], undo: Callable[[Any], None]) -> Faul
 
         return careful
 
+    def copied(right: Callable[..., Any]) -> Callable[..., Any]:
+        return lambda raw: copy.deepcopy(right(raw))  # of what are views of the model's memory
+
     def fault(patch: Patcher) -> None:
         for adapter in _adapters():
             patch.setattr(adapter, "compile_file", changing(adapter.compile_file))
-            patch.setattr(adapter, "facts", unharmed(adapter.facts))
+            patch.setattr(adapter, "facts", unharmed(copied(adapter.facts)))
             patch.setattr(adapter, "edited", changing(unharmed(adapter.edited)))
 
     return fault
@@ -221,7 +239,7 @@ def _turn_spin(data: Data, from_world: bool) -> None:
     model = data.model
     for joint in np.flatnonzero(model.jnt_type == JointType.FREE):
         quat = data.qpos[model.jnt_qposadr[joint] + 3 :][:4]
-        turn = matrix_from_quat(quat / np.linalg.norm(quat))
+        turn = matrix_from_quat(quat / (np.linalg.norm(quat) or 1.0))
         spin = data.qvel[model.jnt_dofadr[joint] + 3 :][:3]
         spin[:] = (turn.T if from_world else turn) @ spin
 

@@ -11,6 +11,7 @@ and `data` (a new one for each test). Without `--fault` the arm is healthy:
 from __future__ import annotations
 
 import json
+import os
 import traceback
 from collections.abc import Generator, Iterator
 from contextlib import closing
@@ -45,6 +46,7 @@ def pytest_configure(config: pytest.Config) -> None:
         FAULTS[name](pytest.MonkeyPatch())  # for the life of the process
     if path := config.getoption("record"):
         config.pluginmanager.register(Recorder(Path(path)))
+        os.chdir(Path(path).parent)  # what tests write does not end up beside them
 
 
 @pytest.fixture(scope="session")
@@ -80,8 +82,8 @@ class Recorder:
         self._file.write(json.dumps(facts) + "\n")
 
     @pytest.hookimpl(trylast=True)
-    def pytest_collection_finish(self, session: pytest.Session) -> None:
-        self._write(tests=[_name(item.nodeid) for item in session.items])
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        self._write(tests=[_name(item.nodeid) for item in items])
 
     def pytest_exception_interact(self, node: Any, call: Any, report: Any) -> None:
         if isinstance(report, pytest.CollectReport):
@@ -115,6 +117,8 @@ def _name(nodeid: str) -> str:
 def _said(error: BaseException, path: Path) -> str:
     """An error in one line, with the last line of the student's file that led to it."""
     text = next((line.strip() for line in str(error).splitlines() if line.strip()), "")
+    if isinstance(error, pytest.FixtureLookupError):
+        return f"there is no fixture {error.argname!r}; this command gives model, data and backend"
     if isinstance(error, SyntaxError):
         return f"line {error.lineno}: {error.msg}"
     if not isinstance(error, AssertionError | pytest.fail.Exception):

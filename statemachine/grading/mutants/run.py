@@ -53,7 +53,7 @@ class Examination:
     Attributes:
         file: Its name.
         backend, engine_version: What it ran on.
-        tests: Those that ran on the healthy arm.
+        tests: Those that are not skipped.
         failures: Those that failed there; then there are no trials.
         trials: One for each mutant.
     """
@@ -115,7 +115,7 @@ def examine(
     healthy = _run(path, backend, None, seconds)
     if healthy.broken:
         raise BadInputError(f"{path.name} cannot be imported: {healthy.broken}")
-    if not healthy.ran and not healthy.failures:
+    if not healthy.tests:
         reason = "each was skipped" if healthy.skipped else "a test is a function test_…"
         raise BadInputError(f"there are no tests in {path.name}: {reason}")
     trials: dict[str, Trial] = {}
@@ -135,7 +135,7 @@ def examine(
         file=path.name,
         backend=backend,
         engine_version=version,
-        tests=healthy.ran,
+        tests=healthy.tests,
         failures=healthy.failures,
         trials=tuple(trials[mutant.name] for mutant in mutants if trials),
     )
@@ -175,9 +175,9 @@ def _ready(backend: str) -> str:
 
 @dataclass(frozen=True)
 class _Record:
-    """What one run of pytest came to."""
+    """What one run of pytest came to; tests that were skipped are no tests."""
 
-    ran: tuple[str, ...]
+    tests: tuple[str, ...]
     skipped: int
     failures: tuple[Failure, ...]
     broken: str
@@ -190,13 +190,13 @@ def _run(path: Path, backend: str, fault: str | None, seconds: float) -> _Record
         settings, record = here / "pytest.ini", here / "record"
         settings.write_text("[pytest]\n", encoding="utf-8")
         record.touch()
-        command = [sys.executable, "-m", "pytest", "-c", str(settings), "--rootdir", folder]
+        # -P: what lies beside the file must not pass for a module of pytest's.
+        command = [sys.executable, "-P", "-m", "pytest", "-c", str(settings), "--rootdir", folder]
         command += ["--noconftest", "--tb=no", "-q", "-p", "no:cacheprovider"]
         command += ["-p", f"{__package__}.plugin", "--engine", backend, "--record", str(record)]
         command += ["--fault", fault] if fault else []
-        outcome = sandbox.run(
-            [*command, str(path)], seconds=seconds, cwd=folder, env=_environment()
-        )
+        command += [os.path.join(os.curdir, path.name)]  # brackets in a whole path confuse pytest
+        outcome = sandbox.run(command, seconds=seconds, cwd=path.parent, env=_environment())
         return _read(record, outcome, seconds)
 
 
@@ -234,13 +234,13 @@ def _read(record: Path, outcome: sandbox.Outcome, seconds: float) -> _Record:
                 ended.append(name)
             case {"broken": why}:
                 broken = why
-    if tests is None:
+    if broken or tests is None:
         broken = broken or f"it {_end(outcome, seconds)}"
         failures[_IMPORT] = broken
     elif len(ended) < len(tests):  # one ended them all
         failures.setdefault(running or tests[0], _end(outcome, seconds))
     return _Record(
-        ran=tuple(test for test in ended if test not in skipped),
+        tests=tuple(test for test in tests or () if test not in skipped),
         skipped=len(skipped),
         failures=tuple(Failure(test, why) for test, why in failures.items()),
         broken=broken,
