@@ -11,6 +11,10 @@ A test is a function test_…, as pytest takes it. It gets, if it asks for them:
     model    the arm on a floor, with a box (sm.load("so101/scene_box"))
     data     a new Data of it: zero pose, nothing derived yet
 
+    pytest -p statemachine.grading.mutants.plugin exercises/test_arm.py
+
+runs them on the healthy arm alone, and shows more of what fails.
+
 What to test against? Not what the arm gave you yesterday: what you know without it. A turn by
 90 degrees, a free fall, a circle about an axis, a weight on a spring, two runs that must agree.
 """

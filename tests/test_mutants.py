@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,8 @@ from rich.cells import cell_len
 
 import statemachine as sm
 from statemachine import cli as command_line
-from statemachine.errors import BadInputError
-from statemachine.grading.mutants import MUTANTS, run
+from statemachine.errors import BadInputError, EngineError
+from statemachine.grading.mutants import MUTANTS, Mutant, run
 from statemachine.grading.mutants.faults import FAULTS
 from statemachine.grading.mutants.run import Examination, Failure, Trial, examine
 from statemachine.page import Table
@@ -242,6 +243,22 @@ def test_a_file_that_is_no_test_file_is_refused(text: str, message: str, write: 
     with pytest.raises(BadInputError, match=message) as caught:
         examine(write(text), seconds=2 if "sleep" in text else 60)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+def test_a_forgotten_fork_takes_no_part(write: Write) -> None:
+    text = "import os\ndef test_a(): assert os.fork() >= 0\ndef test_b(): assert False, 'no'\n"
+    found = examine(write(text), only=["xyzw"])
+    assert found.failures == (Failure("test_b", "line 3: no"),)
+
+
+def test_a_fault_that_cannot_be_put_in_is_not_caught(
+    write: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write("def test_x(): pass")
+    monkeypatch.setitem(MUTANTS, "unheard-of", Mutant("unheard-of", "", ""))
+    with pytest.raises(EngineError, match=r"before the tests: .*unheard-of"):
+        examine(path, only=["unheard-of"])
 
 
 def test_another_pytests_settings_do_not_disturb(

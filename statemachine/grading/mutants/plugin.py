@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from statemachine import Data, Model
 
 SCENE = "so101/scene_box"
+_LONGEST = 300  # characters of what an error says
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -71,15 +72,19 @@ def data(model: Model) -> Iterator[Data]:
 class Recorder:
     """Writes down what was found, what began and how it ended.
 
-    Lines: {"tests": names}, {"began": name}, {"failed": name, "why": …}, {"skipped": name},
-    {"ended": name}, {"broken": why} for a file that cannot be imported.
+    Lines: {"ready": true} once the fault is in, {"tests": names}, {"began": name},
+    {"failed": name, "why": …}, {"skipped": name}, {"ended": name}, and {"broken": why} for a
+    file that cannot be imported.
     """
 
     def __init__(self, path: Path) -> None:
         self._file = path.open("a", encoding="utf-8", buffering=1)
+        self._process = os.getpid()
+        self._write(ready=True)
 
     def _write(self, **facts: Any) -> None:
-        self._file.write(json.dumps(facts) + "\n")
+        if os.getpid() == self._process:  # not a fork of it that a test forgot to end
+            self._file.write(json.dumps(facts) + "\n")
 
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
@@ -116,7 +121,7 @@ def _name(nodeid: str) -> str:
 
 def _said(error: BaseException, path: Path) -> str:
     """An error in one line, with the last line of the student's file that led to it."""
-    text = next((line.strip() for line in str(error).splitlines() if line.strip()), "")
+    text = next((line.strip() for line in str(error).splitlines() if line.strip()), "")[:_LONGEST]
     if isinstance(error, pytest.FixtureLookupError):
         return f"there is no fixture {error.argname!r}; this command gives model, data and backend"
     if isinstance(error, SyntaxError):

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from ...backends import backend_names
 from ...engines import engine_version, require
-from ...errors import BadInputError, MissingEngineError, ModelFileError, unknown_name
+from ...errors import BadInputError, EngineError, MissingEngineError, ModelFileError, unknown_name
 from .. import sandbox
 from . import BACKENDS, MUTANTS, Mutant
 
@@ -54,7 +54,7 @@ class Examination:
         file: Its name.
         backend, engine_version: What it ran on.
         tests: Those that are not skipped.
-        failures: Those that failed there; then there are no trials.
+        failures: Those that failed on the healthy arm; then there are no trials.
         trials: One for each mutant.
     """
 
@@ -108,9 +108,10 @@ def examine(
         BadInputError: It cannot be imported, or there are no tests in it.
         UnknownNameError: There is no such mutant or backend.
         MissingEngineError: The engine, or pytest, is not here.
+        EngineError: pytest did not come as far as the tests.
     """
     path = _test_file(file)
-    mutants = [_mutant(name) for name in only or MUTANTS]
+    mutants = [_mutant(name) for name in dict.fromkeys(only or MUTANTS)]
     version = _ready(backend)
     healthy = _run(path, backend, None, seconds)
     if healthy.broken:
@@ -185,7 +186,7 @@ class _Record:
 
 
 def _run(path: Path, backend: str, fault: str | None, seconds: float) -> _Record:
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         here = Path(folder)
         settings, record = here / "pytest.ini", here / "record"
         settings.write_text("[pytest]\n", encoding="utf-8")
@@ -216,12 +217,15 @@ def _environment() -> dict[str, str]:
 
 def _read(record: Path, outcome: sandbox.Outcome, seconds: float) -> _Record:
     tests: list[str] | None = None
+    ready = False
     running, broken = "", ""
     ended: list[str] = []
     skipped: set[str] = set()
     failures: dict[str, str] = {}
     for line in record.read_text(encoding="utf-8").splitlines():
         match json.loads(line):
+            case {"ready": _}:
+                ready = True
             case {"tests": names}:
                 tests = names
             case {"began": name}:
@@ -234,6 +238,10 @@ def _read(record: Path, outcome: sandbox.Outcome, seconds: float) -> _Record:
                 ended.append(name)
             case {"broken": why}:
                 broken = why
+    if not ready:  # of which no test can be the reason
+        lines = outcome.stderr.strip().splitlines()
+        said = [line for line in lines if "rror" in line] or lines or ["it said nothing"]
+        raise EngineError(f"pytest {_end(outcome, seconds)} before the tests: {said[-1]}")
     if broken or tests is None:
         broken = broken or f"it {_end(outcome, seconds)}"
         failures[_IMPORT] = broken
