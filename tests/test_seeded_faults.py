@@ -1,13 +1,15 @@
 """A check that cannot fail is a defect: each fault here is caught by the checks it names.
 
 The faults are put into the MuJoCo backend, one at a time, as a third-party backend that
-is registered under the name "faulty".
+is registered under the name "faulty". Those that students' tests have to catch too come from
+`statemachine.grading.mutants`.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -17,6 +19,7 @@ import pytest
 from statemachine import conformance
 from statemachine.backends import _mjcf, mujoco_backend
 from statemachine.backends.mujoco_backend import MujocoData, MujocoModel
+from statemachine.grading.mutants import faults as mutants
 from statemachine.interface import Model
 from statemachine.records import DERIVED, State
 
@@ -47,30 +50,6 @@ def replaced(owner: type, name: str) -> Callable[[Callable[..., Any]], Patch]:
         return apply
 
     return decorate
-
-
-@replaced(MujocoData, "xquat")
-def xyzw_for_wxyz(self: MujocoData, right: Callable[[], np.ndarray]) -> np.ndarray:
-    turned = np.roll(right(), -1, axis=1)
-    turned.setflags(write=False)
-    return turned
-
-
-@replaced(MujocoData, "xpos")
-def centre_of_mass_for_frame(self: MujocoData, right: Callable[[], np.ndarray]) -> np.ndarray:
-    centres = self.raw.xipos.copy()
-    centres.setflags(write=False)
-    return centres
-
-
-@replaced(MujocoData, "_recompute")
-def forward_does_nothing(self: MujocoData, right: Callable[[], None]) -> None:
-    pass
-
-
-@replaced(MujocoData, "_recompute")
-def forward_takes_a_step(self: MujocoData, right: Callable[[], None]) -> None:
-    mujoco.mj_step(self._home.raw, self.raw)
 
 
 @replaced(MujocoData, "site_xpos")
@@ -132,103 +111,11 @@ def contact_normal_the_other_way(self: MujocoData, right: Callable[[], Any]) -> 
     return dataclasses.replace(found, geom=found.geom[:, ::-1].copy())
 
 
-def advance_with(change: Callable[[Any, Any], None]) -> Patch:
-    """A fault that does something to the raw data before every step."""
-
-    def apply(monkeypatch: pytest.MonkeyPatch) -> None:
-        right = mujoco_backend._transition
-
-        def transition(model: MujocoModel, raw: Any) -> Callable[..., None]:
-            advance = right(model, raw)
-
-            def faulty(nstep: int = 1) -> None:
-                for _ in range(nstep):
-                    change(model.raw, raw)
-                    advance(1)
-
-            return faulty
-
-        monkeypatch.setattr(mujoco_backend, "_transition", transition)
-
-    return apply
+def _damp_bodies(raw: Any, by: float) -> None:
+    raw.dof_damping[6:] = by
 
 
-def _motor(model: Any, data: Any) -> None:
-    # A velocity motor of the kind that another engine leaves in every joint.
-    data.qfrc_applied[:6] = np.clip(-200 * data.qvel[:6], -1, 1)
-
-
-default_motor_left_on = advance_with(_motor)
-
-
-def bulk_is_one_short(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = mujoco_backend._transition
-
-    def transition(model: MujocoModel, raw: Any) -> Callable[..., None]:
-        advance = right(model, raw)
-        return lambda nstep=1: advance(max(1, nstep - 1))
-
-    monkeypatch.setattr(mujoco_backend, "_transition", transition)
-
-
-def step_ends_with_forward(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = mujoco_backend._transition
-
-    def transition(model: MujocoModel, raw: Any) -> Callable[..., None]:
-        advance = right(model, raw)
-
-        def faulty(nstep: int = 1) -> None:
-            advance(nstep)
-            mujoco.mj_forward(model.raw, raw)
-
-        return faulty
-
-    monkeypatch.setattr(mujoco_backend, "_transition", transition)
-
-
-def compiled(change: Callable[[Any], None]) -> Patch:
-    """A fault in the compiled model."""
-
-    def apply(monkeypatch: pytest.MonkeyPatch) -> None:
-        right = MujocoModel.__init__
-
-        def faulty(self: MujocoModel, raw: Any, *rest: Any, **named: Any) -> None:
-            change(raw)
-            right(self, raw, *rest, **named)
-
-        monkeypatch.setattr(MujocoModel, "__init__", faulty)
-
-    return apply
-
-
-def _gravity_up(raw: Any) -> None:
-    raw.opt.gravity[2] = abs(raw.opt.gravity[2])
-
-
-def _gains_doubled(raw: Any) -> None:
-    raw.actuator_gainprm[:, 0] *= 2
-    raw.actuator_biasprm[:, 1] *= 2
-
-
-def _body_damping(raw: Any) -> None:
-    raw.dof_damping[6:] = 0.4
-
-
-gravity_sign = compiled(_gravity_up)
-gains_doubled = compiled(_gains_doubled)
-free_body_damped = compiled(_body_damping)
-
-
-def joints_shifted(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = Model.__init__
-
-    def faulty(self: Model, **facts: Any) -> None:
-        if "joint_names" in facts:
-            names = facts["joint_names"]
-            facts["joint_names"] = (*names[1:6], names[0], *names[6:])
-        right(self, **facts)
-
-    monkeypatch.setattr(Model, "__init__", faulty)
+free_body_damped = mutants.compiled(partial(_damp_bodies, by=0.4), partial(_damp_bodies, by=0))
 
 
 def options_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -296,13 +183,13 @@ def facts_with(part: str, change: Callable[[np.ndarray], np.ndarray]) -> Patch:
 
 
 FAULTS: dict[str, tuple[Patch, set[str]]] = {
-    "xyzw for wxyz": (xyzw_for_wxyz, {"xquat_is_wxyz", "the_witness_agrees"}),
-    "centre of mass for frame": (centre_of_mass_for_frame, {"the_witness_agrees"}),
-    "forward omitted": (forward_does_nothing, {"a_write_marks_nothing_dirty"}),
-    "forward takes a step": (forward_takes_a_step, {"forward_changes_no_input"}),
+    "xyzw for wxyz": (mutants.xyzw, {"xquat_is_wxyz", "the_witness_agrees"}),
+    "centre of mass for frame": (mutants.com_for_frame, {"the_witness_agrees"}),
+    "forward omitted": (mutants.no_forward, {"a_write_marks_nothing_dirty"}),
+    "forward takes a step": (mutants.forward_steps, {"forward_changes_no_input"}),
     "a read recomputes": (a_read_recomputes, {"a_write_marks_nothing_dirty"}),
     "step ends with forward": (
-        step_ends_with_forward,
+        mutants.step_and_forward,
         {"a_step_leaves_values_of_the_state_before"},
     ),
     "reset keeps the time": (reset_keeps_the_time, {"time_passes_only_in_step"}),
@@ -322,12 +209,16 @@ FAULTS: dict[str, tuple[Patch, set[str]]] = {
         contact_normal_the_other_way,
         {"contact_carries_the_weight"},
     ),
-    "default motor left on": (default_motor_left_on, {"options_do_what_they_say"}),
-    "bulk is one short": (bulk_is_one_short, {"steps_add_up", "time_passes_only_in_step"}),
-    "gravity sign": (gravity_sign, {"free_fall"}),
-    "gains doubled": (gains_doubled, {"untouched_ctrl_is_a_command"}),
+    "default motor left on": (mutants.motor_left_on, {"options_do_what_they_say"}),
+    "bulk is one short": (mutants.one_step_short, {"steps_add_up"}),
+    "gravity sign": (mutants.gravity_up, {"free_fall"}),
+    "gains doubled": (mutants.gains_doubled, {"untouched_ctrl_is_a_command"}),
+    "degrees": (mutants.degrees, {"the_witness_agrees", "the_servo_law"}),
+    "spin in world axes": (mutants.spin_in_world, {"free_body_velocity_conventions"}),
+    "reset keeps ctrl": (mutants.reset_keeps_ctrl, {"keyframes_are_taken_whole"}),
+    "no replay": (mutants.no_replay, {"replay_is_bit_identical"}),
     "free body damped": (free_body_damped, {"free_body_velocity_conventions"}),
-    "joints shifted": (joints_shifted, {"the_witness_agrees"}),
+    "joints shifted": (mutants.joints_shifted, {"the_witness_agrees"}),
     "options ignored": (options_ignored, {"options_do_what_they_say"}),
     "replace works in place": (replace_in_place, {"options_do_what_they_say"}),
     "inputs are new arrays": (fresh_arrays_each_time, {"inputs_are_the_same_arrays_for_life"}),

@@ -49,7 +49,7 @@ limp = model.replace(actuation=False)  # another Model: servos off
 slot = model.jnt_qposadr[model.joint_id({options["joint"]!r})]
 for each in (model, limp):
     data = sm.make_data(each)
-    for second in range(4):
+    for _ in range(4):
         sm.step(each, data, round(1 / each.timestep))
         print(np.degrees(data.qpos[slot]).round(3), end="  ")
     print()

@@ -1,0 +1,103 @@
+"""Mutants: the arm with one seeded fault at a time, to test a student's tests.
+
+A test that no wrong arm fails says nothing about the right one. `faults` puts a fault into a
+running process, `plugin` does it inside pytest, `run` starts pytest once for each fault.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One fault, as it is told.
+
+    Attributes:
+        name: What `--only` takes; its fault is `faults.FAULTS[name]`.
+        wrong: What is wrong, in a few words.
+        hint: What nobody looked at, where it survives.
+    """
+
+    name: str
+    wrong: str
+    hint: str
+
+
+# From what is read, over what forward and step do, to what a replay is worth.
+_ALL = (
+    Mutant(
+        "xyzw",
+        "quaternions read x y z w",
+        "nothing compares a quaternion with a turn that you know by hand",
+    ),
+    Mutant(
+        "com-for-frame",
+        "xpos is the centre of mass",
+        "nothing compares xpos of a link with a place from the model's file, or asks whether "
+        "turning a joint leaves the origin of its own link where it is",
+    ),
+    Mutant(
+        "joints-shifted",
+        "numbers go to the next joint",
+        "nothing turns one joint and asks whether the fingertip moves as that joint moves it",
+    ),
+    Mutant(
+        "degrees",
+        "angles are taken for degrees",
+        "nothing writes a known angle into qpos and measures how far the arm turned",
+    ),
+    Mutant(
+        "no-forward",
+        "forward does nothing",
+        "nothing writes qpos, calls forward, and asks whether the fingertip followed",
+    ),
+    Mutant(
+        "forward-steps",
+        "forward takes a step",
+        "nothing asks whether forward leaves time, qpos and qvel as they were",
+    ),
+    Mutant(
+        "step-and-forward",
+        "step ends with a forward",
+        "nothing asks to which moment the fingertip belongs that is read right after a step",
+    ),
+    Mutant(
+        "one-step-short",
+        "step(…, n) takes n − 1 steps",
+        "nothing compares one call of n steps with n calls of one; the clock alone does not tell",
+    ),
+    Mutant(
+        "motor-left-on",
+        "a motor resists every joint",
+        "nothing turns the servos off (model.replace(actuation=False)) and lets the arm fall",
+    ),
+    Mutant(
+        "gains-doubled",
+        "servos pull twice as hard",
+        "nothing looks at how far the arm sags under its own weight, or how hard a servo pulls",
+    ),
+    Mutant(
+        "gravity-up",
+        "gravity points up",
+        "nothing lets something fall and asks where it went",
+    ),
+    Mutant(
+        "spin-in-world",
+        "a box spins about world axes",
+        "nothing spins a box that is already turned, and asks about which axis it goes round",
+    ),
+    Mutant(
+        "reset-keeps-ctrl",
+        "reset keeps the old ctrl",
+        "nothing writes ctrl, resets, and looks at ctrl",
+    ),
+    Mutant(
+        "no-replay",
+        "a hidden number moves ctrl",
+        "nothing runs the same commands twice from the same start and asks for the same bits",
+    ),
+)
+MUTANTS = {mutant.name: mutant for mutant in _ALL}
+# Those whose adapters the faults are made for.
+BACKENDS = ("mujoco", "pybullet")

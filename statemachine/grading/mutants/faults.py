@@ -1,0 +1,287 @@
+"""The faults themselves: patches on the contract's own classes, so that each holds on every engine.
+
+A fault is a function that takes a patcher, such as pytest's MonkeyPatch. What is wrong is what
+the arm does; what the Model tells of itself (gravity, gains, friction) stays right.
+"""
+
+from __future__ import annotations
+
+import copy
+import importlib
+import random
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from types import ModuleType
+from typing import Any, Protocol
+
+import numpy as np
+
+from ...engines import require
+from ...errors import MissingEngineError
+from ...interface import Data
+from ...records import INPUTS, Array, JointType, read_only
+from ...rotations import matrix_from_quat, xyzw_from_wxyz
+from . import BACKENDS
+
+
+class Patcher(Protocol):
+    """What puts one attribute in the place of another."""
+
+    def setattr(self, target: object, name: str, value: object) -> None:
+        """Replace an attribute."""
+
+
+Fault = Callable[[Patcher], None]
+# (data, the right function, its arguments); what a fault does in its place.
+Instead = Callable[..., Any]
+
+
+def _adapters() -> list[ModuleType]:
+    """The modules of the backends whose engine is here."""
+    found = []
+    for name in BACKENDS:
+        with suppress(MissingEngineError):
+            require(name)
+            found.append(importlib.import_module(f"statemachine.backends.{name}_backend"))
+    return found
+
+
+def reading(name: str) -> Callable[[Callable[[Data, Array], Array]], Fault]:
+    """A fault in a derived array as it is read."""
+
+    def decorate(function: Callable[[Data, Array], Array]) -> Fault:
+        def fault(patch: Patcher) -> None:
+            right = vars(Data)[name].fget
+            patch.setattr(Data, name, property(lambda data: read_only(function(data, right(data)))))
+
+        return fault
+
+    return decorate
+
+
+def hook(name: str) -> Callable[[Instead], Fault]:
+    """A fault in what the backends do for a verb."""
+
+    def decorate(instead: Instead) -> Fault:
+        def replacement(right: Callable[..., Any]) -> Callable[..., Any]:
+            return lambda data, *arguments: instead(data, partial(right, data), *arguments)
+
+        def fault(patch: Patcher) -> None:
+            _adapters()  # they define the kinds of Data
+            for kind in Data.__subclasses__():
+                patch.setattr(kind, name, replacement(vars(kind)[name]))
+
+        return fault
+
+    return decorate
+
+
+def advancing(instead: Instead) -> Fault:
+    """A fault in the engine's step, called with a number of steps."""
+
+    def fault(patch: Patcher) -> None:
+        right = Data.__init__
+
+        def init(self: Data, model: Any, advance: Any, alarms: Any, inputs: Any) -> None:
+            right(self, model, lambda nstep=1: instead(self, advance, nstep), alarms, inputs)
+
+        patch.setattr(Data, "__init__", init)
+
+    return fault
+
+
+def misreading(into: Callable[[Data], None], back: Callable[[Data], None]) -> Fault:
+    """Inputs that the engine takes for other numbers: changed before each verb, and back after.
+
+    Rounding must not give it away: each step goes there and back, and forward gives back bits.
+    """
+
+    def stepping(data: Data, right: Callable[[int], None], nstep: int) -> None:
+        for _ in range(nstep):
+            into(data)
+            try:
+                right(1)
+            finally:
+                back(data)
+
+    def looking(data: Data, right: Callable[[], None]) -> None:
+        arrays = [getattr(data, name) for name in INPUTS]
+        kept = [array.copy() for array in arrays]
+        into(data)
+        try:
+            right()
+        finally:
+            for array, values in zip(arrays, kept, strict=True):
+                array[:] = values
+
+    def fault(patch: Patcher) -> None:
+        advancing(stepping)(patch)
+        hook("_recompute")(looking)(patch)
+
+    return fault
+
+
+def compiled(change: Callable[[Any], None], undo: Callable[[Any], None]) -> Fault:
+    """A fault in the compiled model, and in all that `replace` makes of it.
+
+    It is taken out while the facts of the Model are read, so that these do not give it away.
+    """
+
+    def changing(right: Callable[..., Any]) -> Callable[..., Any]:
+        def faulty(*arguments: Any) -> Any:
+            raw = right(*arguments)
+            change(raw)
+            return raw
+
+        return faulty
+
+    def unharmed(right: Callable[..., Any]) -> Callable[..., Any]:
+        def careful(raw: Any, *arguments: Any) -> Any:
+            undo(raw)
+            try:
+                return right(raw, *arguments)
+            finally:
+                change(raw)
+
+        return careful
+
+    def copied(right: Callable[..., Any]) -> Callable[..., Any]:
+        return lambda raw: copy.deepcopy(right(raw))  # of what are views of the model's memory
+
+    def fault(patch: Patcher) -> None:
+        for adapter in _adapters():
+            patch.setattr(adapter, "compile_file", changing(adapter.compile_file))
+            patch.setattr(adapter, "facts", unharmed(copied(adapter.facts)))
+            patch.setattr(adapter, "edited", changing(unharmed(adapter.edited)))
+
+    return fault
+
+
+@reading("xquat")
+def xyzw(_data: Data, right: Array) -> Array:
+    """The order of another engine."""
+    return xyzw_from_wxyz(right)
+
+
+@reading("xpos")
+def com_for_frame(data: Data, right: Array) -> Array:
+    """The place that another engine reports for a link."""
+    model: Any = data.model
+    raw = model._shared.raw if data.model.backend == "pybullet" else model.raw
+    return right + np.einsum("bij,bj->bi", matrix_from_quat(data.xquat), raw.body_ipos)
+
+
+@hook("_recompute")
+def no_forward(_data: Data, _right: Callable[[], None]) -> None:
+    """Nobody does the arithmetic."""
+
+
+@hook("_recompute")
+def forward_steps(data: Data, _right: Callable[[], None]) -> None:
+    """Step, where nothing but the derived values should change."""
+    data._advance()
+
+
+@hook("_reset")
+def reset_keeps_ctrl(data: Data, right: Callable[[int | None], None], key: int | None) -> None:
+    """A default ctrl is a command too, and is forgotten."""
+    ctrl = data.ctrl.copy()
+    right(key)
+    data.ctrl[:] = ctrl
+
+
+@advancing
+def step_and_forward(data: Data, right: Callable[[int], None], nstep: int) -> None:
+    """Derived values that are never those of the state before."""
+    right(nstep)
+    data._recompute()
+
+
+@advancing
+def one_step_short(data: Data, right: Callable[[int], None], nstep: int) -> None:
+    """A loop with the wrong end, and a clock that is set by multiplication."""
+    time = data.time
+    right(max(1, nstep - 1))
+    data._set_time(time + nstep * data.model.timestep)
+
+
+_hidden = random.Random(1)  # outside of every State
+
+
+@advancing
+def no_replay(data: Data, right: Callable[[int], None], nstep: int) -> None:
+    """Something that decides the future and is no part of the State."""
+    ctrl = data.ctrl.copy()
+    data.ctrl[:] += 1e-9 * _hidden.random()
+    try:
+        right(nstep)
+    finally:
+        data.ctrl[:] = ctrl
+
+
+def _shift(data: Data, by: int) -> None:
+    """Roll what belongs to hinges and slides, and the commands."""
+    model = data.model
+    scalar = model.jnt_type >= JointType.SLIDE
+    for array, places in ((data.qpos, model.jnt_qposadr), (data.qvel, model.jnt_dofadr)):
+        array[places[scalar]] = np.roll(array[places[scalar]], by)
+    data.ctrl[:] = np.roll(data.ctrl, by)
+
+
+def _scale_angles(data: Data, by: float) -> None:
+    model = data.model
+    data.qpos[model.jnt_qposadr[model.jnt_type == JointType.HINGE]] *= by
+
+
+def _turn_spin(data: Data, from_world: bool) -> None:
+    """Between world axes and body axes, by the orientation of the moment."""
+    model = data.model
+    for joint in np.flatnonzero(model.jnt_type == JointType.FREE):
+        quat = data.qpos[model.jnt_qposadr[joint] + 3 :][:4]
+        turn = matrix_from_quat(quat / (np.linalg.norm(quat) or 1.0))
+        spin = data.qvel[model.jnt_dofadr[joint] + 3 :][:3]
+        spin[:] = (turn.T if from_world else turn) @ spin
+
+
+def _turn_gravity(raw: Any) -> None:
+    raw.opt.gravity[:] = -raw.opt.gravity
+
+
+def _scale_gains(raw: Any, by: float) -> None:
+    raw.actuator_gainprm[:, 0] *= by
+    raw.actuator_biasprm[:, 1] *= by
+
+
+def _scale_friction(raw: Any, by: float) -> None:
+    raw.dof_frictionloss[:] *= by
+
+
+joints_shifted = misreading(partial(_shift, by=1), partial(_shift, by=-1))
+degrees = misreading(partial(_scale_angles, by=np.pi / 180), partial(_scale_angles, by=180 / np.pi))
+spin_in_world = misreading(
+    partial(_turn_spin, from_world=True), partial(_turn_spin, from_world=False)
+)
+gravity_up = compiled(_turn_gravity, _turn_gravity)
+# By powers of two, so that undoing it gives back the same bits.
+gains_doubled = compiled(partial(_scale_gains, by=2), partial(_scale_gains, by=1 / 2))
+# A motor that aims at velocity 0 with a limited torque is dry friction: here 0.83 N·m a joint
+# of the SO-101, more than its weight and less than its servos.
+motor_left_on = compiled(partial(_scale_friction, by=16), partial(_scale_friction, by=1 / 16))
+
+FAULTS: dict[str, Fault] = {
+    "xyzw": xyzw,
+    "com-for-frame": com_for_frame,
+    "joints-shifted": joints_shifted,
+    "degrees": degrees,
+    "no-forward": no_forward,
+    "forward-steps": forward_steps,
+    "step-and-forward": step_and_forward,
+    "one-step-short": one_step_short,
+    "motor-left-on": motor_left_on,
+    "gains-doubled": gains_doubled,
+    "gravity-up": gravity_up,
+    "spin-in-world": spin_in_world,
+    "reset-keeps-ctrl": reset_keeps_ctrl,
+    "no-replay": no_replay,
+}

@@ -1,0 +1,267 @@
+"""A test file against the healthy arm, then against every mutant, each in a process of its own."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...backends import backend_names
+from ...engines import engine_version, require
+from ...errors import BadInputError, EngineError, MissingEngineError, ModelFileError, unknown_name
+from .. import sandbox
+from . import BACKENDS, MUTANTS, Mutant
+
+_SECONDS = 60.0  # for the tests on the healthy arm
+# Under a fault they may take longer, and the machine may be busy with others.
+_TIMES, _AND = 5.0, 15.0
+_IMPORT = "the import of the file"
+_OWN = ("PYTEST_ADDOPTS", "PYTEST_PLUGINS", "PYTEST_DEBUG")  # settings of another pytest
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A test that did not pass, and what it said in one line."""
+
+    test: str
+    why: str
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A mutant, and the tests that caught it."""
+
+    mutant: Mutant
+    caught_by: tuple[Failure, ...]
+
+    @property
+    def caught(self) -> bool:
+        """Whether any test did."""
+        return bool(self.caught_by)
+
+
+@dataclass(frozen=True)
+class Examination:
+    """What a test file is worth.
+
+    Attributes:
+        file: Its name.
+        backend, engine_version: What it ran on.
+        tests: Those that are not skipped.
+        failures: Those that failed on the healthy arm; then there are no trials.
+        trials: One for each mutant.
+    """
+
+    file: str
+    backend: str
+    engine_version: str
+    tests: tuple[str, ...]
+    failures: tuple[Failure, ...]
+    trials: tuple[Trial, ...]
+
+    @property
+    def caught(self) -> int:
+        """How many mutants were caught."""
+        return sum(trial.caught for trial in self.trials)
+
+    @property
+    def survivors(self) -> tuple[Mutant, ...]:
+        """The mutants that no test caught."""
+        return tuple(trial.mutant for trial in self.trials if not trial.caught)
+
+    @property
+    def idle(self) -> tuple[str, ...]:
+        """Tests that caught no mutant."""
+        busy = {failure.test for trial in self.trials for failure in trial.caught_by}
+        return tuple(test for test in self.tests if test not in busy)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the tests pass on the healthy arm and catch all mutants."""
+        return not self.failures and not self.survivors
+
+
+def examine(
+    file: str | os.PathLike[str],
+    backend: str = "mujoco",
+    only: Sequence[str] = (),
+    seconds: float = _SECONDS,
+    progress: Callable[[float], None] = lambda _fraction: None,
+) -> Examination:
+    """Run a student's tests on the healthy arm and on every mutant.
+
+    Args:
+        file: Tests as pytest takes them.
+        backend: What the fixture `model` is loaded on.
+        only: Names of mutants; none for all.
+        seconds: What the tests may take on the healthy arm.
+        progress: Told the fraction that is done.
+
+    Raises:
+        ModelFileError: There is no such file.
+        BadInputError: It cannot be imported, or there are no tests in it.
+        UnknownNameError: There is no such mutant or backend.
+        MissingEngineError: The engine, or pytest, is not here.
+        EngineError: pytest did not come as far as the tests.
+    """
+    path = _test_file(file)
+    mutants = [_mutant(name) for name in dict.fromkeys(only or MUTANTS)]
+    version = _ready(backend)
+    healthy = _run(path, backend, None, seconds)
+    if healthy.broken:
+        raise BadInputError(f"{path.name} cannot be imported: {healthy.broken}")
+    if not healthy.tests:
+        reason = "each was skipped" if healthy.skipped else "a test is a function test_…"
+        raise BadInputError(f"there are no tests in {path.name}: {reason}")
+    trials: dict[str, Trial] = {}
+    if not healthy.failures:
+        progress(1 / (len(mutants) + 1))
+        patience = _TIMES * healthy.wall + _AND
+        pool = ThreadPoolExecutor(os.cpu_count() or 1)
+        try:
+            running = {pool.submit(_run, path, backend, m.name, patience): m for m in mutants}
+            for done in as_completed(running):
+                mutant = running[done]
+                trials[mutant.name] = Trial(mutant, done.result().failures)
+                progress((len(trials) + 1) / (len(mutants) + 1))
+        finally:  # those that have not begun, after an interrupt, never will
+            pool.shutdown(cancel_futures=True)
+    return Examination(
+        file=path.name,
+        backend=backend,
+        engine_version=version,
+        tests=healthy.tests,
+        failures=healthy.failures,
+        trials=tuple(trials[mutant.name] for mutant in mutants if trials),
+    )
+
+
+def _test_file(file: str | os.PathLike[str]) -> Path:
+    path = Path(file).absolute()
+    if not path.is_file():
+        raise ModelFileError(f"no file {os.fspath(file)}: --mutants takes a file of tests")
+    if path.suffix != ".py":
+        raise BadInputError(f"{path.name} is no Python file: --mutants takes a file of tests")
+    return path
+
+
+def _mutant(name: str) -> Mutant:
+    if name not in MUTANTS:
+        raise unknown_name("mutant", name, MUTANTS)
+    return MUTANTS[name]
+
+
+def _ready(backend: str) -> str:
+    """The version of the backend's engine; raises where the tests could not even begin."""
+    if backend not in backend_names():
+        raise unknown_name("backend", backend, BACKENDS)
+    if backend not in BACKENDS:
+        raise BadInputError(
+            f"the faults are made for {' and '.join(BACKENDS)}, not for backend {backend!r}"
+        )
+    require(backend)
+    if importlib.util.find_spec("pytest") is None:
+        raise MissingEngineError(
+            "pytest is not installed here: pip install 'statemachine-sim[mutants]'",
+            engine="pytest",
+        )
+    return engine_version(backend)
+
+
+@dataclass(frozen=True)
+class _Record:
+    """What one run of pytest came to; tests that were skipped are no tests."""
+
+    tests: tuple[str, ...]
+    skipped: int
+    failures: tuple[Failure, ...]
+    broken: str
+    wall: float
+
+
+def _run(path: Path, backend: str, fault: str | None, seconds: float) -> _Record:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        here = Path(folder)
+        settings, record = here / "pytest.ini", here / "record"
+        settings.write_text("[pytest]\n", encoding="utf-8")
+        record.touch()
+        # -P: what lies beside the file must not pass for a module of pytest's.
+        command = [sys.executable, "-P", "-m", "pytest", "-c", str(settings), "--rootdir", folder]
+        command += ["--noconftest", "--tb=no", "-q", "-p", "no:cacheprovider"]
+        command += ["-p", f"{__package__}.plugin", "--engine", backend, "--record", str(record)]
+        command += ["--fault", fault] if fault else []
+        command += [os.path.join(os.curdir, path.name)]  # brackets in a whole path confuse pytest
+        outcome = sandbox.run(command, seconds=seconds, cwd=path.parent, env=_environment())
+        return _read(record, outcome, seconds)
+
+
+def _environment() -> dict[str, str]:
+    """Ours, without what is meant for another pytest, and with this package to be found."""
+    env = {name: value for name, value in os.environ.items() if name not in _OWN}
+    home = str(Path(__file__).parents[3])
+    paths = [home, *filter(None, [env.get("PYTHONPATH")])]
+    return {
+        **env,
+        "PYTHONPATH": os.pathsep.join(paths),
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "PYTHONUTF8": "1",
+        "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
+    }
+
+
+def _read(record: Path, outcome: sandbox.Outcome, seconds: float) -> _Record:
+    tests: list[str] | None = None
+    ready = False
+    running, broken = "", ""
+    ended: list[str] = []
+    skipped: set[str] = set()
+    failures: dict[str, str] = {}
+    for line in record.read_text(encoding="utf-8").splitlines():
+        match json.loads(line):
+            case {"ready": _}:
+                ready = True
+            case {"tests": names}:
+                tests = names
+            case {"began": name}:
+                running = name
+            case {"failed": name, "why": why}:
+                failures.setdefault(name, why)  # the test itself, before its teardown
+            case {"skipped": name}:
+                skipped.add(name)
+            case {"ended": name}:
+                ended.append(name)
+            case {"broken": why}:
+                broken = why
+    if not ready:  # of which no test can be the reason
+        lines = outcome.stderr.strip().splitlines()
+        said = [line for line in lines if "rror" in line] or lines or ["it said nothing"]
+        raise EngineError(f"pytest {_end(outcome, seconds)} before the tests: {said[-1]}")
+    if broken or tests is None:
+        broken = broken or f"it {_end(outcome, seconds)}"
+        failures[_IMPORT] = broken
+    elif len(ended) < len(tests):  # one ended them all
+        failures.setdefault(running or tests[0], _end(outcome, seconds))
+    return _Record(
+        tests=tuple(test for test in tests or () if test not in skipped),
+        skipped=len(skipped),
+        failures=tuple(Failure(test, why) for test, why in failures.items()),
+        broken=broken,
+        wall=outcome.wall,
+    )
+
+
+def _end(outcome: sandbox.Outcome, seconds: float) -> str:
+    """How a run ended that did not come to its end."""
+    if outcome.timed_out:
+        return f"took longer than {seconds:.0f} s"
+    if outcome.out_of_memory:
+        return "took more memory than it may"
+    if outcome.signal is not None:
+        return f"ended the process by signal {outcome.signal}"
+    return f"ended the process with code {outcome.returncode}"

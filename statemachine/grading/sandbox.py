@@ -1,0 +1,232 @@
+"""Run a command that may loop, crash, flood or leave processes behind, and come back from it.
+
+It guards against what goes wrong, not against an attacker: the command has the rights of
+whoever runs it, and nothing here bounds how many processes it may start. On POSIX it gets a session and limits of its own; on Linux processes that left
+the session are found too. On Windows only the process itself is ended.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import secrets
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+GB = 1024**3
+# Address space, of which engines reserve far more than they use.
+MEMORY_MOST = 4 * GB
+_FILE_MOST = GB // 4
+_TOKEN = "STATEMACHINE_SANDBOX"
+_PATIENCE = 2.0  # seconds to end what a command left behind
+_CHUNK = 65536
+
+# Sets the limits and becomes the command: what `preexec_fn` is for, and may not be used for
+# where the parent has threads. One limit that cannot be set leaves the others.
+_LAUNCHER = """
+import os, resource, sys
+for name, most in zip(("AS", "CPU", "FSIZE", "CORE"), sys.argv[1:5]):
+    try:
+        resource.setrlimit(getattr(resource, "RLIMIT_" + name), (int(most), int(most)))
+    except (OSError, ValueError, AttributeError):
+        pass
+try:
+    os.execvp(sys.argv[5], sys.argv[5:])
+except OSError as error:
+    sys.exit(f"{sys.argv[5]}: {error.strerror}")
+"""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a command ended.
+
+    Attributes:
+        returncode: Its exit code; None if a signal or the time limit ended it.
+        signal: The number of the signal that ended it, unless that was ours.
+        timed_out: Whether the time limit ended it.
+        out_of_memory: Whether what it wrote last speaks of memory that it did not get.
+        stdout, stderr: What it wrote, each up to `output_most` bytes.
+        truncated: Whether it wrote more than that.
+        wall: How long it ran [s].
+        left_behind: Processes of its own that were still there at its end, and were ended.
+    """
+
+    returncode: int | None
+    signal: int | None
+    timed_out: bool
+    out_of_memory: bool
+    stdout: str
+    stderr: str
+    truncated: bool
+    wall: float
+    left_behind: int
+
+
+def run(
+    command: Sequence[str],
+    *,
+    seconds: float,
+    cwd: str | os.PathLike[str] | None = None,
+    env: Mapping[str, str] | None = None,
+    output_most: int = 1_000_000,
+    memory_most: int = MEMORY_MOST,
+) -> Outcome:
+    """Run a command to its end, or to that of its time; nothing of it is left afterwards.
+
+    Args:
+        command: Program and arguments.
+        seconds: Wall-clock time that it may take.
+        cwd: Where it runs; None for here.
+        env: Its environment; None for ours.
+        output_most: Bytes of stdout, and of stderr, to keep; the rest is read and dropped.
+        memory_most: Bytes of address space of each process, where the system can limit it.
+
+    Raises:
+        FileNotFoundError: `cwd` is not there, or on Windows the program.
+    """
+    token = secrets.token_hex(16)
+    began = time.monotonic()
+    process = subprocess.Popen(
+        _limited(command, seconds, memory_most),
+        cwd=cwd,
+        env={**(os.environ if env is None else env), _TOKEN: token},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        start_new_session=True,  # without effect on Windows
+    )
+    readers = [_Reader(pipe, output_most) for pipe in (process.stdout, process.stderr)]
+    ended = False
+    try:
+        ended = _wait(process, began + seconds)
+        wall = time.monotonic() - began
+    finally:  # an interrupt too
+        left = _end_all(process, token)
+        process.wait()
+    out, err = (reader.finish() for reader in readers)
+    code = process.returncode if ended else None
+    return Outcome(
+        returncode=code if code is not None and code >= 0 else None,
+        signal=-code if code is not None and code < 0 else None,
+        timed_out=not ended,
+        out_of_memory=ended and code != 0 and _speaks_of_memory(err),
+        stdout=out,
+        stderr=err,
+        truncated=any(reader.dropped for reader in readers),
+        wall=wall,
+        left_behind=left,
+    )
+
+
+def _limited(command: Sequence[str], seconds: float, memory_most: int) -> list[str]:
+    if os.name != "posix":
+        return list(command)
+    # The time on all processors ends a loop even where we were killed and cannot.
+    processors = math.ceil(seconds + 1) * (os.cpu_count() or 1)
+    limits = [str(limit) for limit in (memory_most, processors, _FILE_MOST, 0)]
+    return [sys.executable, "-I", "-S", "-c", _LAUNCHER, *limits, *command]
+
+
+def _wait(process: subprocess.Popen[bytes], deadline: float) -> bool:
+    """Whether the process ended in time. On POSIX it is not reaped yet.
+
+    So that its number, and that of its group, is nobody else's when the group is killed.
+    """
+    pause = 0.001
+    while True:
+        if _has_ended(process):
+            return True
+        remaining = deadline - time.monotonic()
+        if remaining <= 0:
+            return False
+        time.sleep(min(pause, remaining))
+        pause = min(pause * 2, 0.02)
+
+
+def _has_ended(process: subprocess.Popen[bytes]) -> bool:
+    if sys.platform == "win32" or not hasattr(os, "waitid"):
+        return process.poll() is not None
+    options = os.WEXITED | os.WNOHANG | os.WNOWAIT
+    return os.waitid(os.P_PID, process.pid, options) is not None
+
+
+def _end_all(process: subprocess.Popen[bytes], token: str) -> int:
+    """Kill the command and all that it started; how many others there were."""
+    if sys.platform == "win32":
+        process.kill()
+        return 0
+    deadline = time.monotonic() + _PATIENCE
+    seen: set[int] = set()
+    first = True
+    while True:
+        found = _relatives(process.pid, token)
+        seen |= found
+        if process.returncode is None:
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(process.pid, signal.SIGKILL)
+        for pid in found:
+            with suppress(ProcessLookupError, PermissionError):
+                os.kill(pid, signal.SIGKILL)
+        if time.monotonic() > deadline or not (found or first):
+            return len(seen)
+        first = False  # what was being forked meanwhile shows in the next round
+        time.sleep(0.002)
+
+
+def _relatives(leader: int, token: str) -> set[int]:
+    """Living processes of the session, or that carry the token; without /proc, none."""
+    mark = f"{_TOKEN}={token}".encode()
+    found = set()
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            # After the name in brackets, which may hold anything: state, parent, group, session.
+            fields = (entry / "stat").read_bytes().rpartition(b")")[2].split()
+            if fields[0] in b"ZX":
+                continue
+            ours = int(fields[3]) == leader or mark in (entry / "environ").read_bytes()
+        except (OSError, IndexError, ValueError):  # it ended meanwhile, or is another user's
+            continue
+        if ours and int(entry.name) != leader:
+            found.add(int(entry.name))
+    return found
+
+
+def _speaks_of_memory(stderr: str) -> bool:
+    tail = stderr[-2000:]
+    return any(word in tail for word in ("MemoryError", "bad_alloc", "annot allocate memory"))
+
+
+class _Reader:
+    """Reads a pipe to its end in a thread, so that the writer never waits for us."""
+
+    def __init__(self, pipe: IO[bytes] | None, most: int) -> None:
+        assert pipe is not None
+        self._pipe: Any = pipe
+        self._most = most
+        self._kept = bytearray()
+        self.dropped = False
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
+
+    def _read(self) -> None:
+        with suppress(OSError, ValueError):
+            while chunk := os.read(self._pipe.fileno(), _CHUNK):
+                room = self._most - len(self._kept)
+                self._kept += chunk[:room]
+                self.dropped |= len(chunk) > room
+
+    def finish(self) -> str:
+        """What was read. Someone whom we could not end may hold the pipe open: not waited for."""
+        self._thread.join(_PATIENCE)
+        if not self._thread.is_alive():
+            self._pipe.close()
+        return bytes(self._kept).decode("utf-8", "replace")

@@ -1,0 +1,353 @@
+"""`statemachine check --mutants`: faults that are really there, and tests judged by them."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import math
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.cells import cell_len
+
+import statemachine as sm
+from statemachine import cli as command_line
+from statemachine.errors import BadInputError, EngineError
+from statemachine.grading.mutants import MUTANTS, Mutant, run
+from statemachine.grading.mutants.faults import FAULTS
+from statemachine.grading.mutants.run import Examination, Failure, Trial, examine
+from statemachine.page import Table
+from statemachine.report import mutants as report
+
+from .conftest import ROOT, Cli
+
+EXERCISE = ROOT / "exercises" / "test_arm.py"
+SOLUTION = ROOT / "exercises" / "solutions" / "test_arm.py"
+# The test of the solution that was written against each fault.
+WRITTEN_AGAINST = {
+    "xyzw": "test_a_quarter_turn_as_a_quaternion",
+    "com-for-frame": "test_a_link_begins_at_its_own_joint",
+    "joints-shifted": "test_pan_turns_the_fingertip_about_the_axis_of_the_base",
+    "degrees": "test_pan_turns_the_fingertip_about_the_axis_of_the_base",
+    "no-forward": "test_after_a_step_the_fingertip_is_that_of_the_state_before",
+    "forward-steps": "test_forward_takes_no_time_and_moves_nothing",
+    "step-and-forward": "test_after_a_step_the_fingertip_is_that_of_the_state_before",
+    "one-step-short": "test_ten_steps_are_ten_steps",
+    "motor-left-on": "test_an_arm_without_servos_falls",
+    "gains-doubled": "test_a_servo_is_a_spring_that_carries_the_arm",
+    "gravity-up": "test_the_box_falls_as_everything_does",
+    "spin-in-world": "test_a_turned_box_spins_about_its_own_axis",
+    "reset-keeps-ctrl": "test_reset_forgets_the_command",
+    "no-replay": "test_the_same_start_and_commands_give_the_same_bits",
+}
+
+Write = Callable[[str], Path]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    """Tests of a student, in a folder of their own."""
+
+    def write(text: str) -> Path:
+        path = tmp_path / "student" / "test_mine.py"
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+# The faults.
+
+
+def test_every_mutant_has_a_fault_and_a_test() -> None:
+    assert list(MUTANTS) == list(FAULTS) == list(WRITTEN_AGAINST)
+
+
+@pytest.mark.slow
+def test_the_solution_passes_and_catches_every_mutant(backend: str) -> None:
+    # A fault that changed nothing would survive here.
+    found = examine(SOLUTION, backend)
+    assert found.failures == ()
+    caught = {trial.mutant.name: {f.test for f in trial.caught_by} for trial in found.trials}
+    assert list(caught) == list(MUTANTS)
+    for name, test in WRITTEN_AGAINST.items():
+        assert test in caught[name], name
+    assert found.idle == ()
+    assert found.holds
+
+
+def test_the_model_does_not_give_its_faults_away(
+    backend: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def facts() -> list[bytes]:
+        model = sm.load("so101", backend=backend)
+        other = model.replace(timestep=0.002)
+        names = ("gravity", "actuator_kp", "actuator_kv", "dof_frictionloss")
+        return [getattr(m, name).tobytes() for m in (model, other) for name in names]
+
+    healthy = facts()
+    for name in ("gravity-up", "gains-doubled", "motor-left-on"):
+        FAULTS[name](monkeypatch)
+    assert facts() == healthy
+
+
+def test_a_fault_in_the_model_is_in_its_variants_too(
+    backend: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    FAULTS["gravity-up"](monkeypatch)
+    model = sm.load("so101/scene_box", backend=backend)
+    for given, up in ((None, 9.81), ([0, 0, -1.62], 1.62)):
+        variant = model.replace(timestep=0.002) if given is None else model.replace(gravity=given)
+        with sm.make_data(variant) as data:
+            data.qpos[8] = 1.0
+            sm.step(variant, data, 10)
+            speed = data.qvel[8]
+        assert speed == pytest.approx(10 * variant.timestep * up, abs=1e-9)
+        assert variant.gravity[2] < 0
+
+
+@pytest.mark.parametrize("name", ["joints-shifted", "degrees", "spin-in-world"])
+def test_rounding_does_not_give_a_fault_away(
+    name: str, backend: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    FAULTS[name](monkeypatch)
+    model = sm.load("so101/scene_box", backend=backend)
+    runs = []
+    for calls, steps in ((1, 12), (12, 1)):
+        with sm.make_data(model) as data:
+            sm.reset(model, data, keyframe="pickup")
+            data.qpos[8] += 0.5
+            data.qvel[:] = np.linspace(-0.7, 0.9, model.nv)
+            before = data.qpos.tobytes(), data.qvel.tobytes(), data.ctrl.tobytes()
+            sm.forward(model, data)
+            assert (data.qpos.tobytes(), data.qvel.tobytes(), data.ctrl.tobytes()) == before
+            for _ in range(calls):
+                sm.step(model, data, steps)
+            runs.append(data.qpos.tobytes())
+    assert runs[0] == runs[1]
+
+
+def test_the_short_step_keeps_the_clock_right(
+    backend: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    FAULTS["one-step-short"](monkeypatch)
+    model = sm.load("so101", backend=backend)
+    with sm.make_data(model) as data:
+        sm.step(model, data, 7)
+        assert math.isclose(data.time, 7 * model.timestep)
+
+
+# The judgement.
+
+
+def test_the_exercise_begins_with_survivors_and_an_idle_test() -> None:
+    found = examine(EXERCISE, only=("xyzw", "degrees", "no-forward"))
+    assert found.failures == ()
+    assert [mutant.name for mutant in found.survivors] == ["xyzw"]
+    assert found.idle == ("test_the_clock",)
+    assert (found.caught, found.holds) == (2, False)
+
+
+def test_a_test_that_asserts_nothing_catches_nothing(write: Write) -> None:
+    found = examine(write("def test_nothing(): assert True"), only=("no-forward", "gravity-up"))
+    assert (found.failures, found.caught, found.idle) == ((), 0, ("test_nothing",))
+
+
+HANGS_OR_FALLS = """
+import os, time
+import pytest
+import statemachine as sm
+
+@pytest.fixture
+def nowhere(model, data):
+    sm.forward(model, data)
+    return not data.site_xpos.any()
+
+def test_before(model):
+    assert model.nq == 13
+
+def test_hard(nowhere):
+    if nowhere:
+        {what}
+
+def test_after(model):
+    assert model.nv == 12
+"""
+
+
+@pytest.mark.parametrize(
+    ("what", "why"),
+    [
+        pytest.param("time.sleep(600)", "took longer than", marks=pytest.mark.slow),
+        ("os.abort()", "ended the process by signal 6"),
+        ("os._exit(0)", "ended the process with code 0"),
+        ("raise RuntimeError('lost')", "RuntimeError: lost"),
+    ],
+)
+def test_what_ends_under_a_fault_has_caught_it(
+    what: str, why: str, write: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run, "_TIMES", 1.0)
+    monkeypatch.setattr(run, "_AND", 10.0)
+    found = examine(write(HANGS_OR_FALLS.format(what=what)), only=("no-forward", "xyzw"))
+    caught, survived = found.trials
+    assert not survived.caught
+    (failure,) = caught.caught_by
+    assert failure.test == "test_hard"
+    assert why in failure.why
+
+
+@pytest.mark.parametrize(
+    ("body", "why"),
+    [
+        ("assert 1 == 2, 'as it must'", "line 2: as it must"),
+        ("raise SystemExit(0)", "line 2: SystemExit: 0"),
+        ("import os; os.abort()", "ended the process by signal 6"),
+        ("import os; os._exit(0)", "ended the process with code 0"),
+        ("import pytest; pytest.exit('enough')", "ended the process with code"),
+        pytest.param("while True: pass", "took longer than 10 s", marks=pytest.mark.slow),
+        # It prints what a run that passed would, and what is written in the record.
+        (
+            "print('1 passed in 0.01s\\n{\"ended\": \"test_it\"}', flush=True); assert False, 'no'",
+            "no",
+        ),
+    ],
+)
+def test_tests_that_fail_on_the_healthy_arm_are_told(body: str, why: str, write: Write) -> None:
+    found = examine(write(f"def test_it():\n    {body}\ndef test_fine(): pass\n"), seconds=10)
+    (failure,) = found.failures
+    assert failure.test == "test_it"
+    assert why in failure.why
+    assert "\n" not in failure.why
+    assert (found.trials, found.holds) == ((), False)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("def test_x(:", r"test_mine.py cannot be imported: line 1: .*syntax"),
+        ("\nimport nothing_of_this_name", "cannot be imported: line 2: ModuleNotFoundError"),
+        ("import sys; sys.exit(0)", "cannot be imported: it ended the process"),
+        ("import os; os._exit(0)", "cannot be imported: it ended the process with code 0"),
+        ("import time; time.sleep(60)", "cannot be imported: it took longer than 2 s"),
+        ("x = 1", "no tests in test_mine.py: a test is a function"),
+        ("import pytest\n@pytest.mark.skip\ndef test_x(): pass", "each was skipped"),
+    ],
+)
+def test_a_file_that_is_no_test_file_is_refused(text: str, message: str, write: Write) -> None:
+    with pytest.raises(BadInputError, match=message) as caught:
+        examine(write(text), seconds=2 if "sleep" in text else 60)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+def test_a_forgotten_fork_takes_no_part(write: Write) -> None:
+    text = "import os\ndef test_a(): assert os.fork() >= 0\ndef test_b(): assert False, 'no'\n"
+    found = examine(write(text), only=["xyzw"])
+    assert found.failures == (Failure("test_b", "line 3: no"),)
+
+
+def test_a_fault_that_cannot_be_put_in_is_not_caught(
+    write: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write("def test_x(): pass")
+    monkeypatch.setitem(MUTANTS, "unheard-of", Mutant("unheard-of", "", ""))
+    with pytest.raises(EngineError, match=r"before the tests: .*unheard-of"):
+        examine(path, only=["unheard-of"])
+
+
+def test_another_pytests_settings_do_not_disturb(
+    write: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write("import helper\nopen('left', 'w').close()\ndef test_x(): assert helper.ONE == 1")
+    beside = {
+        "helper.py": "ONE = 1",  # a module of the student's own is found
+        "random.py": "raise RuntimeError('not the one of Python')",
+        "conftest.py": "raise RuntimeError('a conftest')",
+        "pytest.ini": "[pytest]\naddopts = --no-such-option\n",
+    }
+    for name, text in beside.items():
+        (path.parent / name).write_text(text, encoding="utf-8")
+    odd = path.parent.rename(path.parent.with_name("with [brackets] and blanks")) / path.name
+    monkeypatch.setenv("PYTEST_ADDOPTS", "--no-such-option")
+    monkeypatch.setenv("PYTEST_PLUGINS", "no_such_plugin")
+    found = examine(odd, only=["xyzw"])
+    assert found.failures == ()
+    assert {entry.name for entry in odd.parent.iterdir()} == {path.name, *beside}
+
+
+# The page and the command.
+
+
+def test_the_page_keeps_to_its_columns(capsys: pytest.CaptureFixture[str]) -> None:
+    from statemachine.report import terminal
+
+    name = "test_" + "a_name_that_goes_on_and_on_" * 4
+    one = Failure(name, "why")
+    trials = tuple(Trial(mutant, (one,) * (k % 3 * 6)) for k, mutant in enumerate(MUTANTS.values()))
+    page = report.page(Examination("test_x.py", "mujoco", "4", (name, "test_b"), (), trials))
+    assert not page.holds
+    terminal.show(page)
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(cell_len, lines)) <= 80
+    (table,) = [block for block in page.blocks if isinstance(block, Table)]
+    rows = [line for line in lines if line.split(" ")[0] in MUTANTS and "   " in line]
+    assert len(rows) == len(table.rows) == len(MUTANTS)  # each in one line
+    for mutant in MUTANTS.values():
+        told = any(line.startswith(f"{mutant.name}: nothing") for line in lines)
+        assert told == (mutant in {t.mutant for t in trials if not t.caught})
+    assert "test_b" in " ".join(lines)
+
+
+def test_the_command_says_what_survives(cli: Cli) -> None:
+    only = ("--only", "xyzw", "--only", "degrees")
+    done = cli("check", "--mutants", str(EXERCISE), *only)
+    assert (done.returncode, done.stderr) == (1, "")
+    assert "1 of 2 faults caught" in done.stdout
+    assert MUTANTS["xyzw"].hint in done.stdout
+    assert cli("check", "--mutants", str(EXERCISE), *only[2:]).returncode == 0
+
+
+def test_the_command_speaks_json(cli: Cli, write: Write) -> None:
+    path = write("def test_it(): assert False, 'no'")
+    done = cli("check", "--mutants", str(path), "--json")
+    assert (done.returncode, done.stderr) == (1, "")
+    found: dict[str, Any] = json.loads(done.stdout)
+    assert found["failures"] == [{"test": "test_it", "why": "line 1: no"}]
+    assert (found["trials"], found["holds"]) == ([], False)
+    text = cli("check", "--mutants", str(path)).stdout
+    assert "your tests fail on the healthy arm" in text
+    assert "test_it: line 1: no" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["nothing.py"], "no file nothing.py"),
+        (["."], "no file ."),
+        ([str(ROOT / "README.md")], "README.md is no Python file"),
+        ([str(EXERCISE), "--only", "xyz"], "Did you mean 'xyzw'?"),
+        ([str(EXERCISE), "--backend", "mujcoo"], "known: mujoco, pybullet"),
+    ],
+)
+def test_a_mistake_is_one_line(cli: Cli, arguments: list[str], message: str) -> None:
+    done = cli("check", "--mutants", *arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert message in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_without_pytest_it_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    right = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name, *rest: None if name == "pytest" else right(name)
+    )
+    assert command_line.main(["check", "--mutants", str(EXERCISE)]) == 3
+    assert "pip install 'statemachine-sim[mutants]'" in capsys.readouterr().err
