@@ -20,14 +20,15 @@ help:
 
 lesson: $(VENV)/run.stamp
 	@# Both engines; one that cannot be had here is named in one line and left out.
-	@$(BIN)/statemachine lesson forward --backend all
-	@$(BIN)/statemachine lesson gravity --backend all
+	@$(BIN)/statemachine lesson forward --backend all --no-questions
+	@$(BIN)/statemachine lesson gravity --backend all --no-questions
 	@# 3: the witness cannot be had here; it has said so in one line.
 	@$(BIN)/statemachine fingertip --backend all || [ $$? -eq 3 ]
 	@echo "Where to go next:"
 	@echo "  source $(BIN)/activate   makes statemachine a command of your shell"
-	@echo "  statemachine                all lessons, in the order of the course"
-	@echo "  statemachine lesson state   the first of them"
+	@echo "  statemachine lesson         the guided path: ten stations, about 35 minutes"
+	@echo "  python exercises/step_loop.py    then four functions for you to write"
+	@echo "  statemachine                everything that there is"
 	@echo "  statemachine doctor         what this machine has, and what to do"
 
 test: check

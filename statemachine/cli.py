@@ -17,6 +17,7 @@ from .commands._common import BAD_INPUT, MISSING, NO_OUTPUT, PROGRAM, complain
 from .errors import EngineWarning, MissingEngineError, StateMachineError
 from .lessons import LESSONS
 
+_SAID: set[str] = set()
 _NAMES = [command.__name__.rpartition(".")[2] for command in COMMANDS]
 
 
@@ -86,7 +87,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _show_warning(message: Warning | str, category: type[Warning], *where: Any) -> None:
     """What an engine warns of in one line; where in our code it came up is no help."""
     if issubclass(category, EngineWarning):
-        complain(message, 0)
+        if str(message) not in _SAID:  # a lesson may load a model more than once
+            _SAID.add(str(message))
+            complain(message, 0)
     else:
         sys.stderr.write(warnings.formatwarning(message, category, *where[:2]))
 

@@ -121,13 +121,10 @@ def test_gravity_beyond_four_seconds_creeps(cli: Cli) -> None:
 
 def test_hold(cli: Cli) -> None:
     found = _json(cli, "lesson", "hold")["mujoco"]
-    assert max(found["lag"]) == pytest.approx(9.95e-3, abs=0.02e-3)
     assert len(found["error"]) == 401
     assert math.degrees(found["error"][-1]) < 1.5
-    assert found["previous"] <= 1e-12
     assert max(map(abs, found["without_contacts"])) > 0
     page = " ".join(cli("lesson", "hold").stdout.split())
-    assert "9.95 mm behind at worst" in page
     assert "with contacts left out it would be 0.02°" in page
 
 
@@ -242,7 +239,6 @@ def test_alone_it_lists_the_lessons_in_order(cli: Cli) -> None:
     places = [done.stdout.index(f"statemachine lesson {name}") for name in LESSONS]
     assert places == sorted(places)
     assert max(map(len, done.stdout.splitlines())) <= 80
-    assert cli("lesson").stdout == done.stdout
 
 
 @pytest.mark.parametrize(
@@ -400,10 +396,10 @@ def test_hold_says_that_a_command_beyond_its_range_is_clamped(cli: Cli) -> None:
 
 def test_hold_wants_a_target_for_another_robot(cli: Cli, tmp_path: Path) -> None:
     file = _model(tmp_path, PENDULUM.format(""), "<actuator><motor joint='j'/></actuator>")
-    done = cli("lesson", "hold", "--model", file, "--site", "tip")
+    done = cli("lesson", "hold", "--model", file)
     assert done.returncode == 2
     assert "1 actuators" in done.stderr
-    done = cli("lesson", "hold", "--model", file, "--site", "tip", "--target", "0.1")
+    done = cli("lesson", "hold", "--model", file, "--target", "0.1")
     assert done.returncode == 0, done.stderr
     assert "position servo" not in done.stdout
 

@@ -1,0 +1,199 @@
+"""The documentation and the notebook are made from runs, whole, and read without a network."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+from statemachine.lessons import LESSONS
+from statemachine.page import Page, Pipeline, Printed, Question, Slots, Table, Text, Traces
+from statemachine.report import markdown as md
+from statemachine.report.figures import svg
+from statemachine.report.notebook import Shown, build, station
+from statemachine.report.site import make_path
+
+from .conftest import ROOT, need_engine
+
+_NOTEBOOK = ROOT / "notebooks" / "path.ipynb"
+_PICTURES = [
+    Traces("t", "x", "y", {"one": ([0, 1, 2], [3, 4, 5])}),
+    Traces("t", "x", "y", {"a": ([0, 1], [0.0, 1e-9]), "b": ([0, 1], [1e-3, 1e-6])}, log=True),
+    Slots("s", {"qpos": [("a", 0, 1), ("b", 1, 8)], "qvel": [("a", 0, 1), ("b", 1, 7)]}),
+    Pipeline("p", (("stored", ["qpos"]), ("derived", ["xpos"])), (("forward", 0, 1),)),
+]
+
+
+@pytest.mark.parametrize("picture", _PICTURES, ids=lambda each: type(each).__name__)
+def test_a_picture_is_the_same_each_time(picture: Traces) -> None:
+    text = svg(picture)
+    assert text == svg(picture)
+    ElementTree.fromstring(text)
+    assert "<text" in text  # and no glyphs as paths
+
+
+def test_slots_are_drawn_for_every_number() -> None:
+    text = svg(_PICTURES[2])
+    numbers = re.findall(r"<text[^>]*>(\d+)</text>", text)
+    assert sorted(map(int, numbers)) == sorted([*range(8), *range(7)])
+
+
+def test_markdown_takes_nothing_for_its_own() -> None:
+    table = Table(("a|b", "n"), [("x*y", "[1]")], title="t", emphasis=frozenset({0}))
+    text = md.block_as_markdown(table, lambda _: "")
+    assert r"a\|b" in text
+    assert r"**x\*y**" in text
+    assert ":-- | --:" in text
+    assert md.block_as_markdown(Text("data.qpos[1] <b>"), lambda _: "") == r"data.qpos\[1\] \<b\>"
+    printed = md.block_as_markdown(Printed({"a": "1\n", "b": "1\n", "c": ""}), lambda _: "")
+    assert printed.count("```text") == 2
+    assert "a, b:" in printed
+    assert "(nothing)" in printed
+
+
+class _Links(HTMLParser):
+    """What a page loads, and the pictures' texts."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.loaded: list[str] = []
+        self.alt: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = dict(attrs)
+        if tag in ("script", "img") and found.get("src"):
+            self.loaded.append(str(found["src"]))
+        if tag == "link" and found.get("rel") in ("stylesheet", "icon", "preload"):
+            self.loaded.append(str(found["href"]))
+        if tag == "img":
+            self.alt.append(found.get("alt") or "")
+
+
+@pytest.mark.slow
+def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
+    source = tmp_path / "docs"
+    source.mkdir()
+    for name in ("conf.py", "index.md", "exercises.md"):
+        (source / name).write_text((ROOT / "docs" / name).read_text())
+    done = subprocess.run(
+        [sys.executable, "-m", "sphinx", "-W", "-q", "-b", "html", str(source), str(tmp_path / "o")],
+        capture_output=True,
+        text=True,
+        env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "HOME": str(tmp_path),
+             "STATEMACHINE_DOCS_BACKENDS": "mujoco"},
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    pages = sorted((tmp_path / "o" / "path").glob("*.html"))
+    assert len(pages) == len(LESSONS)
+    pictures = 0
+    for page in pages:
+        text = page.read_text()
+        links = _Links()
+        links.feed(text)
+        assert not [link for link in links.loaded if "//" in link], page
+        assert all(links.alt)
+        pictures += len(links.alt)
+        assert "✗" not in text
+    assert pictures >= 5
+    gravity = (tmp_path / "o" / "path" / "06-gravity.html").read_text()
+    assert "53.89°" in gravity
+    assert "<details>" in gravity
+    assert "--realtime" in (tmp_path / "o" / "path" / "09-time.html").read_text()
+
+
+def test_a_page_that_is_the_same_is_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "statemachine.report.site.LESSONS", {name: LESSONS[name] for name in ("state", "write")}
+    )
+    first = make_path(tmp_path, ["mujoco"], say=lambda _: None)
+    times = {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
+    assert make_path(tmp_path, ["mujoco"], say=lambda _: None) == first
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == times
+
+
+def _sources() -> Iterator[str]:
+    for cell in json.loads(_NOTEBOOK.read_text(encoding="utf-8"))["cells"]:
+        yield "".join(cell["source"])
+
+
+def test_the_notebook_is_what_the_lessons_make() -> None:
+    assert _NOTEBOOK.read_text(encoding="utf-8") == build(), "run: make notebook"
+
+
+def test_the_notebook_has_the_whole_path_and_no_outputs() -> None:
+    notebook = nbformat.read(_NOTEBOOK, as_version=4)
+    nbformat.validate(notebook)
+    assert not any(cell.get("outputs") for cell in notebook.cells)
+    text = "\n".join(_sources())
+    places = [text.index(f'station("{name}", BACKEND)') for name in LESSONS]
+    assert places == sorted(places)
+
+
+@pytest.mark.slow
+def test_the_notebook_runs_headless(backend: str) -> None:
+    notebook = nbformat.read(_NOTEBOOK, as_version=4)
+    setup = next(cell for cell in notebook.cells if cell.id == "setup")
+    setup.source = setup.source.replace('BACKEND = "mujoco"', f'BACKEND = "{backend}"')
+    NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(ROOT)}}).execute()
+    shown = [
+        output["data"]["text/markdown"]
+        for cell in notebook.cells
+        for output in cell.get("outputs", ())
+        if output["output_type"] == "execute_result"
+    ]
+    assert len(shown) == len(LESSONS)
+    assert all(
+        "✓" in text or "real time" in text or "nq" in text or "goal" in text for text in shown
+    )
+    assert not any("✗" in text for text in shown)
+    assert any("data:image/svg+xml;base64," in text for text in shown)
+
+
+def test_a_station_in_a_notebook(backend: str) -> None:
+    shown = station("write", backend)
+    text = shown._repr_markdown_()
+    assert backend in text
+    assert "import statemachine" not in text
+    assert "The run says: 0.8." in text
+    assert "notebook" in repr(shown)
+    with pytest.raises(KeyError, match="Did you mean 'gravity'"):
+        station("gravty")
+    with pytest.raises(KeyError, match="seconds"):
+        station("hold", backend, second=1.0)
+
+
+def test_a_question_that_went_wrong_in_a_notebook() -> None:
+    page = Page("t", "o", [Text("first"), Question("q", ("a", "b"), None, "because")])
+    assert "None of them. because" in Shown(page)._repr_markdown_()
+
+
+def test_documentation_on_an_engine_that_is_missing(tmp_path: Path) -> None:
+    with pytest.raises(KeyError, match="mujcoo"):
+        make_path(tmp_path, ["mujcoo"], say=lambda _: None)
+
+
+def test_every_command_of_the_documentation(tmp_path: Path) -> None:
+    """What docs/exercises.md shows is run elsewhere; here, that each file and flag is there."""
+    text = (ROOT / "docs" / "exercises.md").read_text()
+    commands = [
+        line for block in re.findall(r"```console\n(.*?)```", text, re.DOTALL)
+        for line in block.splitlines()
+    ]  # fmt: skip
+    assert len(commands) >= 4
+    for line in commands:
+        for word in line.split():
+            if word.endswith(".py"):
+                assert (ROOT / word).is_file(), line
+    need_engine("mujoco")

@@ -1,0 +1,354 @@
+"""The path: its code runs as typed, its questions are answered by runs, its claims can fail."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import pty
+import re
+import select
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.cells import cell_len
+
+import statemachine as sm
+from statemachine.lessons import LESSONS, STATIONS, module
+from statemachine.lessons.session import Session, Taken, load_line, page_of_lesson, play, take
+from statemachine.page import Code, Page, Printed, Question, Verdict
+from statemachine.report import quiz
+
+from .conftest import ROOT, Cli, need_engine
+
+_TIMED = {"time", "speed", "objects", "questions"}  # print wall times
+_QUICK = {"speed": {"steps": 200}, "gravity": {"longer": 0.0}, "forward": {"seconds": 0.4}}
+
+
+def _take(name: str, backend: str, **options: Any) -> tuple[Page, Taken]:
+    lesson = LESSONS[name]
+    taken = take(
+        lesson, sm.load(lesson.model, backend=backend), backend, _QUICK.get(name, {}) | options
+    )
+    return page_of_lesson(lesson, {backend: taken}), taken
+
+
+def _repage(name: str, backend: str, result: Any) -> Page:
+    """The page of a result that was changed."""
+    return module(name).page({backend: result}, Session("", {backend: ""}))
+
+
+def test_the_path_has_ten_stations_in_the_order_of_the_course() -> None:
+    assert [lesson.name for lesson in STATIONS] == [
+        "objects", "state", "write", "forward", "hold", "gravity", "reset", "replay", "time",
+        "speed",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [lesson.name for lesson in STATIONS])
+def test_the_code_is_typed_run_and_questioned(name: str, backend: str) -> None:
+    page, taken = _take(name, backend)
+    shown = next(block for block in page.blocks if isinstance(block, Code))
+    assert "\n".join(shown.lines) == taken.code.rstrip("\n")
+    assert max(map(cell_len, shown.lines)) <= 76  # indented by four
+    assert f'backend="{backend}"' in taken.code
+    (printed,) = (block for block in page.blocks if isinstance(block, Printed))
+    assert printed.by_engine == {backend: taken.printed}
+    assert taken.printed.strip()
+    assert "Error" not in taken.printed
+    (question,) = (block for block in page.blocks if isinstance(block, Question))
+    assert question.right is not None
+    assert 2 <= len(question.choices) <= 4
+    # A prediction comes before the answer.
+    assert page.blocks.index(question) < page.blocks.index(printed)
+    assert page.holds
+
+
+@pytest.mark.parametrize("name", [lesson.name for lesson in STATIONS if lesson.name not in _TIMED])
+def test_what_is_shown_is_what_a_student_would_see(name: str, tmp_path: Path) -> None:
+    _, taken = _take(name, "mujoco")
+    done = subprocess.run(
+        [sys.executable, "-c", taken.code],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin"},
+        check=True,
+    )
+    assert done.stdout == taken.printed
+
+
+def test_an_error_in_the_code_is_its_last_line() -> None:
+    code = "import statemachine as sm\nprint(1)\nsm.load('so101', backend='mujcoo')\nprint(2)\n"
+    lines = play(code).splitlines()
+    assert lines[0] == "1"
+    assert lines[1].startswith("UnknownNameError: no backend named 'mujcoo'")
+    assert len(lines) == 2
+
+
+def test_the_line_that_loads_a_model() -> None:
+    assert load_line("so101/scene", "mujoco") == 'sm.load("so101/scene", backend="mujoco")'
+    assert load_line("a", "b", "c d") == 'sm.load("a", backend="b", menagerie=\'c d\')'
+    assert eval(load_line('x"y\\z', "b"), {"sm": type("S", (), {"load": lambda m, **_: m})})
+
+
+Change = Callable[[Any], Any]
+# For each claim a result that belies it: the page must say so.
+_BELIED: dict[str, tuple[str, Change]] = {
+    "worlds disturb each other": ("objects", lambda r: dataclasses.replace(r, alone=False)),
+    "the model changes": ("objects", lambda r: dataclasses.replace(r, constant=False)),
+    "a write is seen": ("write", lambda r: dataclasses.replace(r, changed=("xpos",))),
+    "an array is made anew": ("write", lambda r: dataclasses.replace(r, kept=("qpos",))),
+    "readings 3 and 4 are equal": ("forward", lambda r: dataclasses.replace(r, equal=((2, 3),))),
+    "a step leaves what is new": (
+        "forward",
+        lambda r: dataclasses.replace(
+            r, stages=dataclasses.replace(r.stages, of_before=dict.fromkeys(r.stages.of_before, 0))
+        ),
+    ),
+    "a reset forgets the time": (
+        "reset",
+        lambda r: dataclasses.replace(r, restored=("qpos", "qvel", "ctrl")),
+    ),
+    "a reset computes": ("reset", lambda r: dataclasses.replace(r, empty=False)),
+    "a reset has another future": ("reset", lambda r: dataclasses.replace(r, same_future=False)),
+    "time passes by itself": ("time", lambda r: dataclasses.replace(r, passed=0.2)),
+    "pacing changes the physics": ("time", lambda r: dataclasses.replace(r, identical=False)),
+    "a run does not repeat": ("replay", lambda r: dataclasses.replace(r, identical=False)),
+    "forces do not balance": (
+        "gravity",
+        lambda r: dataclasses.replace(
+            r,
+            servos_on=dataclasses.replace(
+                r.servos_on, forces=dataclasses.replace(r.servos_on.forces, actuator=0.0)
+            ),
+        ),
+    ),
+}
+
+
+@pytest.mark.parametrize("claim", _BELIED)
+def test_a_result_that_belies_a_claim_fails_it(claim: str) -> None:
+    name, change = _BELIED[claim]
+    _, taken = _take(name, "mujoco")
+    assert _repage(name, "mujoco", taken.result).holds
+    assert not _repage(name, "mujoco", change(taken.result)).holds
+
+
+def test_the_right_choice_is_computed() -> None:
+    def right(name: str, result: Any) -> int | None:
+        page = module(name).page({"mujoco": result}, Session("sleep(0.2)", {"mujoco": ""}))
+        return next(block.right for block in page.blocks if isinstance(block, Question))
+
+    forward = _take("forward", "mujoco")[1].result
+    assert right("forward", forward) == 1
+    assert right("forward", dataclasses.replace(forward, equal=((2, 3),))) == 2
+    assert right("forward", dataclasses.replace(forward, equal=())) is None
+    write = _take("write", "mujoco")[1].result
+    assert right("write", dataclasses.replace(write, view=0.0)) == 1
+    pace = _take("time", "mujoco")[1].result
+    assert right("time", dataclasses.replace(pace, passed=0.2)) == 1
+    gravity = _take("gravity", "mujoco")[1].result
+    fallen = dataclasses.replace(gravity, servos_on=gravity.servos_off)
+    assert (right("gravity", gravity), right("gravity", fallen)) == (1, 0)
+    speed = _take("speed", "mujoco")[1].result
+    slow = [
+        dataclasses.replace(speed, bulk=speed.simulated / factor) for factor in (1, 10, 100, 1000)
+    ]
+    assert [right("speed", each) for each in slow] == [0, 1, 2, 3]
+
+
+def test_six_questions_are_answered_by_runs(backend: str) -> None:
+    page, _ = _take("questions", backend)
+    asked = [block for block in page.blocks if isinstance(block, Question)]
+    assert len(asked) == 6
+    assert all(question.right is not None for question in asked)
+    verdicts = [block for block in page.blocks if isinstance(block, Verdict)]
+    assert len(verdicts) == 6
+    assert page.holds
+
+
+@pytest.mark.parametrize(
+    ("part", "change"),
+    [
+        ("forward", lambda r: dataclasses.replace(r, equal=())),
+        ("state", lambda r: dataclasses.replace(r, joints=r.joints[:6])),
+        ("replay", lambda r: dataclasses.replace(r, identical=False)),
+        ("gravity", lambda r: dataclasses.replace(r, servos_on=r.servos_off)),
+        ("objects", lambda r: dataclasses.replace(r, alone=False)),
+        ("pace", lambda r: dataclasses.replace(r, identical=False)),
+    ],
+)
+def test_an_answer_that_its_run_belies_is_none(part: str, change: Change) -> None:
+    result = _take("questions", "mujoco")[1].result
+    belied = dataclasses.replace(result, **{part: change(getattr(result, part))})
+    page = _repage("questions", "mujoco", belied)
+    assert not page.holds
+    wrong = [b for b in page.blocks if isinstance(b, Question) and b.right is None]
+    assert len(wrong) == 1
+
+
+def test_what_catches_the_falling_arm() -> None:
+    """Against the course's text: the floor does, and the arm does not settle on it."""
+    found = _take("gravity", "mujoco", longer=100.0)[1].result.longer
+    at = {name: np.degrees(run.position) for name, run in found.items()}
+    limit = np.degrees(sm.load("so101/scene").jnt_range[1, 1])
+    assert at["no floor"][-1] == pytest.approx(limit, abs=0.1)
+    assert found["no floor"].forces.limit == pytest.approx(found["no floor"].forces.bias, abs=1e-3)
+    assert at["floor"][4] == pytest.approx(23.92, abs=0.01)
+    assert at["floor"][-1] > 50
+    page = _take("gravity", "mujoco", longer=100.0)[0]
+    (said,) = (b.text for b in page.blocks if isinstance(b, Verdict) and "catches" in b.text)
+    assert "not damping or friction" in said
+    assert "creeps on, from 23.92° to 53.89°" in said
+
+
+def test_of_which_moment_a_step_leaves_what(backend: str) -> None:
+    """Against the course's figure: of the state before, 9.95 mm behind at worst."""
+    page, taken = _take("forward", backend, seconds=2.0)
+    stages = taken.result.stages
+    assert stages.lag.max() == pytest.approx(9.95e-3, abs=0.02e-3)
+    assert stages.of_before["site_xpos"] == stages.of_before["contacts"] == 400
+    assert stages.of_after["site_xpos"] < 400
+    assert any("9.95 mm behind" in b.text for b in page.blocks if isinstance(b, Verdict))
+    changes = {each.name: each for each in stages.changes}
+    assert changes["qpos"].write
+    assert not any(each.write for each in stages.changes if not each.stored)
+    assert not any(each.forward for each in stages.changes if each.stored)
+    for name in ("xpos", "site_xpos", "qacc"):
+        assert changes[name].forward
+        assert changes[name].step
+    assert {"xpos", "site_xpos", "contacts"} <= set(stages.same)
+
+
+def test_what_keyframe_0_of_the_public_scene_is(cli: Cli, menagerie: Path) -> None:
+    done = cli("lesson", "reset", "--menagerie", str(menagerie))
+    assert done.returncode == 0, done.stderr
+    said = " ".join(done.stdout.split())
+    assert "the box is not held: 4 contacts with what does not move, none with the robot" in said
+    assert "is mistaken" in said
+
+
+def test_our_keyframe_holds_the_box(backend: str) -> None:
+    held, pickup = _take("reset", backend)[1].result.scenes
+    assert held.held
+    assert held.on_world == 0
+    assert held.robot_steps == held.nstep
+    assert abs(held.rise) < 1e-3
+    assert not pickup.held
+    assert pickup.on_robot == 0
+
+
+def test_real_time_is_the_loops_affair(cli: Cli) -> None:
+    began = time.monotonic()
+    done = cli("lesson", "time", "--realtime", "--seconds", "0.8")
+    assert done.returncode == 0, done.stderr
+    assert time.monotonic() - began >= 1.6  # the code and the measurement
+    assert "s simulated in" in done.stdout
+    assert "the waiting is yours" in done.stdout
+    assert "0.8 s of simulated time" in done.stdout
+
+
+@pytest.mark.slow
+def test_the_whole_path_piped(cli: Cli) -> None:
+    done = cli("lesson")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    numbers = re.findall(r"^(\d+) of 10: ", done.stdout, re.MULTILINE)
+    assert numbers == [str(k) for k in range(1, 11)]
+    assert max(map(cell_len, done.stdout.splitlines())) <= 80
+    assert "\x1b" not in done.stdout
+    assert "Your prediction" not in done.stdout
+    assert "exercises/step_loop.py" in done.stdout
+
+
+def test_options_may_stand_before_the_station(cli: Cli) -> None:
+    need_engine("pybullet")
+    for words in (("--backend", "pybullet", "write"), ("write", "--backend", "pybullet")):
+        assert "pybullet prints" in cli("lesson", *words).stdout
+    both = cli("lesson", "--backend", "pybullet", "write", "--backend", "mujoco")
+    assert "mujoco prints" in both.stdout
+
+
+# --- at a terminal
+
+
+def _at_a_terminal(*words: str, typed: list[tuple[str, str]], columns: int = 80) -> str:
+    """Run the command on a pseudo-terminal; type each answer when its prompt appears."""
+    ours, theirs = pty.openpty()
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": str(columns), "TERM": "xterm"}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "statemachine", *words],
+        stdin=theirs, stdout=theirs, stderr=theirs, env=environment, close_fds=True,
+    )  # fmt: skip
+    os.close(theirs)
+    seen, waiting, deadline = "", list(typed), time.monotonic() + 60
+    try:
+        while time.monotonic() < deadline:
+            if select.select([ours], [], [], 0.2)[0]:
+                try:
+                    chunk = os.read(ours, 65536)
+                except OSError:  # closed at the other end
+                    break
+                if not chunk:
+                    break
+                seen += chunk.decode(errors="replace")
+            if waiting and waiting[0][0] in seen.rpartition("\n")[2]:
+                os.write(ours, waiting.pop(0)[1].encode())
+                seen += "\n"
+    finally:
+        process.kill()
+        process.wait()
+        os.close(ours)
+    assert not waiting, seen
+    return re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", seen)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
+def test_a_prediction_is_asked_for_before_the_answer() -> None:
+    seen = _at_a_terminal("lesson", "state", typed=[("Your prediction", "b\n")])
+    question, prompt = seen.index("How many has qvel?"), seen.index("Your prediction")
+    assert question < prompt < seen.index("13 12 6")
+    assert "as you said" in seen
+    assert seen.index("as you said") > seen.index("13 12 6")
+    assert "you said a; it is b" in _at_a_terminal(
+        "lesson", "state", typed=[("Your prediction", "x\n"), ("Your prediction", "a\n")]
+    )
+    assert "you said" not in _at_a_terminal(
+        "lesson", "state", typed=[("Your prediction", "\n")]
+    )  # passed
+    assert "Your prediction" not in _at_a_terminal("lesson", "state", "--no-questions", typed=[])
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
+def test_the_path_waits_for_its_reader() -> None:
+    typed = [
+        ("Your prediction", "b\n"),
+        ("Enter for station 2", "\n"),
+        ("Your prediction", "\n"),
+        ("Enter for station 3", "q\n"),
+    ]
+    seen = _at_a_terminal("lesson", typed=typed)
+    assert "1 of 10: Two objects" in seen
+    assert "2 of 10: The state" in seen
+    assert "3 of 10" not in seen
+
+
+def test_answers_that_are_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    question = Question("?", ("x", "y"), 0, "")
+    typed = iter(["3", "", "B) "])
+    monkeypatch.setattr("builtins.input", lambda _: next(typed))
+    assert quiz.ask(question) is None
+    assert quiz.ask(question) == 1
+
+    def end(_: str) -> str:
+        raise EOFError
+
+    monkeypatch.setattr("builtins.input", end)
+    assert quiz.ask(question) is None
+    assert quiz.go_on("more") is False
