@@ -85,7 +85,7 @@ def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
     for name in ("conf.py", "index.md", "exercises.md"):
         (source / name).write_text((ROOT / "docs" / name).read_text())
     done = subprocess.run(
-        [sys.executable, "-m", "sphinx", "-W", "-q", "-b", "html", str(source), str(tmp_path / "o")],
+        [sys.executable, "-m", "sphinx", "-W", "-q", "-b", "html", source, tmp_path / "o"],
         capture_output=True,
         text=True,
         env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "HOME": str(tmp_path),
@@ -154,9 +154,7 @@ def test_the_notebook_runs_headless(backend: str) -> None:
         if output["output_type"] == "execute_result"
     ]
     assert len(shown) == len(LESSONS)
-    assert all(
-        "✓" in text or "real time" in text or "nq" in text or "goal" in text for text in shown
-    )
+    assert all("run says" in text for text in shown)
     assert not any("✗" in text for text in shown)
     assert any("data:image/svg+xml;base64," in text for text in shown)
 
