@@ -97,7 +97,7 @@ def record(code: str, engine: str) -> Recording:
     # First of all: what a backend takes from the engine when it is imported must be the
     # engine's own, and not a wrapper that nobody takes away again.
     importlib.import_module(f"statemachine.backends.{engine}_backend")
-    namespace: dict[str, Any] = {"__name__": "__main__", "__builtins__": __builtins__}
+    namespace: dict[str, Any] = {"__name__": "__main__"}
     done: list[Statement] = []
     error = None
     with Recorder([_watch(name) for name in _WATCHES[engine]]) as recorder:
@@ -116,7 +116,7 @@ def record(code: str, engine: str) -> Recording:
     for name, value in namespace.items():
         if isinstance(value, Model) and value.backend != engine:
             raise BadInputError(
-                f"the code's {name} is on {value.backend}: its calls cannot be recorded as {engine}'s"
+                f"the code's {name} is on {value.backend}, and {engine} was to be recorded"
             )
     return Recording(engine, engine_version(engine), tuple(done), error)
 

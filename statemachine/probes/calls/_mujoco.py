@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import types
 import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -13,7 +12,7 @@ from ...engines import require
 from ...interface import Data, Model
 from ...records import DERIVED, INPUTS
 from ._names import named
-from ._recorder import Look, Subject, Watch, entries
+from ._recorder import FUNCTIONS, Look, Subject, Watch, entries
 
 _OURS = ("time", *INPUTS, *DERIVED)
 # What comes before the rest in a list of what changed.
@@ -116,7 +115,7 @@ class _Watch(Watch):
 
     def functions(self) -> Iterator[tuple[Any, str, str]]:
         for name, value in vars(self._module).items():
-            if isinstance(value, types.BuiltinFunctionType):
+            if isinstance(value, FUNCTIONS) and not name.startswith("_"):
                 yield self._module, name, name
         for owner in (self._module.MjModel, self._module.MjData, self._module.MjSpec):
             for name, value in vars(owner).items():

@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import marshal
 import types
+import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from ...backends._bullet_machine import Machine
 from ...backends.pybullet_backend import PybulletData, PybulletModel
 from ...engines import require
 from ...records import DERIVED, INPUTS
 from ._names import named
-from ._recorder import Look, Subject, Watch, entries
+from ._recorder import FUNCTIONS, Look, Subject, Watch, entries
 
 # How many arguments come before `physicsClientId` where it is given by its place, which the
 # engine's functions do not tell. It is the last one in all of these.
@@ -110,13 +112,15 @@ class _World(Subject):
 class _Arrays(Subject):
     """The interface's own arrays of a Data: copies, and what was computed for a reader."""
 
-    def __init__(self, data: PybulletData, label: str) -> None:
+    def __init__(self, machine: Machine, label: str) -> None:
         super().__init__(label)
-        self.data = data
+        self._machine = weakref.ref(machine)  # a Data ends when the code lets go of it
 
     def look(self, thoroughly: bool = False) -> Look | None:
-        machine = self.data._machine
-        found = {name: getattr(self.data, name).tobytes() for name in INPUTS}
+        machine = self._machine()
+        if machine is None:
+            return None
+        found = {name: getattr(machine, name).tobytes() for name in INPUTS}
         found["time"] = marshal.dumps(machine.time, 2)
         # Not by asking the Data, which would compute what nobody has read.
         for name, value in machine._derived.items():
@@ -144,11 +148,11 @@ class _Watch(Watch):
         # Looks must not come by way of what is replaced.
         self._bare = types.SimpleNamespace(**vars(self._module))
         self._worlds: dict[int, _World] = {}
-        self._arrays: dict[int, _Arrays] = {}
+        self._arrays: weakref.WeakKeyDictionary[Machine, _Arrays] = weakref.WeakKeyDictionary()
 
     def functions(self) -> Iterator[tuple[Any, str, str]]:
         for name, value in vars(self._module).items():
-            if isinstance(value, types.BuiltinFunctionType):
+            if isinstance(value, FUNCTIONS) and not name.startswith("_"):
                 yield self._module, name, name
 
     def concerned(self, function: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
@@ -170,17 +174,18 @@ class _Watch(Watch):
     def name(self, namespace: Mapping[str, Any]) -> None:
         for known in (*self._worlds.values(), *self._arrays.values()):
             known.named = False
-        arrays = {}
+        arrays: weakref.WeakKeyDictionary[Machine, _Arrays] = weakref.WeakKeyDictionary()
         for label, value in named(namespace):
             if isinstance(value, PybulletModel):
                 self._name_model(label, value)
             elif isinstance(value, PybulletData):
                 self._name_model(f"{label}.model", value._home)
                 self._label(value._machine.world, f"the world of {label}")
-                if id(value) not in arrays:
-                    kept = self._arrays.get(id(value)) or _Arrays(value, label)
+                machine = value._machine
+                if machine not in arrays:
+                    kept = self._arrays.get(machine) or _Arrays(machine, label)
                     kept.label, kept.named = label, True
-                    arrays[id(value)] = kept
+                    arrays[machine] = kept
         self._arrays = arrays  # the others no variable leads to
 
     def _name_model(self, label: str, model: PybulletModel) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import types
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from ...errors import BadInputError
 
 # What stands in `Call.changed` for something that was not there before, or is no more.
 NEW, CLOSED = "new", "closed"
+FUNCTIONS = (types.BuiltinFunctionType, types.FunctionType)
 Look = dict[str, bytes]
 
 
