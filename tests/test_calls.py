@@ -1,0 +1,535 @@
+"""The recorder of calls: complete, without effect on the run, and gone afterwards."""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import io
+import sys
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from statemachine import backends, engines
+from statemachine.backends.mujoco_backend import MujocoData
+from statemachine.errors import BadInputError, UnknownNameError
+from statemachine.page import Page, Table
+from statemachine.probes import calls
+from statemachine.probes.calls import CLOSED, NEW, Recording, Statement, record
+from statemachine.probes.calls._recorder import Recorder
+from statemachine.report import calls as words
+from statemachine.report import terminal
+from statemachine.report.as_json import dumps
+
+from .conftest import need_engine
+
+# A little of everything: a keyframe in mid-contact, a write, both verbs, each kind of
+# derived array, a State, a variant of the model, two Data.
+WHOLE = """\
+import statemachine as sm
+model = sm.load("so101/scene_box", backend="{engine}")
+data = sm.make_data(model)
+sm.reset(model, data, keyframe=0)
+sm.forward(model, data)
+print(data.contacts, data.qfrc_bias, data.qfrc_contact)
+data.ctrl[:2] += (0.4, -0.2)
+sm.step(model, data, 30)
+for _ in range(5):
+    sm.step(model, data)
+print(data.xpos[3], data.contacts)
+state = sm.get_state(model, data)
+off = model.replace(actuation=False)
+other = sm.make_data(off)
+sm.set_state(model, data, state)
+sm.step(off, other, 3)
+sm.step(model, data, 25)
+other.close()
+print(data.qpos.tobytes().hex(), data.qvel.tobytes().hex())
+"""
+SHORT = """\
+import statemachine as sm
+model = sm.load("so101/scene", backend="{engine}")
+data = sm.make_data(model)
+{code}
+"""
+
+
+@pytest.fixture(params=calls.RECORDED)
+def engine(request: pytest.FixtureRequest) -> str:
+    need_engine(request.param)
+    return request.param
+
+
+def short(engine: str, code: str) -> list[Statement]:
+    """What each line of some code did, after a Data was made."""
+    recording = record(SHORT.format(engine=engine, code=code), engine)
+    assert recording.error is None
+    return list(recording.statements[3:])
+
+
+def counts(recording: Recording, engine: str | None = None) -> Counter[str]:
+    found: Counter[str] = Counter()
+    for statement in recording.statements:
+        for call in statement.calls:
+            if engine in (None, call.engine):
+                found[call.function] += call.count
+    return found
+
+
+def run_plainly(code: str) -> str:
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out):
+        exec(compile(code, "<plain>", "exec"), {"__name__": "__main__"})
+    return out.getvalue()
+
+
+def owners(engine: str) -> list[Any]:
+    """Whatever has functions that are replaced."""
+    found: list[Any] = [mujoco, mujoco.MjModel, mujoco.MjData, mujoco.MjSpec]
+    return found + ([engines.require("pybullet")] if engine == "pybullet" else [])
+
+
+def methods(owner: type) -> dict[int, str]:
+    return {
+        id(value.__func__): f"{owner.__name__}.{name}"
+        for name, value in vars(owner).items()
+        if type(value).__name__ in ("instancemethod", "staticmethod") and name != "__init__"
+    }
+
+
+@contextlib.contextmanager
+def profiled(engine: str, heard: Callable[[Any, str], None]) -> Any:
+    """Python's own account of calls into C: (frame, name) of each that is the engine's."""
+    functions: dict[int, str] = {}
+    for owner in owners(engine):
+        if isinstance(owner, type):
+            functions |= methods(owner)
+        else:
+            functions |= {
+                id(value): name
+                for name, value in vars(owner).items()
+                if type(value).__name__ == "builtin_function_or_method"
+            }
+
+    def profile(frame: Any, event: str, argument: Any) -> None:
+        if event == "c_call" and id(argument) in functions:
+            heard(frame, functions[id(argument)])
+
+    sys.setprofile(profile)
+    try:
+        yield
+    finally:
+        sys.setprofile(None)
+
+
+def test_every_call_is_recorded(engine: str) -> None:
+    """Against Python's own account of the same code, run without the recorder."""
+    code = WHOLE.format(engine=engine)
+    run_plainly(code)  # so that what happens once in a process has happened
+    recorded = counts(record(code, engine))
+    seen: Counter[str] = Counter()
+    namespace: dict[str, Any] = {"__name__": "__main__"}
+    with (
+        contextlib.redirect_stdout(io.StringIO()),
+        profiled(engine, lambda _, name: seen.update([name])),
+    ):
+        exec(compile(code, "<plain>", "exec"), namespace)
+    # Python's account lacks what C calls for it: constructors, copy, a step in a partial.
+    assert recorded.pop("MjData") >= 2
+    assert recorded.pop("MjModel.__copy__") == 1
+    if engine == "mujoco":
+        assert recorded.pop("mj_step") == 1 + 5 + 1 + 1
+    assert recorded == seen
+    assert sum(seen.values()) > 20
+
+
+def test_no_call_goes_round_the_recorder(engine: str) -> None:
+    """What holds on to an engine's function from before would not be heard."""
+    around: set[str] = set()
+
+    def heard(frame: Any, name: str) -> None:
+        ours = Path(frame.f_code.co_filename).parent == Path(calls.__file__).parent
+        if Recorder._active and not ours:  # at its end, Data are collected
+            around.add(name)
+
+    with profiled(engine, heard):
+        record(WHOLE.format(engine=engine), engine)
+    assert not around
+
+
+def test_early_hold_of_a_function_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """That the test above can fail."""
+    early = mujoco.mj_forward
+    monkeypatch.setattr(MujocoData, "_recompute", lambda self: early(self._home.raw, self.raw))
+    around: set[str] = set()
+
+    def heard(frame: Any, name: str) -> None:
+        ours = Path(frame.f_code.co_filename).parent == Path(calls.__file__).parent
+        if Recorder._active and not ours:  # at its end, Data are collected
+            around.add(name)
+
+    with profiled("mujoco", heard):
+        (forward,) = short("mujoco", "sm.forward(model, data)")
+    assert around == {"mj_forward"}
+    assert forward.calls == ()
+    assert "data.xpos" in forward.changed
+
+
+def test_a_recorded_run_ends_at_the_same_bits(engine: str) -> None:
+    code = WHOLE.format(engine=engine)
+    assert record(code, engine).printed == run_plainly(code)
+
+
+def test_looks_disturb_nothing_for_long(engine: str) -> None:
+    """Many steps of a box that is held: every call of each is looked at."""
+    code = WHOLE.format(engine=engine).replace("range(5)", "range(200)")
+    recording = record(code, engine)
+    assert recording.printed == run_plainly(code)
+    (loop,) = [each for each in recording.statements if each.source.startswith("for")]
+    step = "mj_step" if engine == "mujoco" else "stepSimulation"
+    assert [call.count for call in loop.calls if call.function == step] == [200]
+
+
+@pytest.mark.parametrize("ending", ["pass", "1 / 0", "raise KeyboardInterrupt", "def"])
+def test_everything_is_put_back(engine: str, ending: str) -> None:
+    before = [dict(vars(owner)) for owner in owners(engine)]
+    raised: Any = contextlib.nullcontext()
+    if ending != "pass":
+        raised = pytest.raises((ZeroDivisionError, KeyboardInterrupt, SyntaxError))
+    with raised:
+        record(SHORT.format(engine=engine, code=f"sm.step(model, data)\n{ending}"), engine)
+    for owner, attributes in zip(owners(engine), before, strict=True):
+        assert vars(owner).keys() == attributes.keys()
+        assert all(vars(owner)[name] is value for name, value in attributes.items())
+    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+    assert isinstance(mujoco.MjData(model), mujoco.MjData)
+    assert record(SHORT.format(engine=engine, code=""), engine).error is None  # and again
+
+
+def test_a_data_outlives_the_recording() -> None:
+    """It keeps the engine's function that it was made with."""
+    kept: list[Any] = []
+    sys.modules["kept_by_the_test"] = kept  # type: ignore[assignment]
+    try:
+        short("mujoco", "import sys\nsys.modules['kept_by_the_test'].append((sm, model, data))")
+    finally:
+        del sys.modules["kept_by_the_test"]
+    sm, model, data = kept[0]
+    sm.step(model, data, 3)
+    assert data.time == pytest.approx(3 * model.timestep)
+
+
+def test_isinstance_holds_while_recording() -> None:
+    (line,) = short(
+        "mujoco",
+        "import mujoco; print(isinstance(data.raw, mujoco.MjData), isinstance(1, mujoco.MjModel))",
+    )[1:]
+    assert line.printed == "True False\n"
+
+
+def test_forward_on_mujoco_is_one_call() -> None:
+    write, forward = short("mujoco", "data.qpos[1] = 0.8\nsm.forward(model, data)")
+    assert (write.calls, write.changed) == ((), ("data.qpos[1]",))
+    (call,) = forward.calls
+    assert (call.function, call.on, call.count) == ("mj_forward", "data", 1)
+    assert {"xpos", "xquat", "site_xpos", "qacc"} <= set(call.changed)
+    assert not {"time", "qpos", "qvel", "ctrl", "act", "qacc_warmstart"} & set(call.changed)
+    assert forward.changed == ()
+
+
+def test_many_steps_on_mujoco_are_one_call() -> None:
+    (line,) = short("mujoco", "sm.step(model, data, 800)")
+    (call,) = line.calls
+    assert (call.function, call.on, call.count) == ("mj_step", "data", 1)
+    assert call.changed[:3] == ("time", "qpos", "qvel")
+    assert "ctrl" not in call.changed
+
+
+def test_a_read_on_mujoco_is_no_call() -> None:
+    _, line = short("mujoco", "sm.forward(model, data)\nprint(data.site_xpos)")
+    assert (line.calls, line.changed) == ((), ())
+    assert line.printed.startswith("[[")
+
+
+@pytest.mark.parametrize(
+    ("code", "changed"),
+    [
+        ("data.ctrl[:2] = (1, 2)", "data.ctrl[0:2]"),
+        ("data.ctrl = [1, 2, 3, 4, 5, 6]", "data.ctrl"),
+        ("data.time = 2", "data.time"),
+        ("data.raw.qfrc_applied[3] = 1", "data.raw.qfrc_applied[3]"),
+        ("model.raw.opt.disableflags |= 1", "model.raw.opt.disableflags"),
+        ("model.raw.opt.gravity[2] = 0", "model.raw.opt.gravity"),
+        ("model.raw.body_mass[2] = 5", "model.raw.body_mass"),
+        ("model.raw.mesh_vert[:] += 1", None),
+    ],
+)
+def test_a_write_is_spelled_as_it_is_typed(code: str, changed: str | None) -> None:
+    (line,) = short("mujoco", code)
+    assert line.calls == ()
+    if changed:
+        assert line.changed == (changed,)
+
+
+def test_the_interface_s_own_write_at_load_is_told() -> None:
+    """The engine's automatic reset is turned off by a flag: no function does it."""
+    load = record(SHORT.format(engine="mujoco", code=""), "mujoco").statements[1]
+    assert load.changed == ("model.raw.opt.disableflags",)
+    assert ("MjModel.from_xml_path", "model", 1, (NEW,)) in [
+        (call.function, call.on, call.count, call.changed) for call in load.calls
+    ]
+
+
+def test_several_data_are_told_apart(engine: str) -> None:
+    lines = short(
+        engine,
+        "more = [sm.make_data(model) for _ in range(2)]\n"
+        "sm.step(model, more[1])\nsm.step(model, data, 2)\nmore[1].close(); more.clear()",
+    )
+    step, world = ("mj_step", "{}") if engine == "mujoco" else ("stepSimulation", "the world of {}")
+    stepped = [
+        [(call.on, call.count) for call in line.calls if call.function == step] for line in lines
+    ]
+    once, twice = (world.format("more[1]"), 1), (world.format("data"), 2)
+    if engine == "mujoco":
+        twice = ("data", 1)  # one call with nstep
+    assert stepped == [[], [once], [twice], [], []]
+    if engine == "pybullet":
+        ended = [(c.function, c.on, c.changed) for line in lines[3:] for c in line.calls]
+        assert ended == [
+            ("disconnect", "the world of more[1]", (CLOSED,)),
+            ("disconnect", "the world of more[0]", (CLOSED,)),
+        ]
+
+
+def test_pybullet_computes_when_it_is_read() -> None:
+    need_engine("pybullet")
+    forward, read, again, step, late = short(
+        "pybullet",
+        "sm.forward(model, data)\nprint(data.site_xpos)\nprint(data.site_xpos)\n"
+        "sm.step(model, data, 4)\nprint(data.site_xpos)",
+    )
+    assert (forward.calls, forward.changed) == ((), ())
+    for line in (read, late):
+        asked = {call.function: call.on for call in line.calls if call.engine == "pybullet"}
+        assert asked["getLinkStates"] == "the still copy of model"
+        assert set(line.changed) == {
+            "data.xpos",
+            "data.xquat",
+            "data.site_xpos",
+            "data.site_xmat",
+        }
+    assert (again.calls, again.changed) == ((), ())
+    assert step.changed == ("data.qpos", "data.qvel", "data.time")
+    ours = {call.function: call for call in step.calls if call.on == "the world of data"}
+    assert ours["stepSimulation"].count == 4
+    assert {"joint positions", "joint velocities"} <= set(ours["stepSimulation"].changed)
+    assert ours["getJointStates"].changed == ()
+
+
+def test_the_still_copy_is_never_stepped() -> None:
+    need_engine("pybullet")
+    recording = record(WHOLE.format(engine="pybullet"), "pybullet")
+    on = {
+        (call.on, call.function)
+        for statement in recording.statements
+        for call in statement.calls
+        if call.engine == "pybullet"
+    }
+    assert ("the still copy of model", "calculateMassMatrix") in on
+    assert ("the still copy of model", "stepSimulation") not in on
+    assert ("the look-ahead of model", "stepSimulation") in on
+    assert not {name for name, _ in on} - {
+        *(
+            f"the {role} of {model}"
+            for role in ("still copy", "look-ahead")
+            for model in ("model", "off")
+        ),
+        *(f"the world of {data}" for data in ("data", "other")),
+        "a world without a name",  # in which load tries what it wrote
+    }
+    # Nothing of an engine's world changes but by a call of the engine's.
+    assert not [
+        each for s in recording.statements for each in s.changed if each.startswith("the world")
+    ]
+
+
+def test_the_client_of_a_call_is_found_where_it_is_given() -> None:
+    need_engine("pybullet")
+    from statemachine.probes.calls import _pybullet as watched
+
+    found = watched.client_of
+    assert found("stepSimulation", (7,), {}) == 7
+    assert found("stepSimulation", (), {}) == 0
+    assert found("anything", (1, 2), {"physicsClientId": 5}) == 5
+    assert found("anything", (1, 2), {}) is None
+    assert found("getJointStates", (1, [2], 9), {}) == 9
+    assert found("getJointStates", (1, [2]), {}) == 0
+    pb: Any = engines.require("pybullet")
+    nowhere = pb.connect(pb.DIRECT)
+    pb.disconnect(nowhere)
+    for name, place in watched._BEFORE_CLIENT.items():
+        arguments: list[Any] = [0] * place
+        if name == "loadURDF":
+            arguments[:3] = ["no.urdf", (0, 0, 0), (0, 0, 0, 1)]
+        if name == "isConnected":
+            assert not pb.isConnected(nowhere)
+        else:  # the engine takes the number for a world's
+            with pytest.raises(pb.error, match="Not connected"):
+                getattr(pb, name)(*arguments, nowhere)
+        with pytest.raises(TypeError, match="at most"):  # and has no argument after it
+            getattr(pb, name)(*arguments, nowhere, nowhere)
+
+
+def test_every_call_of_the_backend_says_its_client() -> None:
+    need_engine("pybullet")
+    from statemachine.probes.calls import _pybullet as watched
+
+    folder = Path(backends.__file__).parent
+    seen = 0
+    for path in [*folder.glob("_bullet_*.py"), folder / "pybullet_backend.py"]:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)):
+                continue
+            if not (isinstance(node.func.value, ast.Name) and node.func.value.id == "pb"):
+                continue
+            name = node.func.attr
+            keywords = {each.arg for each in node.keywords}
+            if name == "connect" or "physicsClientId" in keywords:
+                continue
+            seen += 1
+            place = watched._BEFORE_CLIENT[name]
+            if not any(isinstance(each, ast.Starred) for each in node.args):
+                assert len(node.args) == place + 1, f"{path.name}:{node.lineno}"
+    assert seen > 20
+
+
+def test_a_forward_that_steps_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        MujocoData, "_recompute", lambda self: mujoco.mj_step(self._home.raw, self.raw)
+    )
+    (line,) = short("mujoco", "sm.forward(model, data)")
+    (call,) = line.calls
+    assert call.function == "mj_step"
+    assert "time" in call.changed
+
+
+def test_a_hidden_write_in_a_call_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = mujoco.mj_forward
+
+    def wrong(model: Any, data: Any) -> None:
+        right(model, data)
+        data.qpos[0] = np.nextafter(data.qpos[0], 1)
+        model.dof_damping[0] += 1
+
+    monkeypatch.setattr(mujoco, "mj_forward", wrong)
+    (line,) = short("mujoco", "sm.forward(model, data)")
+    (call,) = line.calls
+    assert call.function == "mj_forward"
+    assert {"qpos", "model.raw.dof_damping"} <= set(call.changed)
+    assert line.changed == ()
+
+
+def test_a_hidden_write_beside_a_call_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    def wrong(self: Any) -> None:
+        mujoco.mj_forward(self._home.raw, self.raw)
+        self.raw.qvel[2] = 1e-300
+        mujoco.mj_forward(self._home.raw, self.raw)
+
+    monkeypatch.setattr(MujocoData, "_recompute", wrong)
+    (line,) = short("mujoco", "sm.forward(model, data)")
+    (call,) = line.calls
+    assert call.count == 2
+    assert "qvel" not in call.changed
+    assert line.changed == ("data.qvel[2]",)
+
+
+def test_a_getter_that_moves_the_world_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    need_engine("pybullet")
+    pb: Any = engines.require("pybullet")
+    right = pb.getJointStates
+
+    def wrong(body: int, joints: Any, client: int) -> Any:
+        found = right(body, joints, client)
+        pb.resetJointState(body, joints[0], 0.25, 0.0, client)
+        return found
+
+    code = SHORT.format(engine="pybullet", code="sm.step(model, data)")
+    run_plainly(code)
+    monkeypatch.setattr(pb, "getJointStates", wrong)
+    line = record(code, "pybullet").statements[-1]
+    read = [call for call in line.calls if call.function == "getJointStates"]
+    assert "joint positions" in read[0].changed
+
+
+def test_a_refusal_ends_the_run(engine: str) -> None:
+    code = "print('here')\nsm.step(model, data, -1)\nprint('not here')"
+    recording = record(SHORT.format(engine=engine, code=code), engine)
+    assert recording.error is not None
+    assert "nstep" in recording.error
+    assert recording.printed == "here\n"
+    assert recording.statements[-1].source == "sm.step(model, data, -1)"
+
+
+def test_what_cannot_be_recorded_is_refused() -> None:
+    with pytest.raises(UnknownNameError, match="mujoco, pybullet"):
+        record("", "mujco")
+    need_engine("pybullet")
+    with pytest.raises(BadInputError, match="on pybullet"):
+        record(SHORT.format(engine="pybullet", code=""), "mujoco")
+    nested = 'from statemachine.probes.calls import record\nrecord("", "mujoco")'
+    assert "cannot record another" in str(record(nested, "mujoco").error)
+
+
+def test_statements_are_those_that_were_typed() -> None:
+    function = "@lambda f: f\ndef g():\n    return '''\n  x'''"
+    code = f"a = 1; b = 2\n\n# a comment\n{function}\nprint(g(),\n  a)"
+    recording = record(code, "mujoco")
+    assert [(each.line, each.source) for each in recording.statements] == [
+        (1, "a = 1"),
+        (1, "b = 2"),
+        (4, function),
+        (8, "print(g(),\n  a)"),
+    ]
+    assert recording.printed == "\n  x 1\n"
+    assert not any(each.calls or each.changed for each in recording.statements)
+
+
+def page_of(*engines_: str, code: str = "") -> tuple[Page, str]:
+    for each in engines_:
+        need_engine(each)
+    recordings = {each: record(SHORT.format(engine=each, code=code), each) for each in engines_}
+    page = Page("calls", "", words.blocks(recordings))
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out):
+        terminal.show(page)
+    assert dumps(recordings)
+    return page, out.getvalue()
+
+
+def test_a_page_shows_the_same_line_in_both_engines_words() -> None:
+    code = "sm.forward(model, data)\ndata.qpos[1] = 0.8\nprint(data.qacc)\nsm.step(model, data, 7)"
+    page, text = page_of("mujoco", "pybullet", code=code)
+    assert max(map(len, text.splitlines())) <= 80
+    for words_ in ("pybullet: No call. Nothing changed.", "Changed: data.qpos[1], and nothing"):
+        assert words_ in text
+    assert 'backend="mujoco"' in text
+    assert 'backend="pybullet"' in text
+    assert "import statemachine" not in text
+    last = [block for block in page.blocks if isinstance(block, Table)][-1]
+    assert ("  stepSimulation", "7") in [tuple(row[:2]) for row in last.rows]
+    flat = " ".join(text.split())
+    assert "In this run it was never stepped." in flat
+    assert "In this run it was stepped once." in flat
+    assert "Its own step was never called there." in flat
+
+
+def test_a_page_says_why_the_run_ended() -> None:
+    _, text = page_of("mujoco", code="sm.step(model, data, 0)")
+    assert "The run ended there: nstep" in " ".join(text.split())
+    assert "mujoco: " not in text.replace("on mujoco", "")
