@@ -28,6 +28,14 @@ def add(commands: Any) -> None:
         epilog="In a terminal each station asks for a prediction before it shows the answer.",
     )
     _add_shared(path)
+    path.add_argument(
+        "--from",
+        dest="start",
+        choices=[lesson.name for lesson in STATIONS],
+        default=STATIONS[0].name,
+        metavar="STATION",
+        help="where to begin, if not at the first",
+    )
     path.set_defaults(run=run_path)
     named = path.add_subparsers(metavar="name")
     for lesson in LESSONS.values():
@@ -39,6 +47,12 @@ def _add_shared(parser: argparse.ArgumentParser, default: Any = None) -> None:
     add_backend(parser, default=default or "mujoco")
     add_menagerie(parser, default)
     add_json(parser, default=default or False)
+    parser.add_argument(
+        "--calls",
+        action="store_true",
+        default=default or False,
+        help="show which of the engine's own functions the code made it run",
+    )
     parser.add_argument(
         "--no-questions",
         action="store_true",
@@ -116,8 +130,10 @@ def run_path(options: argparse.Namespace) -> int:
     from ..report.quiz import go_on
 
     ask, code, everything = _asking(options), 0, {}
-    for number, lesson in enumerate(STATIONS, start=1):
-        if ask and number > 1 and not go_on(f"station {number}: {lesson.question}"):
+    first = [lesson.name for lesson in STATIONS].index(options.start)
+    for number, lesson in enumerate(STATIONS[first:], start=first + 1):
+        if ask and number > first + 1 and not go_on(f"station {number}: {lesson.question}"):
+            print(f"Go on later with: {PROGRAM} lesson --from {lesson.name}")
             break
         values = {option.key: option.default for option in lesson.options}
         page, results = _compute(options, lesson, lesson.model, values)
@@ -145,10 +161,17 @@ def _compute(
         lesson.name,
         model,
         lambda loaded, backend, report: take(
-            lesson, loaded, backend, values, model, options.menagerie, report
+            lesson, loaded, backend, values, model, options.menagerie, report, options.calls
         ),
     )
-    return page_of_lesson(lesson, taken), {name: each.result for name, each in taken.items()}
+    page = page_of_lesson(lesson, taken)
+    if not options.calls:
+        return page, {name: each.result for name, each in taken.items()}
+    from ..report import calls
+
+    recordings = {name: each.calls for name, each in taken.items() if each.calls}
+    page = replace(page, blocks=[*page.blocks, *calls.blocks(recordings)])
+    return page, {name: {"result": t.result, "calls": t.calls} for name, t in taken.items()}
 
 
 def _asking(options: argparse.Namespace) -> Any:

@@ -9,9 +9,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ..backends import backend_engine
 from ..errors import StateMachineError
 from ..interface import Model
 from ..page import Page
+from ..probes.calls import Recording, record
 from . import Lesson, module
 
 _NAME = "<lesson>"
@@ -27,11 +29,18 @@ class Session:
 
 @dataclass(frozen=True)
 class Taken:
-    """A lesson on one backend: its result, and the code with what it printed."""
+    """A lesson on one backend.
+
+    Attributes:
+        result: What its module computed.
+        code: As it was typed; printed: what it printed.
+        calls: What the engine was made to do by it, if that was to be recorded.
+    """
 
     result: Any
     code: str
     printed: str
+    calls: Recording | None = None
 
 
 def take(
@@ -42,6 +51,7 @@ def take(
     name: str | None = None,
     menagerie: str | None = None,
     progress: Callable[[float], None] = lambda _fraction: None,
+    calls: bool = False,
 ) -> Taken:
     """Run a lesson and its code.
 
@@ -53,12 +63,19 @@ def take(
         name: What `load` was given as the model, if not the lesson's.
         menagerie: What it was given as that.
         progress: Told the fraction that is done.
+        calls: Whether to record what the code makes the engine do.
+
+    Raises:
+        UnknownNameError: The backend's calls were to be recorded, and cannot be.
     """
     values = {option.key: option.default for option in lesson.options} | dict(options or {})
     station = module(lesson.name)
     result = station.run(model, values, progress)
     code = station.code(values, load_line(name or lesson.model, backend, menagerie))
-    return Taken(result, code, play(code))
+    if not calls:
+        return Taken(result, code, play(code))
+    recording = record(code, backend_engine(backend) or backend)
+    return Taken(result, code, recording.printed, recording)
 
 
 def page_of_lesson(lesson: Lesson, taken: Mapping[str, Taken]) -> Page:
