@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ..experiments import hold
-from ..experiments._common import TARGET
 from ..page import Page, Question, Table, Text, Traces
 from ..records import Array
 from ._words import angle_or_length, differences, page_of, position, typed, where
@@ -30,7 +29,7 @@ def run(model: Any, options: Mapping[str, Any], progress: Any) -> hold.Hold:
 
 def code(options: Mapping[str, Any], load: str) -> str:
     """One command, and where the arm is then."""
-    target = [float(x) for x in options["target"] or TARGET]
+    target = [float(x) for x in options["target"] or hold.TARGET]
     return f"""\
 import statemachine as sm
 
