@@ -29,6 +29,7 @@ QUESTIONS = (
     "reset",
     "friction",
     "save",
+    "future",
 )
 NO_ANSWER = "–"  # the question does not arise on this engine
 UNDECIDED = "undecided"  # no hypothesis explains what was measured

@@ -17,6 +17,11 @@ def in_pybullet(pb: Any, client: int, height: float) -> int:
     return pb.createMultiBody(1, ball, basePosition=(0, 0, height), physicsClientId=client)
 
 
-def depth(pb: Any, client: int) -> float:
-    """How deep the deepest contact is that the engine tells of; 0 where there is none [m]."""
+def depth(data: Any) -> float:
+    """How deep the deepest contact is that MuJoCo tells of; 0 where there is none [m]."""
+    return max((-float(contact.dist) for contact in data.contact), default=0.0)
+
+
+def depth_in_pybullet(pb: Any, client: int) -> float:
+    """The same of PyBullet."""
     return max((-point[8] for point in pb.getContactPoints(physicsClientId=client)), default=0.0)

@@ -19,8 +19,8 @@ _INERTIA = (
 URDF = (
     '<robot name="pendulum"><link name="world"/>'
     f'<link name="arm"><inertial><origin xyz="{REACH} 0 0"/><mass value="{MASS}"/>{_INERTIA}'
-    '</link><joint name="j" type="continuous"><parent link="world"/><child link="arm"/>'
-    '<axis xyz="0 1 0"/></joint>'
+    '</link><joint name="j" type="revolute"><parent link="world"/><child link="arm"/>'
+    '<axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="1000" velocity="1000"/></joint>'
     '<link name="tip"><inertial><mass value="1e-9"/><inertia ixx="1e-12" ixy="0" ixz="0" '
     'iyy="1e-12" iyz="0" izz="1e-12"/></inertial></link>'
     '<joint name="to_tip" type="fixed"><parent link="arm"/><child link="tip"/>'

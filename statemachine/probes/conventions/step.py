@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...engines import require
-from . import Finding, Findings, Question
+from . import Findings, Question
 from . import _floor as floor
 from ._bullet import load, world
 from ._lacking import lacking
@@ -36,11 +36,10 @@ def mujoco() -> Findings:
     data = mj.MjData(model)
     data.qpos[2], data.qvel[2] = floor.RADIUS - _DEEP, _SPEED
     mj.mj_step(model, data)
-    depths = []
-    for _ in range(2):
-        depths.append(max((-contact.dist for contact in data.contact), default=0.0))
-        mj.mj_forward(model, data)
-    return tip, found(*depths, max(floor.RADIUS - data.qpos[2], 0.0), "a contact")
+    read = floor.depth(data)
+    mj.mj_forward(model, data)
+    deep = max(floor.RADIUS - float(data.qpos[2]), 0.0)
+    return tip, found(read, floor.depth(data), deep, "a contact")
 
 
 def pybullet() -> Findings:
@@ -58,13 +57,12 @@ def pybullet() -> Findings:
         ball = floor.in_pybullet(pb, client, floor.RADIUS - _DEEP)
         pb.resetBaseVelocity(ball, (0, 0, _SPEED), (0, 0, 0), client)
         pb.stepSimulation(client)
-        read = floor.depth(pb, client)
+        read = floor.depth_in_pybullet(pb, client)
         pb.performCollisionDetection(client)
-        deep = floor.RADIUS - pb.getBasePositionAndOrientation(ball, client)[0][2]
-        return tip, found(read, floor.depth(pb, client), max(deep, 0.0), "a contact")
+        deep = max(floor.RADIUS - pb.getBasePositionAndOrientation(ball, client)[0][2], 0.0)
+        return tip, found(read, floor.depth_in_pybullet(pb, client), deep, "a contact")
 
 
 def pinocchio() -> Findings:
     """Whether there is a step at all."""
-    without: Finding = lacking(require("pinocchio"), "step", "simul")
-    return (without,)
+    return (lacking(require("pinocchio"), "step", "simul"),)

@@ -40,13 +40,13 @@ def _predicted(hypothesis: tuple[str, ...], before: Array) -> Array:
     v = turn @ v if linear.startswith("body") else v
     w = turn @ w if angular.startswith("body") else w
     point = _POINTS[linear.partition(" axes, ")[2]]
-    return np.array([v + np.cross(w, turn @ (mark - point)) for mark in MARKS])
+    return v + np.cross(w, (MARKS - point) @ turn.T)
 
 
 def _turn(marks: Array) -> Array:
     """The body's rotation (3, 3), from where its marks are."""
     x, y = marks[1:] - marks[0]
-    return np.column_stack((x, y, np.cross(x, y)))
+    return np.array((x, y, np.cross(x, y))).T
 
 
 def _placed(marks: Array) -> Finding:
@@ -56,8 +56,9 @@ def _placed(marks: Array) -> Finding:
         for name, point in _POINTS.items()
     }
     answer, residual, following = closest(off)
-    return Finding(answer, (Figure("off by", residual, "m"), Figure("otherwise", following, "m")),
-                   "position")
+    return Finding(
+        answer, (Figure("off by", residual, "m"), Figure("otherwise", following, "m")), "position"
+    )
 
 
 def _meaning(before: Array, after: Array) -> Findings:

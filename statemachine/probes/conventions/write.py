@@ -29,7 +29,7 @@ def found(read: Any, recomputed: Any, true: Any, of: str) -> Finding:
 
 
 def mujoco() -> Findings:
-    """qpos of a pendulum, then of a ball that is put into the floor."""
+    """Write qpos of a pendulum, then of a ball that is put into the floor."""
     mj = require("mujoco")
     model = mj.MjModel.from_xml_string(MJCF % "")
     data = mj.MjData(model)
@@ -43,15 +43,13 @@ def mujoco() -> Findings:
     data = mj.MjData(model)
     mj.mj_forward(model, data)
     data.qpos[2] = floor.RADIUS - _DEEP
-    depths = []
-    for _ in range(2):
-        depths.append(max((-contact.dist for contact in data.contact), default=0.0))
-        mj.mj_forward(model, data)
-    return tip, found(*depths, _DEEP, "a contact")
+    deep = floor.depth(data)
+    mj.mj_forward(model, data)
+    return tip, found(deep, floor.depth(data), _DEEP, "a contact")
 
 
 def pybullet() -> Findings:
-    """resetJointState of a pendulum, then a ball that is put into the floor."""
+    """Write by resetJointState to a pendulum, then a ball that is put into the floor."""
     with world() as (pb, client):
         body = load(pb, client, URDF, fixed=True)
         pb.getLinkState(body, 1, computeForwardKinematics=1, physicsClientId=client)
@@ -64,9 +62,9 @@ def pybullet() -> Findings:
         pb.performCollisionDetection(client)
         at = (0, 0, floor.RADIUS - _DEEP)
         pb.resetBasePositionAndOrientation(ball, at, (0, 0, 0, 1), client)
-        read = floor.depth(pb, client)
+        read = floor.depth_in_pybullet(pb, client)
         pb.performCollisionDetection(client)
-        return tip, found(read, floor.depth(pb, client), _DEEP, "a contact")
+        return tip, found(read, floor.depth_in_pybullet(pb, client), _DEEP, "a contact")
 
 
 def pinocchio() -> Findings:
@@ -75,9 +73,7 @@ def pinocchio() -> Findings:
     model = pin.buildModelFromXML(URDF)
     data, tip = model.createData(), model.getFrameId("tip")
     pin.framesForwardKinematics(model, data, pin.neutral(model))
-    q = pin.neutral(model)
-    # A continuous joint has the cosine and the sine of its angle in q.
-    q[:] = pin.integrate(model, q, np.array([_ANGLE]))
+    q = np.array([_ANGLE])
     reads = [np.array(data.oMf[tip].translation)]
     pin.forwardKinematics(model, data, q)
     reads.append(np.array(data.oMf[tip].translation))
