@@ -53,7 +53,7 @@ class Figure:
     """Something that was measured: a number in SI units, several, or words."""
 
     name: str
-    value: float | str | Sequence[float] | Sequence[str]
+    value: float | str | tuple[float, ...] | tuple[str, ...]
     unit: str = ""
 
 

@@ -17,10 +17,11 @@ QUESTION = Question(
 _SECONDS = 0.25
 
 
-def _found(moved: float, free: float, of: str, *more: Figure, unit: str = "rad") -> Finding:
+def _found(of: str, verb: str, moved: float, free: float, unit: str, *more: Figure) -> Finding:
+    """What a joint does, by how it moves and how it would move if nothing held it."""
     share = moved / free
     answer = "falls" if 0.9 < share < 1.1 else "held" if abs(share) < 0.1 else UNDECIDED
-    return Finding(answer, (Figure("moves", moved, unit), Figure("limp", free, unit), *more), of)
+    return Finding(answer, (Figure(verb, moved, unit), Figure("limp", free, unit), *more), of)
 
 
 def mujoco() -> Findings:
@@ -35,7 +36,7 @@ def mujoco() -> Findings:
         data = mj.MjData(model)
         mj.mj_step(model, data, round(_SECONDS / model.opt.timestep))
         more = [Figure("it exerts", float(data.qfrc_actuator[0]), "N·m")] if actuator else []
-        found.append(_found(float(data.qpos[0]), limp(data.time), of, *more))
+        found.append(_found(of, "moves", float(data.qpos[0]), limp(data.time), "rad", *more))
     return tuple(found)
 
 
@@ -56,7 +57,7 @@ def pybullet() -> Findings:
                 pb.stepSimulation(client)
             angle, _, _, torque = pb.getJointState(body, 0, client)
             more = Figure("its motor exerts", torque, "N·m"), Figure("gravity", TORQUE, "N·m")
-            found.append(_found(angle, limp(steps * step), of, *more))
+            found.append(_found(of, "moves", angle, limp(steps * step), "rad", *more))
     return tuple(found)
 
 
@@ -66,4 +67,4 @@ def pinocchio() -> Findings:
     model = pin.buildModelFromXML(URDF)
     rest = np.zeros(model.nv)
     started = float(pin.aba(model, model.createData(), pin.neutral(model), rest, rest)[0])
-    return (_found(started, RATE, "aba at zero torque", unit="rad/s²"),)
+    return (_found("aba at zero torque", "starts with", started, RATE, "rad/s²"),)

@@ -30,7 +30,7 @@ def mujoco() -> Findings:
     mj.mj_step(model, data)
     read = np.array(data.site("tip").xpos)
     mj.mj_kinematics(model, data)
-    tip = found(read, data.site("tip").xpos, tip_at(data.qpos[0]), "a tip")
+    tip = found(read, data.site("tip").xpos, tip_at(data.qpos[0]), "the tip")
 
     model = mj.MjModel.from_xml_string(floor.MJCF)
     data = mj.MjData(model)
@@ -39,7 +39,7 @@ def mujoco() -> Findings:
     read = floor.depth(data)
     mj.mj_forward(model, data)
     deep = max(floor.RADIUS - float(data.qpos[2]), 0.0)
-    return tip, found(read, floor.depth(data), deep, "a contact")
+    return tip, found(read, floor.depth(data), deep, "the contact")
 
 
 def pybullet() -> Findings:
@@ -52,7 +52,7 @@ def pybullet() -> Findings:
         read = pb.getLinkState(body, 1, physicsClientId=client)[4]
         again = pb.getLinkState(body, 1, computeForwardKinematics=1, physicsClientId=client)[4]
         angle = pb.getJointState(body, 0, client)[0]
-        tip = found(read, again, tip_at(angle), "a tip")
+        tip = found(read, again, tip_at(angle), "the tip")
     with world() as (pb, client):
         ball = floor.in_pybullet(pb, client, floor.RADIUS - _DEEP)
         pb.resetBaseVelocity(ball, (0, 0, _SPEED), (0, 0, 0), client)
@@ -60,7 +60,7 @@ def pybullet() -> Findings:
         read = floor.depth_in_pybullet(pb, client)
         pb.performCollisionDetection(client)
         deep = max(floor.RADIUS - pb.getBasePositionAndOrientation(ball, client)[0][2], 0.0)
-        return tip, found(read, floor.depth_in_pybullet(pb, client), deep, "a contact")
+        return tip, found(read, floor.depth_in_pybullet(pb, client), deep, "the contact")
 
 
 def pinocchio() -> Findings:

@@ -61,6 +61,6 @@ def pinocchio() -> Findings:
     q, v = pin.neutral(model), np.zeros(model.nv)
     v[0] = 1
     moved = float(pin.integrate(model, q, v)[0] - q[0])
-    given = Figure("integrate(q, v) with 1 m/s moves a body by", moved, "m")
+    given = Figure("integrate at 1 m/s moves by", f"{moved:g} m")
     found = lacking(pin, "step", "simul", of="one step")
     return (Finding(found.answer, (*found.figures, given), found.of),)

@@ -40,7 +40,7 @@ def _predicted(hypothesis: tuple[str, ...], before: Array) -> Array:
     v = turn @ v if linear.startswith("body") else v
     w = turn @ w if angular.startswith("body") else w
     point = _POINTS[linear.partition(" axes, ")[2]]
-    return v + np.cross(w, (MARKS - point) @ turn.T)
+    return np.asarray(v + np.cross(w, (MARKS - point) @ turn.T), dtype=np.float64)
 
 
 def _turn(marks: Array) -> Array:
@@ -57,7 +57,7 @@ def _placed(marks: Array) -> Finding:
     }
     answer, residual, following = closest(off)
     return Finding(
-        answer, (Figure("off by", residual, "m"), Figure("otherwise", following, "m")), "position"
+        answer, (Figure("off by", residual, "m"), Figure("else", following, "m")), "position"
     )
 
 
@@ -72,7 +72,7 @@ def _meaning(before: Array, after: Array) -> Findings:
     for k, (part, meanings) in enumerate(_PARTS.items()):
         best = {each: min(off[full] for full in off if full[k] == each) for each in meanings}
         answer, residual, following = closest(best)
-        figures = (Figure("off by", residual, "m/s"), Figure("otherwise", following, "m/s"))
+        figures = (Figure("off by", residual, "m/s"), Figure("else", following, "m/s"))
         found.append(Finding(answer, figures, part))
     return tuple(found)
 

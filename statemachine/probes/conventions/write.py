@@ -37,7 +37,7 @@ def mujoco() -> Findings:
     data.qpos[0] = _ANGLE
     read = np.array(data.site("tip").xpos)
     mj.mj_forward(model, data)
-    tip = found(read, data.site("tip").xpos, tip_at(_ANGLE), "a tip")
+    tip = found(read, data.site("tip").xpos, tip_at(_ANGLE), "the tip")
 
     model = mj.MjModel.from_xml_string(floor.MJCF)
     data = mj.MjData(model)
@@ -45,7 +45,7 @@ def mujoco() -> Findings:
     data.qpos[2] = floor.RADIUS - _DEEP
     deep = floor.depth(data)
     mj.mj_forward(model, data)
-    return tip, found(deep, floor.depth(data), _DEEP, "a contact")
+    return tip, found(deep, floor.depth(data), _DEEP, "the contact")
 
 
 def pybullet() -> Findings:
@@ -56,7 +56,7 @@ def pybullet() -> Findings:
         pb.resetJointState(body, 0, _ANGLE, 0, client)
         read = pb.getLinkState(body, 1, physicsClientId=client)[4]
         again = pb.getLinkState(body, 1, computeForwardKinematics=1, physicsClientId=client)[4]
-        tip = found(read, again, tip_at(_ANGLE), "a tip")
+        tip = found(read, again, tip_at(_ANGLE), "the tip")
     with world() as (pb, client):
         ball = floor.in_pybullet(pb, client, 1)
         pb.performCollisionDetection(client)
@@ -64,7 +64,7 @@ def pybullet() -> Findings:
         pb.resetBasePositionAndOrientation(ball, at, (0, 0, 0, 1), client)
         read = floor.depth_in_pybullet(pb, client)
         pb.performCollisionDetection(client)
-        return tip, found(read, floor.depth_in_pybullet(pb, client), _DEEP, "a contact")
+        return tip, found(read, floor.depth_in_pybullet(pb, client), _DEEP, "the contact")
 
 
 def pinocchio() -> Findings:
@@ -80,6 +80,6 @@ def pinocchio() -> Findings:
     pin.updateFramePlacements(model, data)
     now = data.oMf[tip].translation
     return (
-        found(reads[0], now, tip_at(_ANGLE), "a tip"),
-        found(reads[1], now, tip_at(_ANGLE), "a tip, after forwardKinematics"),
+        found(reads[0], now, tip_at(_ANGLE), "the tip"),
+        found(reads[1], now, tip_at(_ANGLE), "the tip, after forwardKinematics"),
     )
