@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from typing import Any
 
 from ..conventions._pendulum import MJCF, tip_at
@@ -50,10 +49,12 @@ def _was_reset(n: Any) -> bool:
 
 
 def _restored(n: Any) -> bool:
-    """And the hundred steps would have led somewhere else."""
-    other = copy.copy(n.d)
-    n.mujoco.mj_step(n.m, other, 100)
-    return _was_reset(n) and abs(other.qpos[0]) > 0.1
+    """And again, from where a hundred steps lead."""
+    back = _was_reset(n)
+    n.mujoco.mj_step(n.m, n.d, 100)
+    away = abs(n.d.qpos[0])
+    n.mujoco.mj_setState(n.m, n.d, n.saved, n.part)
+    return back and away > 0.1 and _was_reset(n)
 
 
 def _apart(n: Any) -> bool:

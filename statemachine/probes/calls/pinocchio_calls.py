@@ -57,6 +57,12 @@ def _was_reset(n: Any) -> bool:
     return _has_no(n, "reset") and near(tip, (TIP, 0, 0), 1e-12) and not n.v.any()
 
 
+def _restored(n: Any) -> bool:
+    """What was kept is still what it was."""
+    q, v = n.saved
+    return _was_reset(n) and near((q[0], v[0]), (0, 0), 0)
+
+
 def _apart(n: Any) -> bool:
     for data, angle in zip(n.worlds, (0.1, 0.2, 0.3), strict=True):
         n.pin.framesForwardKinematics(n.m, data, np.array([angle]))
@@ -94,7 +100,7 @@ CELLS = {
         "saved = q.copy(), v.copy()  # they are yours\n"
         "q = pin.integrate(m, q, np.ones(m.nv))\n"
         "q, v = saved  # back",
-        _was_reset,
+        _restored,
     ),
     "many worlds": Cell("worlds = [m.createData() for _ in range(3)]", _apart),
 }

@@ -59,10 +59,12 @@ def _was_reset(n: Any) -> bool:
 
 
 def _restored(n: Any) -> bool:
-    """And the joint can be somewhere else."""
+    """And again, from where it was put then."""
     back = _joint(n)
     n.pb.resetJointState(n.arm, 0, 1.0, physicsClientId=n.w)
-    return back == (0, 0) and _joint(n) == (1, 0)
+    away = _joint(n)
+    n.pb.restoreState(n.saved, physicsClientId=n.w)
+    return away == (1, 0) and back == _joint(n) == (0, 0)
 
 
 def _apart(n: Any) -> bool:
