@@ -10,7 +10,7 @@ from . import ANGLE, Cell, near
 from ._law import accelerated
 
 FILE = ("arm.urdf", URDF)
-# Its base is told in single precision.
+# A link's frame is told in single precision.
 _SINGLE = 1e-6
 
 
@@ -46,6 +46,7 @@ def _commanded(n: Any) -> bool:
 
 
 def _recomputed(n: Any) -> bool:
+    """Of a link that was not asked for, too."""
     read = n.pb.getLinkState(n.arm, 1, physicsClientId=n.w)[4]
     return _stepped(n) and near(read, tip_at(_joint(n)[0]), _SINGLE)
 
@@ -91,7 +92,7 @@ CELLS = {
     ),
     "step": Cell("pb.stepSimulation(w)", _stepped),
     "recompute": Cell(
-        "pb.getLinkState(arm, 1, computeForwardKinematics=1,\n"
+        "pb.getLinkState(arm, 0, computeForwardKinematics=1,\n"
         "                physicsClientId=w)  # of all links of the body",
         _recomputed,
     ),

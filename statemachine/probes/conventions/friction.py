@@ -13,8 +13,8 @@ from ._lacking import lacking
 
 QUESTION = Question(
     "Two bodies touch: which friction is between them?",
-    "A grip that is tuned on one engine drops its object on another, with the same two numbers "
-    "in the file.",
+    "A grip that is tuned on one engine may drop its object on another, with the same two "
+    "numbers in the file.",
 )
 SMOOTH, ROUGH = 0.25, 0.75
 _RULES: dict[str, Callable[[float, float], float]] = {

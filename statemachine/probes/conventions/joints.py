@@ -13,8 +13,7 @@ from ._bullet import load, world
 
 QUESTION = Question(
     "In which order do the joints come, and does a fixed one take a number?",
-    "A command that is put in the order of another engine moves the wrong joints, and nothing "
-    "complains. Look joints up by name.",
+    "A command in the order of another engine moves the wrong joints. Look joints up by name.",
 )
 # (name, parent link, kind) in the order of the file; the link under a joint has its name.
 # Listed, depth first, breadth first, each by file or by alphabet: all different here.
