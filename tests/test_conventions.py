@@ -18,7 +18,7 @@ from rich.cells import cell_len
 
 from statemachine.engines import ENGINES, require
 from statemachine.errors import BadInputError, MissingEngineError, UnknownNameError
-from statemachine.probes import calls
+from statemachine.probes import phrasebook
 from statemachine.probes.conventions import (
     NO_ANSWER,
     QUESTIONS,
@@ -449,7 +449,9 @@ def test_a_pinocchio_that_steps(pin: Any, monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(pin, "stepWithContacts", lambda: None, raising=False)
     for question in ("step", "friction"):
         assert answers(question, "pinocchio") == {"": "stepWithContacts"}
-    found = {call.concept: call.works for call in calls.run(["pinocchio"]).engines["pinocchio"]}
+    found = {
+        call.concept: call.works for call in phrasebook.run(["pinocchio"]).engines["pinocchio"]
+    }
     assert not found["step"]
 
 
@@ -462,7 +464,7 @@ def test_no_world_and_no_file_stays(
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     monkeypatch.chdir(tmp_path)
     probe(["pybullet"])
-    calls.run(["pybullet"])
+    phrasebook.run(["pybullet"])
 
     def broken(*_arguments: Any) -> None:
         raise RuntimeError("as seeded")
@@ -471,7 +473,7 @@ def test_no_world_and_no_file_stays(
     for question in ("gravity", "future", "save"):
         with pytest.raises(RuntimeError, match="as seeded"):
             ask(question, "pybullet")
-    found = {call.concept: call for call in calls.run(["pybullet"]).engines["pybullet"]}
+    found = {call.concept: call for call in phrasebook.run(["pybullet"]).engines["pybullet"]}
     assert found["state"].works
     assert found["step"].said == "RuntimeError: as seeded"
     assert not any(pb.isConnected(client) for client in range(64))
@@ -482,17 +484,17 @@ def test_no_world_and_no_file_stays(
 
 
 def test_every_call_works(engine: str) -> None:
-    table = calls.run([engine]).engines[engine]
-    assert tuple(call.concept for call in table) == calls.CONCEPTS
+    table = phrasebook.run([engine]).engines[engine]
+    assert tuple(call.concept for call in table) == phrasebook.CONCEPTS
     assert [call.said for call in table if not call.works] == []
 
 
 def test_the_cells_of_an_engine_are_a_program(engine: str, tmp_path: Path) -> None:
     """As a reader would type them, with nothing of ours."""
-    module = __import__(f"statemachine.probes.calls.{engine}_calls", fromlist=["CELLS"])
+    module = __import__(f"statemachine.probes.phrasebook.{engine}_calls", fromlist=["CELLS"])
     file = tmp_path / module.FILE[0]
     file.write_text(module.FILE[1])
-    lines = [f"file = {str(file)!r}", *(module.CELLS[name].code for name in calls.CONCEPTS)]
+    lines = [f"file = {str(file)!r}", *(module.CELLS[name].code for name in phrasebook.CONCEPTS)]
     done = subprocess.run(
         [sys.executable, "-c", "\n".join([*lines, "print(len(worlds))"])],
         capture_output=True,
@@ -504,17 +506,17 @@ def test_the_cells_of_an_engine_are_a_program(engine: str, tmp_path: Path) -> No
     assert done.stdout.splitlines()[-1] == "3"
 
 
-@pytest.mark.parametrize("concept", calls.CONCEPTS[1:])
+@pytest.mark.parametrize("concept", phrasebook.CONCEPTS[1:])
 def test_a_cell_that_does_nothing_is_found_out(
     engine: str, concept: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    module = __import__(f"statemachine.probes.calls.{engine}_calls", fromlist=["CELLS"])
+    module = __import__(f"statemachine.probes.phrasebook.{engine}_calls", fromlist=["CELLS"])
     monkeypatch.setitem(
         module.CELLS, concept, dataclasses.replace(module.CELLS[concept], code="pass")
     )
-    found = {call.concept: call for call in calls.run([engine]).engines[engine]}
+    found = {call.concept: call for call in phrasebook.run([engine]).engines[engine]}
     assert not found[concept].works
-    page = report.calls_page(calls.run([engine]))
+    page = report.calls_page(phrasebook.run([engine]))
     assert not page.holds
     table = next(block for block in page.blocks if getattr(block, "title", "") == concept)
     assert table.rows[0][1] == "✗"  # pyright: ignore
@@ -537,13 +539,13 @@ def test_the_page_reads_well_piped(cli: Cli, arguments: tuple[str, ...]) -> None
     assert "✗" not in done.stdout
     assert UNDECIDED not in done.stdout
     assert all(name in done.stdout for name in ENGINES)
-    wanted = calls.CONCEPTS if arguments else [f"{name}: " for name in QUESTIONS]
+    wanted = phrasebook.CONCEPTS if arguments else [f"{name}: " for name in QUESTIONS]
     assert all(any(line.startswith(each) for line in lines) for each in wanted)
 
 
 def test_no_line_of_code_is_broken_on_the_page(cli: Cli, engine: str) -> None:
     text = cli("conventions", "--calls", "--backend", engine).stdout
-    for call in calls.run([engine]).engines[engine]:
+    for call in phrasebook.run([engine]).engines[engine]:
         for line in call.code.splitlines():
             assert f"   {line}\n" in text
 
@@ -564,7 +566,7 @@ def test_the_calls_as_json(cli: Cli, engine: str) -> None:
     done = cli("conventions", "--calls", "--backend", engine, "--json")
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)["engines"][engine]
-    assert [call["concept"] for call in found] == list(calls.CONCEPTS)
+    assert [call["concept"] for call in found] == list(phrasebook.CONCEPTS)
     assert all(call["works"] and call["code"] for call in found)
 
 

@@ -30,7 +30,7 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Ask, and show."""
-    from ..probes import calls, conventions
+    from ..probes import conventions, phrasebook
     from ..report import conventions as report
     from ..report.progress import progress
 
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     engines = _engines(options.backend)
     if options.calls:
         with progress("calls") as told:
-            table = calls.run(engines, told)
+            table = phrasebook.run(engines, told)
         return show(report.calls_page(table), table, options.json)
     with progress("conventions") as told:
         result = conventions.probe(engines, options.question or conventions.QUESTIONS, told)

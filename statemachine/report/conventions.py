@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 
 from ..page import Block, Page, Table, Text, Verdict
-from ..probes.calls import CONCEPTS, Calls
 from ..probes.conventions import Answered, Conventions, Figure
+from ..probes.phrasebook import CONCEPTS, Calls
 
 _ZERO = 1e-12
 # Units as a reader has them; a result has SI.
