@@ -102,6 +102,7 @@ def overview(_options: argparse.Namespace) -> int:
         "",
         "And beside them:",
         f"  {PROGRAM} fingertip        the engine against an independent witness",
+        f"  {PROGRAM} conventions      what each engine takes for granted",
         f"  {PROGRAM} doctor           what this machine has, and what to do",
         "",
         f"Each takes --help. Start with: {PROGRAM} lesson",

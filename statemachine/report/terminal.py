@@ -13,7 +13,20 @@ if TYPE_CHECKING:
 
 # Spellings for a terminal that has no Unicode; what is not here becomes a question mark.
 _ASCII = str.maketrans(
-    {"−": "-", "–": "-", "×": "x", "·": "*", "°": " deg", "µ": "u", "Δ": "d", "\u0307": "'"}
+    {
+        "−": "-",
+        "–": "-",
+        "×": "x",
+        "·": "*",
+        "°": " deg",
+        "µ": "u",
+        "Δ": "d",
+        "\u0307": "'",
+        "…": "...",
+        "²": "^2",
+        "✓": "yes",
+        "✗": "NO",
+    }
 )
 _WIDTH_PIPED = 80
 _WIDTH_MOST = 100

@@ -1,0 +1,69 @@
+"""`statemachine conventions`: what each engine takes for granted, asked of the engines."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from ..engines import ENGINES, require
+from ..errors import BadInputError, MissingEngineError
+from ._common import MISSING, PROGRAM, add_json, complain, show
+
+
+def add(commands: Any) -> None:
+    """The subparser."""
+    parser = commands.add_parser(
+        "conventions",
+        help="what each engine takes for granted, asked of the engines",
+        description="Ask the engines themselves, not our backends: every answer is measured.",
+    )
+    parser.add_argument(
+        "question", nargs="*", help="only these, such as quaternion or gravity (default: all)"
+    )
+    parser.add_argument("--calls", action="store_true", help="which call does what, each run")
+    parser.add_argument(
+        "--backend", default="all", metavar="NAME", help="an engine, or all (default all)"
+    )
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Ask, and show."""
+    from ..probes import conventions, phrasebook
+    from ..report import conventions as report
+    from ..report.progress import progress
+
+    if options.calls and options.question:
+        raise BadInputError("--calls shows all calls: it takes no question")
+    conventions.check_questions(options.question)
+    engines = _engines(options.backend)
+    if options.calls:
+        with progress("calls") as told:
+            table = phrasebook.run(engines, told)
+        return show(report.calls_page(table), table, options.json)
+    with progress("conventions") as told:
+        result = conventions.probe(engines, options.question or conventions.QUESTIONS, told)
+    footer = f"Which call does what on each engine: {PROGRAM} conventions --calls"
+    return show(report.page(result), result, options.json, footer)
+
+
+def _engines(asked: str) -> list[str]:
+    """The engine that was asked for; of all, those that load, and a line for each other."""
+    if asked != "all":
+        require(asked)
+        return [asked]
+    found: list[str] = []
+    missing: list[MissingEngineError] = []
+    for name in ENGINES:
+        try:
+            require(name)
+        except MissingEngineError as error:
+            missing.append(error)
+        else:
+            found.append(name)
+    for error in missing if found else missing[:-1]:
+        complain(error, MISSING)
+    if not found:
+        raise missing[-1]
+    return found

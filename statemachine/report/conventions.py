@@ -1,0 +1,76 @@
+"""What each engine takes for granted, and which call does what, as pages."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from ..page import Block, Page, Table, Text, Verdict
+from ..probes.conventions import Answered, Conventions, Figure
+from ..probes.phrasebook import CONCEPTS, Calls
+
+_ZERO = 1e-12
+# Units as a reader has them; a result has SI.
+_SHOWN = {"m": (1e3, "mm"), "s": (1e3, "ms"), "rad": (180 / math.pi, "°")}
+
+
+def page(result: Conventions) -> Page:
+    """One table for each question, and why it matters."""
+    blocks: list[Block] = []
+    for answered in result.questions:
+        blocks += [_table(answered), Text(answered.question.why)]
+    return Page("What the engines take for granted", _origin(result.versions), blocks)
+
+
+def calls_page(result: Calls) -> Page:
+    """One table for each concept, and whether all of its calls did what they should."""
+    blocks: list[Block] = []
+    for concept in CONCEPTS:
+        rows = []
+        for engine, calls in result.engines.items():
+            call = next(each for each in calls if each.concept == concept)
+            rows.append((engine, "✓" if call.works else "✗", call.code))
+        blocks.append(Table(("", "", "what to type"), rows, concept, frozenset({0, 1, 2})))
+    every = [(engine, call) for engine, calls in result.engines.items() for call in calls]
+    wrong = [(engine, call) for engine, call in every if not call.works]
+    blocks += [Verdict(f"{engine}, {call.concept}: {call.said}", False) for engine, call in wrong]
+    count = f"{len(every) - len(wrong)} of {len(every)} calls ran"
+    blocks.append(Verdict(f"{count}, and what they should do happened", not wrong))
+    return Page("Which call does what", _origin(result.versions), blocks)
+
+
+def _origin(versions: Mapping[str, str]) -> str:
+    return ", ".join(f"{engine} {version}" for engine, version in versions.items())
+
+
+def _table(answered: Answered) -> Table:
+    parts = any(finding.of for each in answered.findings.values() for finding in each)
+    rows = []
+    for engine, findings in answered.findings.items():
+        for k, finding in enumerate(findings):
+            measured = ", ".join(_text(figure) for figure in finding.figures)
+            part = (finding.of,) if parts else ()
+            rows.append(("" if k else engine, *part, finding.answer, measured))
+    headers = ("", *([""] if parts else []), "answer", "measured")
+    return Table(
+        headers, rows, f"{answered.name}: {answered.question.title}", frozenset(range(len(headers)))
+    )
+
+
+def _number(value: float) -> str:
+    return f"{value + 0:.{3 if abs(value) >= 1e-3 else 2}g}"
+
+
+def _text(figure: Figure) -> str:
+    values = figure.value if isinstance(figure.value, tuple) else (figure.value,)
+    numbers = [each for each in values if not isinstance(each, str)]
+    most = max(map(abs, numbers), default=0.0)
+    factor, unit = _SHOWN.get(figure.unit, (1, figure.unit))
+    words = [
+        # Beside a large number, one that is only rounding is nothing.
+        each if isinstance(each, str) else _number(factor * each if abs(each) > _ZERO * most else 0)
+        for each in values
+    ]
+    shown = (" " if numbers else ", ").join(words) or "nothing"
+    gap = "" if unit in ("", "°") else " "
+    return f"{figure.name} {shown}{gap}{unit}".strip()

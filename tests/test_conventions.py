@@ -1,0 +1,656 @@
+"""What the engines take for granted: the known facts, and probes that can answer otherwise."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.cells import cell_len
+
+from statemachine.engines import ENGINES, require
+from statemachine.errors import BadInputError, MissingEngineError, UnknownNameError
+from statemachine.probes import phrasebook
+from statemachine.probes.conventions import (
+    NO_ANSWER,
+    QUESTIONS,
+    UNDECIDED,
+    _mujoco_scene,
+    _pendulum,
+    ask,
+    closest,
+    joints,
+    probe,
+)
+from statemachine.report import conventions as report
+
+from .conftest import ROOT, Cli, need_engine
+
+DEPTH, ALPHABET = "depth first, children as listed", "depth first, children by alphabet"
+# What each engine answers, by part of the question; measured by others and by hand before.
+FACTS = {
+    "quaternion": {
+        "mujoco": {"": "wxyz"},
+        "pybullet": {"": "xyzw"},
+        "pinocchio": {"": "xyzw"},
+    },
+    "velocity": {
+        "mujoco": {
+            "position": "body origin",
+            "order": "linear first",
+            "linear": "world axes, body origin",
+            "angular": "body axes",
+        },
+        "pybullet": {
+            "position": "centre of mass",
+            "order": "linear first",
+            "linear": "world axes, centre of mass",
+            "angular": "world axes",
+        },
+        "pinocchio": {
+            "position": "body origin",
+            "order": "linear first",
+            "linear": "body axes, body origin",
+            "angular": "body axes",
+        },
+    },
+    "gravity": {
+        "mujoco": {"": "0 0 -9.81"},
+        "pybullet": {"": "0 0 0"},
+        "pinocchio": {"": "0 0 -9.81"},
+    },
+    "timestep": {
+        "mujoco": {"one step": "2 ms", "clock": "data.time"},
+        "pybullet": {"one step": f"{1e3 / 240:.4g} ms", "clock": "none"},
+        "pinocchio": {"one step": NO_ANSWER},
+    },
+    "actuation": {
+        "mujoco": {"no actuator": "falls", "a position actuator": "held"},
+        "pybullet": {"as loaded": "held", "motor off": "falls"},
+        "pinocchio": {"aba at zero torque": "falls"},
+    },
+    "write": {
+        "mujoco": {"the tip": "stale", "the contact": "stale"},
+        "pybullet": {"the tip": "fresh", "the contact": "stale"},
+        "pinocchio": {"the tip": "stale", "the tip, after forwardKinematics": "stale"},
+    },
+    "step": {
+        "mujoco": {"the tip": "stale", "the contact": "stale"},
+        "pybullet": {"the tip": "stale", "the contact": "stale"},
+        "pinocchio": {"": NO_ANSWER},
+    },
+    "joints": {
+        "mujoco": {
+            "URDF": DEPTH,
+            "fixed joint, URDF": "none",
+            "MJCF": DEPTH,
+            "fixed joint, MJCF": "none",
+        },
+        "pybullet": {"URDF": DEPTH, "fixed joint, URDF": "takes a number"},
+        "pinocchio": {
+            "URDF": ALPHABET,
+            "fixed joint, URDF": "none",
+            "MJCF": DEPTH,
+            "fixed joint, MJCF": "none",
+        },
+    },
+    "reset": {
+        "mujoco": {"mj_resetData": "keeps gravity, timestep, bodies"},
+        "pybullet": {
+            "resetSimulation": "keeps timestep",
+            "resetBase…, resetJointState": (
+                "keeps motor target, applied force, gravity, timestep, bodies"
+            ),
+        },
+        "pinocchio": {"": NO_ANSWER},
+    },
+    "friction": {
+        "mujoco": {"equal priority": "the larger", "the block has priority": "the block's"},
+        "pybullet": {"": "their product"},
+        "pinocchio": {"": NO_ANSWER},
+    },
+    "save": {
+        "mujoco": {
+            "qpos and qvel copied": (
+                "forgets time, ctrl, applied forces, warm start, gravity, timestep"
+            ),
+            "mjSTATE_FULLPHYSICS": "forgets ctrl, applied forces, warm start, gravity, timestep",
+            "mjSTATE_INTEGRATION": "forgets gravity, timestep",
+        },
+        "pybullet": dict.fromkeys(
+            (
+                "positions, velocities written",
+                "saveState, restoreState",
+                "saveBullet, restoreState",
+            ),
+            "forgets motor target, applied force, gravity, timestep",
+        ),
+        "pinocchio": {"": NO_ANSWER},
+    },
+    "future": {
+        "mujoco": {
+            "mj_resetData": "exact",
+            "qpos and qvel copied": "differs",
+            "mjSTATE_FULLPHYSICS": "differs",
+            "mjSTATE_INTEGRATION": "exact",
+        },
+        "pybullet": {
+            "resetSimulation": "exact",
+            "resetBase…, resetJointState": "differs",
+            "positions, velocities written": "differs",
+            "saveState, restoreState": "differs",
+            "saveBullet, restoreState": "differs",
+        },
+        "pinocchio": {"a used Data, a new one": "exact"},
+    },
+}
+
+
+def answers(question: str, engine: str) -> dict[str, str]:
+    return {finding.of: finding.answer for finding in ask(question, engine)}
+
+
+def figures(question: str, engine: str, of: str = "") -> dict[str, Any]:
+    finding = next(each for each in ask(question, engine) if each.of == of)
+    return {figure.name: figure.value for figure in finding.figures}
+
+
+@pytest.fixture(params=ENGINES)
+def engine(request: pytest.FixtureRequest) -> str:
+    need_engine(request.param)
+    return request.param
+
+
+@pytest.fixture
+def mj() -> ModuleType:
+    return require("mujoco")
+
+
+@pytest.fixture
+def pb() -> Any:
+    need_engine("pybullet")
+    return require("pybullet")
+
+
+@pytest.fixture
+def pin() -> ModuleType:
+    need_engine("pinocchio")
+    return require("pinocchio")
+
+
+# The facts.
+
+
+@pytest.mark.parametrize("question", QUESTIONS)
+def test_the_engines_are_as_they_were(question: str, engine: str) -> None:
+    """When this fails, an engine has changed: look at the README and at our backends."""
+    assert answers(question, engine) == FACTS[question][engine]
+
+
+def test_every_question_has_facts() -> None:
+    assert tuple(FACTS) == QUESTIONS
+
+
+def test_the_figures_are_those_of_closed_forms(mj: ModuleType, pb: Any) -> None:
+    """Not what the engines gave before: what they must give."""
+    # A tip at 0.8 m and 0.4 rad is a chord away from where it was.
+    assert figures("write", "mujoco", "the tip")["off by"] == pytest.approx(0.8 * 2 * 0.198669331)
+    # It lags by its way in one step: speed · timestep.
+    assert figures("step", "mujoco", "the contact")["off by"] == pytest.approx(3 * 0.002)
+    assert figures("step", "mujoco", "the tip")["off by"] == pytest.approx(0.8 * 3 * 0.002, 0.02)
+    assert figures("step", "pybullet", "the tip")["off by"] == pytest.approx(0.8 * 3 / 240, 0.02)
+    held = figures("actuation", "pybullet", "as loaded")
+    assert held["moves"] == pytest.approx(0, abs=1e-6)
+    assert -held["its motor exerts"] == pytest.approx(9.81 * 0.5)
+    slopes = figures("friction", "pybullet").values()
+    assert all(slope == pytest.approx(0.25 * 0.75, rel=0.05) for slope in slopes)
+    slopes = figures("friction", "mujoco", "equal priority").values()
+    assert all(slope == pytest.approx(0.75, rel=0.05) for slope in slopes)
+
+
+def test_a_second_look_sees_the_same() -> None:
+    """Bit by bit: nothing is random, and no probe leaves a trace in the next."""
+    found = [name for name in ENGINES if not _is_missing(name)]
+    assert probe(found) == probe(found)
+
+
+def _is_missing(name: str) -> bool:
+    try:
+        require(name)
+    except MissingEngineError:
+        return True
+    return False
+
+
+def test_the_limp_pendulum_keeps_its_energy() -> None:
+    """Half I ω² is what gravity gave; ω by a difference of two angles."""
+    h = 1e-4
+    for seconds in (0.1, 0.25, 0.4):
+        rate = (_pendulum.limp(seconds + h) - _pendulum.limp(seconds - h)) / (2 * h)
+        fallen = -_pendulum.tip_at(_pendulum.limp(seconds))[2] / _pendulum.TIP
+        assert rate**2 == pytest.approx(2 * _pendulum.RATE * fallen, rel=1e-5)
+
+
+def test_no_two_orders_of_the_joints_are_the_same() -> None:
+    moving = [[name for name in order if name != joints.FIXED] for order in joints.ORDERS.values()]
+    assert len({tuple(order) for order in moving}) == len(joints.ORDERS)
+    assert all(sorted(order) == sorted(moving[0]) for order in moving)
+
+
+def test_what_nothing_explains_is_undecided() -> None:
+    assert closest({"a": 0.1, "b": 1.0, "c": 2.0}) == ("a", 0.1, 1.0)
+    assert closest({"a": 0.9, "b": 1.0})[0] == UNDECIDED
+    assert closest({"a": 0.0, "b": 0.0})[0] == UNDECIDED
+
+
+# An engine that behaved otherwise would get another answer.
+
+
+def test_quaternions_in_another_order(pb: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    put, tell = pb.resetBasePositionAndOrientation, pb.getBasePositionAndOrientation
+
+    def told(body: int, client: int) -> Any:
+        pos, (x, y, z, w) = tell(body, client)
+        return pos, (w, x, y, z)
+
+    monkeypatch.setattr(pb, "getBasePositionAndOrientation", told)
+    assert answers("quaternion", "pybullet") == {"": "xyzw written, wxyz read"}
+    monkeypatch.setattr(
+        pb,
+        "resetBasePositionAndOrientation",
+        lambda body, pos, quat, client: put(body, pos, (*quat[1:], quat[0]), client),
+    )
+    assert answers("quaternion", "pybullet") == {"": "wxyz"}
+
+
+def test_velocities_in_another_order(pb: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    put = pb.resetBaseVelocity
+    monkeypatch.setattr(pb, "resetBaseVelocity", lambda body, v, w, client: put(body, w, v, client))
+    assert answers("velocity", "pybullet") == FACTS["velocity"]["pybullet"] | {
+        "order": "angular first"
+    }
+
+
+def test_velocities_in_other_axes(pin: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    integrate = pin.integrate
+
+    def along_the_world(model: Any, q: Any, v: Any) -> Any:
+        turn = pin.XYZQUATToSE3(q).rotation
+        return integrate(model, q, np.concatenate((turn.T @ v[:3], turn.T @ v[3:])))
+
+    monkeypatch.setattr(pin, "integrate", along_the_world)
+    assert answers("velocity", "pinocchio") == FACTS["velocity"]["pinocchio"] | {
+        "linear": "world axes, body origin",
+        "angular": "world axes",
+    }
+
+
+def test_a_fresh_world_with_gravity_and_another_timestep(
+    pb: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    connect = pb.connect
+
+    def prepared(mode: int) -> int:
+        client = connect(mode)
+        pb.setGravity(0, -1.5, -3, client)
+        pb.setTimeStep(0.01, client)
+        return client
+
+    monkeypatch.setattr(pb, "connect", prepared)
+    assert answers("gravity", "pybullet") == {"": "0 -1.5 -3"}
+    assert answers("timestep", "pybullet")["one step"] == "10 ms"
+
+
+def test_an_engine_that_tells_what_it_does_not_do(pb: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    tell = pb.getPhysicsEngineParameters
+    lie = {"gravityAccelerationZ": -9.81, "fixedTimeStep": 0.002}
+    monkeypatch.setattr(pb, "getPhysicsEngineParameters", lambda client: tell(client) | lie)
+    assert answers("gravity", "pybullet") == {"": "told 0 0 -9.81, felt 0 0 0"}
+    assert answers("timestep", "pybullet")["one step"] == "told 2 ms, moves 4.167 ms"
+
+
+def test_an_engine_with_a_clock(pb: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    tell, step, time = pb.getPhysicsEngineParameters, pb.stepSimulation, [0.0]
+
+    def stepped(client: int) -> None:
+        step(client)
+        time[0] += 1 / 240
+
+    monkeypatch.setattr(pb, "stepSimulation", stepped)
+    monkeypatch.setattr(
+        pb, "getPhysicsEngineParameters", lambda client: tell(client) | {"time": time[0]}
+    )
+    assert answers("timestep", "pybullet")["clock"] == "time"
+
+
+def test_joints_without_a_motor(pb: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    load = pb.loadURDF
+
+    def limp(file: str, **more: Any) -> int:
+        body = load(file, **more)
+        pb.setJointMotorControl2(
+            body, 0, pb.VELOCITY_CONTROL, force=0, physicsClientId=more["physicsClientId"]
+        )
+        return body
+
+    monkeypatch.setattr(pb, "loadURDF", limp)
+    assert answers("actuation", "pybullet")["as loaded"] == "falls"
+
+
+def test_a_step_that_recomputes(mj: Any, pb: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    step, bullet = mj.mj_step, pb.stepSimulation
+
+    def fresh(model: Any, data: Any, nstep: int = 1) -> None:
+        step(model, data, nstep)
+        mj.mj_forward(model, data)
+
+    def fresh_in_pybullet(client: int) -> None:
+        bullet(client)
+        for body in range(pb.getNumBodies(client)):
+            for link in range(pb.getNumJoints(body, client)):
+                pb.getLinkState(body, link, computeForwardKinematics=1, physicsClientId=client)
+
+    monkeypatch.setattr(mj, "mj_step", fresh)
+    monkeypatch.setattr(pb, "stepSimulation", fresh_in_pybullet)
+    assert answers("step", "mujoco") == {"the tip": "fresh", "the contact": "fresh"}
+    assert answers("step", "pybullet") == {"the tip": "fresh", "the contact": "stale"}
+
+
+def test_a_recomputation_that_does_nothing(mj: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both readings are alike then, and both are wrong: that is not called fresh."""
+    monkeypatch.setattr(mj, "mj_forward", lambda model, data: None)
+    assert answers("write", "mujoco") == {"the tip": UNDECIDED, "the contact": UNDECIDED}
+
+
+def test_joints_in_another_order(pb: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    tell = pb.getJointInfo
+    names = sorted(name for name, _, _ in joints.TREE)
+    monkeypatch.setattr(
+        pb,
+        "getJointInfo",
+        lambda body, k, client: (k, names[k].encode(), *tell(body, k, client)[2:]),
+    )
+    assert answers("joints", "pybullet")["URDF"] == "by alphabet"
+    monkeypatch.setattr(pb, "getJointInfo", lambda body, k, client: (k, names[k - 1].encode()))
+    assert answers("joints", "pybullet")["URDF"] == UNDECIDED
+
+
+def test_another_rule_of_friction(pb: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The product of two roots is the geometric mean."""
+    change = pb.changeDynamics
+
+    def rooted(body: int, link: int, lateralFriction: float, **more: Any) -> None:  # noqa: N803
+        change(body, link, lateralFriction=lateralFriction**0.5, **more)
+
+    monkeypatch.setattr(pb, "changeDynamics", rooted)
+    assert answers("friction", "pybullet") == {"": "their geometric mean"}
+
+
+def test_a_reset_that_keeps_other_things(mj: Any, pb: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    reset, bullet = mj.mj_resetData, pb.resetSimulation
+
+    def keeps_time(model: Any, data: Any) -> None:
+        time = data.time
+        reset(model, data)
+        data.time = time
+
+    def forgets_the_timestep(physicsClientId: int) -> None:  # noqa: N803
+        bullet(physicsClientId=physicsClientId)
+        pb.setTimeStep(1 / 240, physicsClientId)
+
+    monkeypatch.setattr(mj, "mj_resetData", keeps_time)
+    monkeypatch.setattr(pb, "resetSimulation", forgets_the_timestep)
+    assert answers("reset", "mujoco") == {"mj_resetData": "keeps time, gravity, timestep, bodies"}
+    assert answers("reset", "pybullet")["resetSimulation"] == "keeps nothing"
+
+
+def test_a_restore_that_loses_the_warm_start(mj: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    put = mj.mj_setState
+
+    def lossy(model: Any, data: Any, state: Any, part: Any) -> None:
+        put(model, data, state, part)
+        data.qacc_warmstart[:] = 0
+
+    monkeypatch.setattr(mj, "mj_setState", lossy)
+    way = "mjSTATE_INTEGRATION"
+    assert answers("save", "mujoco")[way] == "forgets warm start, gravity, timestep"
+    assert answers("future", "mujoco")[way] == "differs"
+
+
+def test_an_engine_without_a_warm_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Then positions and velocities are all that there is."""
+    flag = '<option><flag warmstart="disable"/></option><worldbody>'
+    text = _mujoco_scene.MJCF.replace("<worldbody>", flag)
+    monkeypatch.setattr(_mujoco_scene, "MJCF", text)
+    assert set(answers("future", "mujoco").values()) == {"exact"}
+
+
+def test_a_file_that_restores_nothing(pb: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    restore = pb.restoreState
+    monkeypatch.setattr(
+        pb,
+        "restoreState",
+        lambda state=-1, fileName="", **more: None if fileName else restore(state, **more),  # noqa: N803
+    )
+    found = answers("save", "pybullet")
+    assert found["saveBullet, restoreState"].startswith("forgets joint position, joint velocity")
+    assert found["saveState, restoreState"] == FACTS["save"]["pybullet"]["saveState, restoreState"]
+
+
+def test_a_pinocchio_that_steps(pin: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pin, "stepWithContacts", lambda: None, raising=False)
+    for question in ("step", "friction"):
+        assert answers(question, "pinocchio") == {"": "stepWithContacts"}
+    found = {
+        call.concept: call.works for call in phrasebook.run(["pinocchio"]).engines["pinocchio"]
+    }
+    assert not found["step"]
+
+
+# What is left behind.
+
+
+def test_no_world_and_no_file_stays(
+    pb: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    probe(["pybullet"])
+    phrasebook.run(["pybullet"])
+
+    def broken(*_arguments: Any) -> None:
+        raise RuntimeError("as seeded")
+
+    monkeypatch.setattr(pb, "stepSimulation", broken)
+    for question in ("gravity", "future", "save"):
+        with pytest.raises(RuntimeError, match="as seeded"):
+            ask(question, "pybullet")
+    found = {call.concept: call for call in phrasebook.run(["pybullet"]).engines["pybullet"]}
+    assert found["state"].works
+    assert found["step"].said == "RuntimeError: as seeded"
+    assert not any(pb.isConnected(client) for client in range(64))
+    assert not list(tmp_path.iterdir())
+
+
+# The calls.
+
+
+def test_every_call_works(engine: str) -> None:
+    table = phrasebook.run([engine]).engines[engine]
+    assert tuple(call.concept for call in table) == phrasebook.CONCEPTS
+    assert [call.said for call in table if not call.works] == []
+
+
+def test_the_cells_of_an_engine_are_a_program(engine: str, tmp_path: Path) -> None:
+    """As a reader would type them, with nothing of ours."""
+    module = __import__(f"statemachine.probes.phrasebook.{engine}_calls", fromlist=["CELLS"])
+    file = tmp_path / module.FILE[0]
+    file.write_text(module.FILE[1])
+    lines = [f"file = {str(file)!r}", *(module.CELLS[name].code for name in phrasebook.CONCEPTS)]
+    done = subprocess.run(
+        [sys.executable, "-c", "\n".join([*lines, "print(len(worlds))"])],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "3"
+
+
+@pytest.mark.parametrize("concept", phrasebook.CONCEPTS[1:])
+def test_a_cell_that_does_nothing_is_found_out(
+    engine: str, concept: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = __import__(f"statemachine.probes.phrasebook.{engine}_calls", fromlist=["CELLS"])
+    monkeypatch.setitem(
+        module.CELLS, concept, dataclasses.replace(module.CELLS[concept], code="pass")
+    )
+    found = {call.concept: call for call in phrasebook.run([engine]).engines[engine]}
+    assert not found[concept].works
+    page = report.calls_page(phrasebook.run([engine]))
+    assert not page.holds
+    table = next(block for block in page.blocks if getattr(block, "title", "") == concept)
+    assert table.rows[0][1] == "✗"  # pyright: ignore
+
+
+# The command.
+
+
+@pytest.mark.parametrize("arguments", [(), ("--calls",)])
+def test_the_page_reads_well_piped(cli: Cli, arguments: tuple[str, ...]) -> None:
+    for name in ENGINES:
+        need_engine(name)
+    done = cli("conventions", *arguments)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    lines = done.stdout.splitlines()
+    assert max(map(cell_len, lines)) <= 80
+    assert all(line == line.rstrip() for line in lines)
+    assert "\x1b" not in done.stdout
+    assert "✗" not in done.stdout
+    assert UNDECIDED not in done.stdout
+    assert all(name in done.stdout for name in ENGINES)
+    wanted = phrasebook.CONCEPTS if arguments else [f"{name}: " for name in QUESTIONS]
+    assert all(any(line.startswith(each) for line in lines) for each in wanted)
+
+
+def test_no_line_of_code_is_broken_on_the_page(cli: Cli, engine: str) -> None:
+    text = cli("conventions", "--calls", "--backend", engine).stdout
+    for call in phrasebook.run([engine]).engines[engine]:
+        for line in call.code.splitlines():
+            assert f"   {line}\n" in text
+
+
+def test_the_answers_as_json(cli: Cli, engine: str) -> None:
+    done = cli("conventions", "quaternion", "gravity", "--backend", engine, "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert list(found["versions"]) == [engine]
+    assert [each["name"] for each in found["questions"]] == ["quaternion", "gravity"]
+    for each in found["questions"]:
+        (finding,) = each["findings"][engine]
+        assert finding["answer"] == FACTS[each["name"]][engine][""]
+        assert {"name", "value", "unit"} == finding["figures"][0].keys()
+
+
+def test_the_calls_as_json(cli: Cli, engine: str) -> None:
+    done = cli("conventions", "--calls", "--backend", engine, "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)["engines"][engine]
+    assert [call["concept"] for call in found] == list(phrasebook.CONCEPTS)
+    assert all(call["works"] and call["code"] for call in found)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("gravty",), "Did you mean 'gravity'?"),
+        (("--backend", "mujcoo"), "Did you mean 'mujoco'?"),
+        (("gravity", "--calls"), "takes no question"),
+    ],
+)
+def test_bad_input_is_one_line(cli: Cli, arguments: tuple[str, ...], words: str) -> None:
+    done = cli("conventions", *arguments)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert words in done.stderr
+    assert done.stdout == ""
+
+
+def _in_a_process(prepare: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    code = f"import sys\n{prepare}\nfrom statemachine.cli import main\nsys.exit(main({arguments}))"
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+
+
+def _without(*names: str) -> str:
+    return (
+        "import importlib.abc\n"
+        "class Gone(importlib.abc.MetaPathFinder):\n"
+        "    def find_spec(self, name, path, target=None):\n"
+        f"        if name in {names!r}: raise ModuleNotFoundError(name=name)\n"
+        "sys.meta_path.insert(0, Gone())"
+    )
+
+
+@pytest.mark.parametrize("more", [(), ("--calls",)])
+def test_a_missing_engine_is_left_out(more: tuple[str, ...]) -> None:
+    done = _in_a_process(_without("pybullet", "pinocchio"), "conventions", *more)
+    assert done.returncode == 0, done.stderr
+    lines = done.stderr.splitlines()
+    assert [line.split()[1] for line in lines] == ["pybullet", "pinocchio"]
+    assert "mujoco 4" in done.stdout
+    assert not any(line.startswith(("pybullet", "pinocchio")) for line in done.stdout.splitlines())
+
+
+@pytest.mark.parametrize(
+    ("gone", "arguments", "lines"),
+    [
+        (("pybullet",), ("--backend", "pybullet"), 1),
+        (("mujoco",), ("--calls", "--backend", "mujoco"), 1),
+        (tuple(ENGINES), (), 3),
+    ],
+)
+def test_the_only_engine_is_missing(
+    gone: tuple[str, ...], arguments: tuple[str, ...], lines: int
+) -> None:
+    done = _in_a_process(_without(*gone), "conventions", *arguments)
+    assert done.returncode == 3
+    assert len(done.stderr.splitlines()) == lines
+    assert done.stdout == ""
+
+
+def test_a_call_that_fails_is_the_exit_code() -> None:
+    spoilt = "import mujoco\nmujoco.mj_forward = lambda m, d: None"
+    done = _in_a_process(spoilt, "conventions", "--calls", "--backend", "mujoco")
+    assert done.returncode == 1
+    assert done.stderr == ""
+    assert "✗ mujoco, recompute: it ran, and what it should do did not happen" in done.stdout
+
+
+@pytest.mark.parametrize("what", ["--calls", "actuation"])
+def test_a_terminal_without_unicode(cli: Cli, what: str) -> None:
+    plain = {"PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"}
+    done = cli("conventions", what, "--backend", "mujoco", **plain)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.isascii()
+    assert done.stdout.count("?") == (0 if what == "--calls" else 1)  # that of the question
+
+
+def test_errors_of_the_library() -> None:
+    need: Callable[..., Any] = ask
+    with pytest.raises(UnknownNameError, match="gravity"):
+        need("gravty", "mujoco")
+    with pytest.raises(UnknownNameError, match="mujoco"):
+        need("gravity", "mujcoo")
+    assert issubclass(BadInputError, ValueError)
