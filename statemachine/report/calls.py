@@ -17,7 +17,7 @@ _SHOWN = {
     "mujoco": "the arrays, counts and options of MjData and MjModel",
     "pybullet": "what its getters tell without computing anything anew",
 }
-_LIBRARY = "no object"
+_NO_OBJECT = "no object"
 
 
 def blocks(recordings: Mapping[str, Recording]) -> list[Block]:
@@ -102,7 +102,7 @@ def _table(engine: str, statement: Statement) -> Table:
 
 
 def _title(owner: str, on: str, engine: str) -> str:
-    where = on or _LIBRARY
+    where = on or _NO_OBJECT
     return where if owner == engine else f"{owner}: {where}"
 
 
@@ -153,6 +153,11 @@ def _legend(recordings: Mapping[str, Recording]) -> Iterator[Text]:
             "The look-ahead is another copy. It is put where your data is and takes one step, so "
             "that contacts and forces can be read after forward and no time passes in yours. In "
             f"this run it was {_times(stepped['the look-ahead'])}."
+        )
+    if "pybullet" in recordings:
+        yield Text(
+            "On pybullet a Data's arrays are the interface's own: it copies between them and the "
+            "engine's hidden world, which is outside the engine's functions."
         )
     helpers = [
         call

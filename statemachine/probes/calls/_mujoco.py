@@ -26,21 +26,27 @@ _LARGE = 1 << 16  # bytes
 class _Object(Subject):
     """An MjData or MjModel; held weakly, so that it lives no longer than without us."""
 
-    def __init__(self, thing: Any, label: str) -> None:
-        super().__init__(label)
+    def __init__(self, thing: Any, kind: str) -> None:
+        super().__init__(kind)
         self._thing = weakref.ref(thing)
-        self.path = label
+        self._raw = False  # whether the variable is the engine's own object
 
     @property
     def thing(self) -> Any:
         """The object; None if it is gone."""
         return self._thing()
 
+    @property
+    def gone(self) -> bool:
+        return self.thing is None
+
+    def lead(self, label: str, raw: bool) -> None:
+        """A variable leads here: by its `raw`, or because it is the object."""
+        self.label, self.named, self._raw = label, True, raw
+
     def spelled(self, field: str) -> str:
         ours = field.partition("[")[0] in _OURS and isinstance(self, _MjData)
-        return f"{self.path}.{field}" if ours or self.raw else f"{self.path}.raw.{field}"
-
-    raw = False  # whether the variable is the engine's own object
+        return f"{self.title}.{field}" if ours or self._raw else f"{self.title}.raw.{field}"
 
 
 class _MjData(_Object):
@@ -67,8 +73,8 @@ class _MjData(_Object):
 
 
 class _MjModel(_Object):
-    def __init__(self, thing: Any, label: str) -> None:
-        super().__init__(thing, label)
+    def __init__(self, thing: Any, kind: str) -> None:
+        super().__init__(thing, kind)
         arrays = {
             name: value.nbytes
             for name in dir(type(thing))
@@ -144,9 +150,9 @@ class _Watch(Watch):
         known = self._known.get(id(thing))
         if known is None or known.thing is not thing:
             if isinstance(thing, self._module.MjModel):
-                known = _MjModel(thing, "an MjModel without a name")
+                known = _MjModel(thing, "an MjModel")
             else:
-                known = _MjData(thing, "an MjData without a name")
+                known = _MjData(thing, "an MjData")
             self._known[id(thing)] = known
         return known
 
@@ -173,8 +179,7 @@ class _Watch(Watch):
     def _label(self, thing: Any, label: str, raw: bool = False) -> None:
         subject = self._subject(thing)
         if not subject.named:
-            subject.label = subject.path = label
-            subject.named, subject.raw = True, raw
+            subject.lead(label, raw)
 
     def living(self) -> Sequence[Subject]:
         self._known = {key: each for key, each in self._known.items() if each.thing is not None}

@@ -64,14 +64,20 @@ _JOINT = ("joint positions", "joint velocities", "joint reaction forces", "joint
 class _World(Subject):
     """One world of the engine's, from its `connect` to its `disconnect`."""
 
-    def __init__(self, engine: Any, client: int, label: str) -> None:
-        super().__init__(label)
-        self.pb, self.client, self.open = engine, client, True
+    def __init__(self, engine: Any, client: int) -> None:
+        super().__init__("a world")
+        self._pb, self._client, self._open = engine, client, True
+
+    @property
+    def gone(self) -> bool:
+        # Once gone for good: the engine gives the number to another world.
+        self._open = self._open and bool(self._pb.isConnected(self._client))
+        return not self._open
 
     def look(self, thoroughly: bool = False) -> Look | None:
-        pb, client = self.pb, self.client
-        if not self.open or not pb.isConnected(client):
+        if self.gone:
             return None
+        pb, client = self._pb, self._client
         bodies = [pb.getBodyUniqueId(i, client) for i in range(pb.getNumBodies(client))]
         poses = [pb.getBasePositionAndOrientation(body, client) for body in bodies]
         speeds = [pb.getBaseVelocity(body, client) for body in bodies]
@@ -106,15 +112,19 @@ class _World(Subject):
         return [_BODIES] if before[_BODIES] != now[_BODIES] else super().differing(before, now)
 
     def spelled(self, field: str) -> str:
-        return f"{self.label}: {field}"
+        return f"{self.title}: {field}"
 
 
 class _Arrays(Subject):
     """The interface's own arrays of a Data: copies, and what was computed for a reader."""
 
     def __init__(self, machine: Machine, label: str) -> None:
-        super().__init__(label)
+        super().__init__("a Data", label)
         self._machine = weakref.ref(machine)  # a Data ends when the code lets go of it
+
+    @property
+    def gone(self) -> bool:
+        return self._machine() is None
 
     def look(self, thoroughly: bool = False) -> Look | None:
         machine = self._machine()
@@ -167,7 +177,7 @@ class _Watch(Watch):
     def made(self, function: str, args: Sequence[Any], result: Any) -> Subject | None:
         if function != "connect" or result < 0:
             return None
-        world = _World(self._bare, result, "a world without a name")
+        world = _World(self._bare, result)
         self._worlds[result] = world
         return world
 
@@ -196,14 +206,16 @@ class _Watch(Watch):
             self._label(mirror.world, f"the look-ahead of {label}")
 
     def _label(self, world: Any, label: str) -> None:
-        known = self._worlds.get(world.client) if world is not None else None
+        # Of one that is closed the number may be another's by now.
+        if world is None or not world._end.alive:
+            return
+        known = self._worlds.get(world.client)
         if known is not None and not known.named:
             known.label, known.named = label, True
 
     def living(self) -> Sequence[Subject]:
-        open_ = {c: w for c, w in self._worlds.items() if self._bare.isConnected(c)}
-        self._worlds = open_
-        return [*open_.values(), *self._arrays.values()]
+        self._worlds = {c: world for c, world in self._worlds.items() if not world.gone}
+        return [*self._worlds.values(), *self._arrays.values()]
 
 
 def client_of(function: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> int | None:

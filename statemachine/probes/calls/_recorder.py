@@ -41,14 +41,25 @@ class Subject(ABC):
     """Something that calls can change: an object of the engine's, or a world.
 
     Attributes:
-        label: How it is called for a reader.
+        kind: What it is, for one that has no label.
+        label: How it is called for a reader; empty until a variable leads to it.
         named: Whether a variable of the code leads to it.
         seen: What was in it when it was last looked at.
     """
 
-    def __init__(self, label: str) -> None:
-        self.label, self.named = label, False
+    def __init__(self, kind: str, label: str = "") -> None:
+        self.kind, self.label, self.named = kind, label, False
         self.seen: Look | None = None
+
+    @property
+    @abstractmethod
+    def gone(self) -> bool:
+        """Whether it is no more."""
+
+    @property
+    def title(self) -> str:
+        """Its label, or what there is to say of one that no variable ever led to."""
+        return self.label or f"{self.kind} {'for a moment' if self.gone else 'without a name'}"
 
     @abstractmethod
     def look(self, thoroughly: bool = False) -> Look | None:
@@ -129,7 +140,8 @@ class Recorder:
     def __exit__(self, *exc: object) -> None:
         self._listening = False
         while self._replaced:
-            setattr(*self._replaced.pop())
+            setattr(*self._replaced[-1])
+            self._replaced.pop()  # after it, so that no interrupt leaves one out
         Recorder._active = False
 
     def _replace(self, watch: Watch, owner: Any, attribute: str, function: str) -> None:
@@ -159,18 +171,16 @@ class Recorder:
             watch.name(namespace)
             for subject in watch.living():
                 self._note_writes(subject, thoroughly=True)
+        merged: dict[tuple[str, str, str], tuple[int, dict[str, None]]] = {}
+        for (engine, function, on), tally in self._tallies.items():
+            key = engine, function, on.title if on else ""
+            count, names = merged.get(key, (0, {}))
+            for subject, field in tally.changed:
+                names[field if subject is on else subject.spelled(field)] = None
+            merged[key] = count + tally.count, names
         calls = tuple(
-            Call(
-                function,
-                on.label if on else "",
-                tally.count,
-                tuple(
-                    field if subject is on else subject.spelled(field)
-                    for subject, field in tally.changed
-                ),
-                engine,
-            )
-            for (engine, function, on), tally in self._tallies.items()
+            Call(function, on, count, tuple(names), engine)
+            for (engine, function, on), (count, names) in merged.items()
         )
         changed = tuple(
             subject.spelled(field if len(entries) > 1 else next(iter(entries)))
