@@ -6,7 +6,7 @@ default `run` takes the parsed options and returns the exit code.
 
 from __future__ import annotations
 
-from . import doctor, fingertip, lesson
+from . import check, doctor, fingertip, lesson
 
 # In the order in which --help shows them.
-COMMANDS = (lesson, fingertip, doctor)
+COMMANDS = (lesson, check, fingertip, doctor)
