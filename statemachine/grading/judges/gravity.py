@@ -114,6 +114,12 @@ def _why(given: Array, other: Array, limp: bool, world: World, watch: Watch) -> 
         return f"{figures}: that is radians; np.degrees(…) makes degrees of them"
     if near(given, np.degrees(right), TOLERANCE * 60):
         return f"{figures}: degrees were made of it twice"
+    for entry in range(model.nq):
+        if entry != place and near(given, fall.degrees(limp, entry), _SAME):
+            return (
+                f"{figures}: that is qpos[{entry}], of {owner(model, entry)!r}; {LIFT} is at "
+                "model.jnt_qposadr[model.joint_id(…)]"
+            )
     if abs(given[0] - right[0]) > TOLERANCE and abs(given[0] - other[-1]) <= TOLERANCE:
         return (
             f"{figures}: this run goes on where the other one ended, at {given[0]:.3f}°; "
@@ -124,12 +130,6 @@ def _why(given: Array, other: Array, limp: bool, world: World, watch: Watch) -> 
     if near(given, wrong, TOLERANCE):
         how = "still on" if limp else "off already"
         return f"{figures}: the servos were {how} in this run"
-    for entry in range(model.nq):
-        if entry != place and near(given, fall.degrees(limp, entry), _SAME):
-            return (
-                f"{figures}: that is qpos[{entry}], of {owner(model, entry)!r}; {LIFT} is at "
-                "model.jnt_qposadr[model.joint_id(…)]"
-            )
     return figures + _when(given, limp, world, watch)
 
 
@@ -147,10 +147,10 @@ def _when(given: Array, limp: bool, world: World, watch: Watch) -> str:
                 f"second has {fall.marks[1]}: round(1 / model.timestep)"
             )
     for late in range(1 - int(fall.marks[1]), int(fall.marks[1]) + 1):
-        marks = np.maximum(fall.marks + late, 0)
-        if late and near(given, trace[marks], _SAME):
+        marks = fall.marks + late
+        if late and near(given[1:], trace[marks[1:]], _SAME):
             word = "later" if late > 0 else "earlier"
-            return f": that is the arm {abs(late) * timestep:g} s {word}; the first is at 0 s"
+            return f": that is the arm {abs(late) * timestep:g} s {word}; the first number is that of 0 s"
     return ""
 
 

@@ -201,8 +201,8 @@ def _ends(ends: list[Array], runs: tuple[Run, Run]) -> list[Remark]:
         away = float(abs(given - run.end).max())
         if same_bits(given, run.qpos):
             why = "that is qpos at the start"
-        elif same_bits(ends[0], ends[1]):
-            why = "one run was returned twice"
+        elif same_bits(given, runs[0].end):
+            why = "the first run was returned twice"
         elif away < 1e-3:
             why = "was it rounded, or read before the last step?"
         else:
