@@ -52,7 +52,7 @@ CTRL = [0.4, -0.8, 0.5, 1.6, 1.57, 0.28]
 
 
 def demo_gravity(model, seconds=4):
-    """TODO(you): nobody writes ctrl. Does the arm fall? And with its servos off?
+    """TODO(you): nobody writes ctrl. Who holds the arm up?
 
     Run twice from the default state, each time in a new Data, and never write ctrl: first
     with the model as it is, then with its servos off. For the second run, `model.replace`
@@ -72,7 +72,7 @@ def demo_gravity(model, seconds=4):
 
 
 def demo_state(model):
-    """TODO(you): which numbers of qpos and of qvel belong to which joint?
+    """TODO(you): which numbers of qpos and qvel belong to which joint?
 
     A joint may own more than one number, and not equally many in qpos and in qvel: a hinge
     owns one and one; a free joint, which lets a body fly, owns more. `JointType` knows.
@@ -89,7 +89,7 @@ def demo_state(model):
 
 
 def demo_forward(model):
-    """TODO(you): where is the fingertip, and since when does the simulator know?
+    """TODO(you): where is the fingertip, and who works it out when?
 
     In one new Data, read the position of the site gripperframe four times:
     1. at once; 2. after a forward; 3. after writing 0.8 [rad] into the place of joint
@@ -105,7 +105,7 @@ def demo_forward(model):
 
 
 def demo_replay(model, ctrl, nstep=600):
-    """TODO(you): does the same start with the same commands end in the same state?
+    """TODO(you): the same start, the same commands: the same end?
 
     Do this twice: go to keyframe 0, set the time to zero, write `ctrl` into the command,
     take `nstep` steps, and keep a copy of qpos. Then compare the two: every bit, not nearly.
@@ -142,7 +142,7 @@ def demo_hold(model, seconds=2):
 
 
 def demo_speed(model, nstep=4000):
-    """Written for you: how much simulated time does a second of your machine buy?
+    """Written for you: how much faster than the world is a simulation?
 
     Returns:
         (simulated time [s], time on the clock [s]).
@@ -245,7 +245,7 @@ def main(functions):
         print(f"{called}: {error}")
         return 2
     except NotImplementedError as todo:
-        print(f"{called} is not written yet. {todo}")
+        print(f"{called}: {todo}")
         return 1
     if result is None:
         print(f"{called} returned nothing: it must hand its result over with `return`")

@@ -73,7 +73,7 @@ def find(names: dict[str, Any], name: str, arguments: Sequence[Any]) -> Function
     if function is None:
         raise FaultError(f"the file has no function {name}")
     if not callable(function):
-        raise FaultError(f"{name} is no function but a {type(function).__name__}")
+        raise FaultError(f"{name} is no function: {type(function).__name__}")
     try:
         inspect.signature(function).bind(None, *arguments)
     except TypeError as error:

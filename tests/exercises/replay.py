@@ -8,7 +8,7 @@ import statemachine as sm
 from . import right, wrong
 
 
-def _once(model, ctrl, nstep, data=None, key=0, zero=True, late=0, copy=True):
+def _once(model, ctrl, nstep, data=None, *, key: int | None = 0, zero=True, late=0, copy=True):
     data = data or sm.make_data(model)
     if key is not None:
         sm.reset(model, data, keyframe=key)

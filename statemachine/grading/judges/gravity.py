@@ -19,6 +19,7 @@ TOLERANCE = 0.006  # [degrees]: two decimals will do
 _MOON = (0.0, 0.0, -1.62)
 _SAME = 1e-6  # [degrees]: the same figure, come by another way
 _NAMES = ("servos on", "servos off")
+_NO_STEP = "no step was taken with the model that you got"
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,8 @@ def judge(function: Function, world: World) -> list[Remark]:
         if not near(given[limp], right[limp], TOLERANCE):
             text = _why(given[limp], given[1 - limp], bool(limp), world, watch)
             remarks.append(Remark(f"{name}: {text}"))
+    if not watch.runs:
+        remarks.append(Remark(_NO_STEP))
     if remarks:
         return remarks
     return [
@@ -115,7 +118,7 @@ def _why(given: Array, other: Array, limp: bool, world: World, watch: Watch) -> 
     if near(given, np.degrees(right), TOLERANCE * 60):
         return f"{figures}: degrees were made of it twice"
     for entry in range(model.nq):
-        if entry != place and near(given, fall.degrees(limp, entry), _SAME):
+        if given.any() and entry != place and near(given, fall.degrees(limp, entry), _SAME):
             return (
                 f"{figures}: that is qpos[{entry}], of {owner(model, entry)!r}; {LIFT} is at "
                 "model.jnt_qposadr[model.joint_id(…)]"
@@ -150,8 +153,8 @@ def _when(given: Array, limp: bool, world: World, watch: Watch) -> str:
         marks = fall.marks + late
         if late and near(given[1:], trace[marks[1:]], _SAME):
             word = "later" if late > 0 else "earlier"
-            return f": that is the arm {abs(late) * timestep:g} s {word}; the first number is that of 0 s"
-    return ""
+            return f": that is the arm {abs(late) * timestep:g} s {word} (the first is at 0 s)"
+    return "" if watch.runs else f": {_NO_STEP}"
 
 
 def _command(watch: Watch) -> list[Remark]:
