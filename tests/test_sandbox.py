@@ -74,7 +74,7 @@ def test_memory_is_limited() -> None:
 def test_what_is_left_in_the_session_is_ended() -> None:
     done = _python(
         "import subprocess, sys\n"
-        "p = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(50)'])\n"
+        "p = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(50)'], env={})\n"
         "print(p.pid)"
     )
     assert done.returncode == 0

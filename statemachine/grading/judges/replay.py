@@ -173,10 +173,9 @@ def _faults(run: Run, world: World) -> dict[str, str]:
             f"it did not begin at keyframe 0: qpos was up to {away:.2g} away. "
             "sm.reset(model, data, keyframe=0)"
         )
-    elif run.time == start.time and start.time:
-        faults["time"] = f"it began at {run.time:g} s, the keyframe's time: set data.time to zero"
-    if run.time != 0 and not faults:
-        faults["time"] = f"it began at {run.time:g} s: set data.time to zero"
+    elif run.time:
+        of = ", the keyframe's time" if run.time == start.time else ""
+        faults["time"] = f"it began at {run.time:g} s{of}: set data.time to zero"
     if not same_bits(run.ctrl, ctrl):
         had = "the keyframe's own" if same_bits(run.ctrl, start.ctrl) else listed(run.ctrl)
         late = ""
