@@ -109,7 +109,6 @@ def _one(judgement: exercise.Judgement) -> str:
     return remark
 
 
-@pytest.mark.slow
 def test_what_never_returns_or_ends_the_process_is_reported(tmp_path: Path) -> None:
     found = _grade(
         tmp_path,
@@ -125,7 +124,7 @@ def test_what_never_returns_or_ends_the_process_is_reported(tmp_path: Path) -> N
         "line 10: it ends the program (sys.exit with 0) where it should return (in `sys.exit(0)`)"
     )
     assert "it ended the process, with code 0" in _one(found["forward"])
-    assert "still running after 5 s" in _one(found["replay"])
+    assert _one(found["replay"]).startswith("line 14: still running after 1 s")
 
 
 def test_crashes_memory_and_other_processes_are_reported(tmp_path: Path) -> None:

@@ -54,6 +54,7 @@ def overview(_options: argparse.Namespace) -> int:
         *(f"  {PROGRAM} lesson {name:<9} {lesson.question}" for name, lesson in LESSONS.items()),
         "",
         "And beside them:",
+        f"  {PROGRAM} check FILE       your exercise, judged by what it does",
         f"  {PROGRAM} fingertip        the engine against an independent witness",
         f"  {PROGRAM} doctor           what this machine has, and what to do",
         "",

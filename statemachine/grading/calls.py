@@ -54,8 +54,6 @@ def load_file(path: Path) -> dict[str, Any]:
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[_MODULE] = module  # dataclasses and pickle look it up there
-    sys.path.insert(0, str(path.parent))  # as when the file is run
-    sys.dont_write_bytecode = True  # nothing is left beside the student's file
     try:
         spec.loader.exec_module(module)
     except BaseException as error:

@@ -169,13 +169,15 @@ def _one(
 ) -> Judgement:
     scratch = folder / "scratch"  # where the student's code runs, and may write
     scratch.mkdir(parents=True)
-    nonce, answers, job = secrets.token_hex(16), folder / "answers", folder / "job"
+    nonce, answers, trace = secrets.token_hex(16), folder / "answers", folder / "trace"
+    job = folder / "job"
     facts = {
         "file": str(path),
         "function": name,
         "backend": backend,
         "seconds": seconds,
         "answers": str(answers),
+        "trace": str(trace),
         "nonce": nonce,
     }
     job.write_text(json.dumps(facts), encoding="utf-8")
@@ -187,7 +189,17 @@ def _one(
         memory_most=_MEMORY_MOST,
         stop=stop,
     )
-    return _judgement(name, path, _last_answer(answers, nonce), outcome)
+    answer = _last_answer(answers, nonce)
+    if answer["stage"] == "refused":
+        raise getattr(errors, answer["kind"], EngineError)(answer["text"])
+    if answer["stage"] == "judged":
+        remarks = tuple(text for text, _ in answer["remarks"])
+        passed = bool(remarks) and all(holds for _, holds in answer["remarks"])
+        return Judgement(name, answer["written"], passed, remarks)
+    if answer["stage"] != "running":
+        return Judgement(name, True, False, (_not_ready(outcome),))
+    last = trace.read_text(encoding="utf-8", errors="replace") if trace.is_file() else ""
+    return Judgement(name, True, False, (_how_it_ended(path, last, seconds, outcome),))
 
 
 def _environment() -> dict[str, str]:
@@ -211,42 +223,29 @@ def _last_answer(file: Path, nonce: str) -> dict[str, Any]:
     return found
 
 
-def _judgement(
-    name: str, path: Path, answer: dict[str, Any], outcome: sandbox.Outcome
-) -> Judgement:
-    if answer["stage"] == "refused":
-        kind = getattr(errors, answer["kind"], EngineError)
-        raise kind(answer["text"])
-    if answer["stage"] == "judged":
-        remarks = tuple(text for text, _ in answer["remarks"])
-        passed = bool(remarks) and all(holds for _, holds in answer["remarks"])
-        return Judgement(name, answer["written"], passed, remarks)
-    return Judgement(name, True, False, (_how_it_ended(path, answer["stage"], outcome),))
-
-
-def _how_it_ended(path: Path, stage: str, outcome: sandbox.Outcome) -> str:
-    """What became of a process that gave no verdict."""
-    if stage != "running":
-        if outcome.timed_out:
-            return (
-                f"nothing could be judged: the engine was not ready after {outcome.wall:.0f} s, "
-                "on a slow or busy machine; try --time-limit 30"
-            )
-        return f"nothing could be judged: the judge itself ended with {outcome.returncode}"
-    where = _where(path, outcome.stderr)
+def _not_ready(outcome: sandbox.Outcome) -> str:
+    """Why a process did not get as far as the student's code."""
     if outcome.timed_out:
-        return f"{where}still running after {outcome.wall:.0f} s: a loop that does not end?"
+        return (
+            f"nothing could be judged: the engine was not ready after {outcome.wall:.0f} s, "
+            "on a slow or busy machine; try --time-limit 30"
+        )
+    how = outcome.returncode if outcome.signal is None else _signal(outcome.signal)
+    return f"nothing could be judged: the judge itself ended with {how}"
+
+
+def _how_it_ended(path: Path, trace: str, seconds: float, outcome: sandbox.Outcome) -> str:
+    """What became of a process that gave no verdict; `trace` is its fault handler's."""
+    # The innermost line of the student's file comes first.
+    lines = re.findall(rf'File "{re.escape(str(path))}", line (\d+)', trace)
+    where = f"line {lines[0]}: " if lines else ""
+    if outcome.timed_out or trace.startswith("Timeout"):
+        return f"{where}still running after {seconds:g} s: a loop that does not end?"
     if outcome.out_of_memory:
         return f"{where}it asks for more memory than there is for it"
     if outcome.signal is not None:
         return f"{where}it crashed the process ({_signal(outcome.signal)})"
     return f"{where}it ended the process, with code {outcome.returncode}: a function must return"
-
-
-def _where(path: Path, stderr: str) -> str:
-    """The line of the student's file that Python's own fault handler named."""
-    lines = re.findall(rf'File "{re.escape(str(path))}", line (\d+)', stderr)
-    return f"line {lines[0]}: " if lines else ""
 
 
 def _signal(number: int) -> str:

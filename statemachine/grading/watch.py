@@ -31,7 +31,7 @@ class Run:
     Attributes:
         data: The Data, or MuJoCo's own.
         qpos, qvel, ctrl, time: What they were at the first step.
-        end: qpos after the last step; end_time: the time then.
+        end, end_qvel, end_time: qpos, qvel and the time after the last step.
         nstep: How many steps it took.
         ctrl_changed: After how many steps ctrl was another; None if it never was.
     """
