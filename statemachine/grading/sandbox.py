@@ -1,8 +1,9 @@
 """Run a command that may loop, crash, flood or leave processes behind, and come back from it.
 
 It guards against what goes wrong, not against an attacker: the command has the rights of
-whoever runs it, and nothing here bounds how many processes it may start. On POSIX it gets a session and limits of its own; on Linux processes that left
-the session are found too. On Windows only the process itself is ended.
+whoever runs it, and nothing here bounds how many processes it may start. On POSIX it gets a
+session and limits of its own; on Linux processes that left the session are found too. On
+Windows only the process itself is ended.
 """
 
 from __future__ import annotations
@@ -79,6 +80,7 @@ def run(
     env: Mapping[str, str] | None = None,
     output_most: int = 1_000_000,
     memory_most: int = MEMORY_MOST,
+    stop: threading.Event | None = None,
 ) -> Outcome:
     """Run a command to its end, or to that of its time; nothing of it is left afterwards.
 
@@ -89,6 +91,7 @@ def run(
         env: Its environment; None for ours.
         output_most: Bytes of stdout, and of stderr, to keep; the rest is read and dropped.
         memory_most: Bytes of address space of each process, where the system can limit it.
+        stop: Set by another thread, it ends the command as the time limit does.
 
     Raises:
         FileNotFoundError: `cwd` is not there, or on Windows the program.
@@ -107,7 +110,7 @@ def run(
     readers = [_Reader(pipe, output_most) for pipe in (process.stdout, process.stderr)]
     ended = False
     try:
-        ended = _wait(process, began + seconds)
+        ended = _wait(process, began + seconds, stop or threading.Event())
         wall = time.monotonic() - began
     finally:  # an interrupt too
         left = _end_all(process, token)
@@ -136,7 +139,7 @@ def _limited(command: Sequence[str], seconds: float, memory_most: int) -> list[s
     return [sys.executable, "-I", "-S", "-c", _LAUNCHER, *limits, *command]
 
 
-def _wait(process: subprocess.Popen[bytes], deadline: float) -> bool:
+def _wait(process: subprocess.Popen[bytes], deadline: float, stop: threading.Event) -> bool:
     """Whether the process ended in time. On POSIX it is not reaped yet.
 
     So that its number, and that of its group, is nobody else's when the group is killed.
@@ -146,9 +149,8 @@ def _wait(process: subprocess.Popen[bytes], deadline: float) -> bool:
         if _has_ended(process):
             return True
         remaining = deadline - time.monotonic()
-        if remaining <= 0:
+        if remaining <= 0 or stop.wait(min(pause, remaining)):
             return False
-        time.sleep(min(pause, remaining))
         pause = min(pause * 2, 0.02)
 
 

@@ -1,0 +1,112 @@
+"""The process in which one function of a student's file runs, alone.
+
+It answers into a file, line by line and with a number that only its parent knows, so that
+nothing that the student's code prints can pass for an answer, and a process that ends early
+leaves behind how far it got.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+# What no exercise needs, by the name of the audit event, and in words.
+_REFUSED = {
+    "os.fork": "it starts another process",
+    "os.forkpty": "it starts another process",
+    "os.posix_spawn": "it starts another process",
+    "os.spawn": "it starts another process",
+    "os.startfile": "it starts another process",
+    "os.system": "it starts another program",
+    "os.exec": "it starts another program",
+    "subprocess.Popen": "it starts another program",
+    "os.kill": "it sends a signal to a process",
+    "os.killpg": "it sends a signal to processes",
+    "socket.connect": "it wants to use the network",
+    "socket.bind": "it wants to use the network",
+    "socket.sendto": "it wants to use the network",
+    "socket.getaddrinfo": "it wants to use the network",
+}
+
+
+class _Guard:
+    """Refuses processes and the network, and remembers what was refused."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self.refused: list[str] = []
+        sys.addaudithook(self._hear)
+
+    def _hear(self, event: str, _arguments: tuple[Any, ...]) -> None:
+        if event in _REFUSED:
+            where = _line_in(sys._getframe(), self._file)
+            self.refused.append(f"{where}{_REFUSED[event]} ({event}), which no exercise needs")
+            raise PermissionError(f"{_REFUSED[event]}: not here")
+
+
+class _Answers:
+    """The private channel."""
+
+    def __init__(self, path: str, nonce: str) -> None:
+        self._path = path
+        self._nonce = nonce
+
+    def say(self, stage: str, **facts: Any) -> None:
+        """Add a line."""
+        with open(self._path, "a", encoding="utf-8") as file:
+            file.write(json.dumps({"nonce": self._nonce, "stage": stage, **facts}) + "\n")
+
+
+def main(job_file: str) -> None:
+    """Examine one function, as the job file says, and end the process."""
+    with open(job_file, encoding="utf-8") as file:
+        job = json.load(file)
+    os.unlink(job_file)
+    answers = _Answers(job["answers"], job["nonce"])
+    path = Path(job["file"])
+    sys.argv = [str(path)]
+    try:
+        judge, worlds = _prepare(job["function"], job["backend"])
+    except Exception as error:
+        answers.say("refused", kind=type(error).__name__, text=" ".join(str(error).split()))
+        return
+    from .examine import examine
+
+    # Both work where Python's own threads do not get their turn, and tell the line.
+    trace = open(job["trace"], "w", encoding="utf-8")  # noqa: SIM115  (till the end)
+    faulthandler.enable(trace)
+    guard = _Guard(path)
+    faulthandler.dump_traceback_later(job["seconds"], exit=True, file=trace)
+    sys.path.insert(0, str(path.parent))  # as when the file is run; engines are loaded by now
+    answers.say("running")
+    verdict = examine(path, job["function"], judge, worlds)
+    remarks = [(text, False) for text in dict.fromkeys(guard.refused)]
+    if not remarks:
+        remarks = [(remark.text, remark.holds) for remark in verdict.remarks]
+    answers.say("judged", written=verdict.written, remarks=remarks)
+    # Threads that the student's code left, and what it registered for the end, have no say.
+    os._exit(0)
+
+
+def _prepare(function: str, backend: str) -> tuple[Any, Any]:
+    """The judge and its worlds, with all that is right worked out."""
+    from .judges import judge_of
+    from .worlds import Scenes
+
+    judge = judge_of(function)
+    folder = Path.cwd() / "worlds"
+    folder.mkdir()
+    return judge, judge.worlds(Scenes(backend, folder))
+
+
+def _line_in(frame: Any, path: Path) -> str:
+    """'line 12: ', the innermost line of the student's file; nothing if there is none."""
+    while frame is not None:
+        if frame.f_code.co_filename == str(path):
+            return f"line {frame.f_lineno}: "
+        frame = frame.f_back
+    return ""

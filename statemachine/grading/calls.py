@@ -1,0 +1,138 @@
+"""Load a student's file and call a function of it; what goes wrong is one line about that file."""
+
+from __future__ import annotations
+
+import importlib.util
+import inspect
+import linecache
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import UnsupportedError
+from .watch import Watch, watching
+from .worlds import World
+
+Function = Callable[..., Any]
+_MODULE = "the_students_file"
+_LONGEST = 200  # characters of an error's own text
+
+
+@dataclass(frozen=True)
+class Remark:
+    """One thing found out about a function, in one line; `holds` is False for a fault."""
+
+    text: str
+    holds: bool = False
+
+
+class FaultError(Exception):
+    """A fault after which there is nothing more to look at; the text is the remark.
+
+    Attributes:
+        written: False if the function is still to be written.
+    """
+
+    def __init__(self, text: str, written: bool = True) -> None:
+        super().__init__(text)
+        self.written = written
+
+
+def load_file(path: Path) -> dict[str, Any]:
+    """The names that a student's file defines.
+
+    Raises:
+        FaultError: It does not compile, or ends with an error.
+    """
+    spec = importlib.util.spec_from_file_location(_MODULE, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[_MODULE] = module  # dataclasses and pickle look it up there
+    try:
+        spec.loader.exec_module(module)
+    except BaseException as error:
+        raise FaultError(f"the file cannot be loaded: {said(error, path)}") from error
+    return vars(module)
+
+
+def find(names: dict[str, Any], name: str, arguments: Sequence[Any]) -> Function:
+    """A function of the file that takes a model and these arguments.
+
+    Raises:
+        FaultError: There is none, or it takes others.
+    """
+    function = names.get(name)
+    if function is None:
+        raise FaultError(f"the file has no function {name}")
+    if not callable(function):
+        raise FaultError(f"{name} is no function: {type(function).__name__}")
+    try:
+        inspect.signature(function).bind(None, *arguments)
+    except TypeError as error:
+        raise FaultError(
+            f"it is called with a model and {len(arguments)} more, and takes "
+            f"{inspect.signature(function)}: {error}"
+        ) from None
+    except ValueError:  # something of C's without a signature
+        pass
+    return function
+
+
+def call(function: Function, world: World) -> tuple[Any, Watch]:
+    """What a function returns on a world, and what it did there.
+
+    Raises:
+        FaultError: It raised, tried to end the program, is not written, or returned nothing.
+    """
+    file = Path(getattr(getattr(function, "__code__", None), "co_filename", ""))
+    given = [
+        np.array(value) if isinstance(value, np.ndarray) else value for value in world.arguments
+    ]
+    try:
+        with watching(world.nudge) as watch:
+            result = function(world.model, *given)
+    except BaseException as error:
+        if isinstance(error, NotImplementedError) and not isinstance(error, UnsupportedError):
+            raise FaultError(f"not written yet. {error}".strip(), written=False) from None
+        raise FaultError(said(error, file)) from error
+    if result is None:
+        raise FaultError("it returns nothing: print shows a result, `return` hands it over")
+    return result, watch
+
+
+def said(error: BaseException, file: Path) -> str:
+    """An error in one line, with the line of the student's file that it came from."""
+    line, text = _line(error, file)
+    where = f"line {line}: " if line else ""
+    source = f" (in `{text}`)" if text else ""
+    if isinstance(error, SyntaxError):
+        return f"{where}{error.msg}{source}"
+    if isinstance(error, SystemExit):
+        return (
+            f"{where}it ends the program (sys.exit with {error.code!r}) where it should return"
+            f"{source}"
+        )
+    if isinstance(error, MemoryError):
+        return f"{where}it asks for more memory than there is for it{source}"
+    if isinstance(error, RecursionError):
+        return f"{where}it calls itself without end{source}"
+    words = " ".join(str(error).split())
+    if len(words) > _LONGEST:
+        words = words[:_LONGEST] + " …"
+    return f"{where}{type(error).__name__}{': ' * bool(words)}{words}{source}"
+
+
+def _line(error: BaseException, file: Path) -> tuple[int, str]:
+    """Number and text of the last line of the file that had a part in it."""
+    if isinstance(error, SyntaxError) and Path(error.filename or "") == file:
+        return error.lineno or 0, (error.text or "").strip()
+    for frame, number in reversed(list(traceback.walk_tb(error.__traceback__))):
+        if Path(frame.f_code.co_filename) == file:
+            return number, linecache.getline(str(file), number).strip()
+    return 0, ""

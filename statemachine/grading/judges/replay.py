@@ -1,0 +1,210 @@
+"""demo_replay: the same start and the same commands end in the same bits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...interface import Model
+from ...records import Array
+from ...verbs import make_data, reset
+from ..calls import Function, Remark, call
+from ..watch import Run, Watch
+from ..worlds import ELSEWHERE, Scenes, World
+from ._values import address, kind, listed, near, numbers, parts, same_bits
+
+SCENE = "so101/scene_box"
+_CTRL = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)
+_OTHER = (-0.2, -0.5, 0.4, 1.5, 1.5, 0.28)
+# So little that nearly equal passes for equal; the engine itself repeats every bit.
+_NUDGE = 1e-10  # [rad]
+_UNSTEADY = "with an engine made to end the second run elsewhere"
+_COUNT = ("first", "second")
+_START = 1e-9  # a keyframe's quaternion may be normalised
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where both runs begin: (nq,), (nv,), and the keyframe's own time [s] and ctrl (nu,)."""
+
+    qpos: Array
+    qvel: Array
+    time: float
+    ctrl: Array
+
+
+def worlds(scenes: Scenes) -> list[World]:
+    """The course's scene; fewer steps with a crate before the arm; runs that do end apart."""
+    course = scenes.ordinary(SCENE)
+    crowded = scenes.crowded(SCENE).replace(timestep=0.004)
+    start = _start(course)
+    return [
+        World("", course, (np.array(_CTRL), 600), start),
+        World(ELSEWHERE, crowded, (np.array(_OTHER), 150), _start(crowded)),
+        World(
+            _UNSTEADY,
+            course,
+            (np.array(_CTRL), 300),
+            start,
+            nudge=(address(course, "shoulder_pan"), _NUDGE),
+        ),
+    ]
+
+
+def _start(model: Model) -> Start:
+    with make_data(model) as data:
+        reset(model, data, keyframe=0)
+        return Start(data.qpos.copy(), data.qvel.copy(), data.time, data.ctrl.copy())
+
+
+def judge(function: Function, world: World) -> list[Remark]:
+    """Two runs as asked for, what they ended in, and whether that is equal."""
+    _, nstep = world.arguments
+    result, watch = call(function, world)
+    same, first, second = parts(result, 3, "(same, first, second)")
+    if not isinstance(same, (bool, np.bool_)):
+        return [Remark(f"same: True or False is asked for; got {kind(same)}")]
+    remarks = _memory(first, second, watch)
+    ends = [
+        numbers(each, (world.model.nq,), f"{name}, qpos at the end")
+        for name, each in zip(_COUNT, (first, second), strict=True)
+    ]
+    remarks += _runs(watch.runs, world)
+    if remarks:
+        return remarks
+    one, two = watch.runs
+    apart = float(abs(one.end - two.end).max())
+    if apart and world.nudge is None:
+        return [
+            Remark(
+                f"the two runs ended {apart:.1e} apart though both began at keyframe 0: something "
+                "of the first was left over. sm.reset clears all, or use a new Data"
+            )
+        ]
+    remarks = _ends(ends, (one, two))
+    if bool(same) != same_bits(one.end, two.end):
+        if same:
+            text = (
+                f"the two runs ended {apart:.1e} apart and you call them equal: nearly is not "
+                "equal. np.array_equal compares every bit; np.allclose, round, or a comparison "
+                "of a run with itself do not"
+            )
+        else:
+            text = "both runs ended in the same bits and you call them different"
+        return [Remark(text)]
+    if remarks:
+        return remarks
+    return [
+        Remark(
+            f"two runs of {nstep} steps from keyframe 0 and time 0, ctrl fixed, end in the same "
+            "bits, and you say so",
+            True,
+        )
+    ]
+
+
+def _memory(first: Any, second: Any, watch: Watch) -> list[Remark]:
+    """Whether what was returned is the simulator's own memory."""
+    if first is second or _shared(first, second):
+        return [
+            Remark(
+                "first and second are one array: both show the last run. Keep a copy of each, "
+                "data.qpos.copy()"
+            )
+        ]
+    for name, each in zip(_COUNT, (first, second), strict=True):
+        if any(_shared(each, data.qpos) for data in watch.datas):
+            return [
+                Remark(
+                    f"{name} is data.qpos itself, which changes with the next step or reset: "
+                    "return a copy, data.qpos.copy()"
+                )
+            ]
+    return []
+
+
+def _shared(one: Any, two: Any) -> bool:
+    arrays = isinstance(one, np.ndarray) and isinstance(two, np.ndarray)
+    return arrays and np.may_share_memory(one, two)
+
+
+def _runs(runs: list[Run], world: World) -> list[Remark]:
+    """Whether there were two runs, each as it was asked for; the first fault of each kind."""
+    _, nstep = world.arguments
+    if not runs:
+        return [Remark(f"no step was taken: two runs of {nstep} steps are asked for")]
+    if len(runs) == 1 and runs[0].nstep >= 2 * nstep:
+        return [
+            Remark(
+                f"one run of {runs[0].nstep} steps: the second did not begin at keyframe 0 but "
+                "went on where the first had ended. Reset before each"
+            )
+        ]
+    if len(runs) == 1:
+        return [
+            Remark(
+                "there was only one run: one run compared with itself is always equal. Run twice"
+            )
+        ]
+    if len(runs) > 2:
+        return [
+            Remark(
+                f"there were {len(runs)} runs, of {', '.join(str(run.nstep) for run in runs[:6])} "
+                "steps: two are asked for, and nothing may be written into qpos, qvel or time "
+                "between their steps"
+            )
+        ]
+    found: dict[str, str] = {}
+    for name, run in zip(_COUNT, runs, strict=True):
+        for concept, text in _faults(run, world).items():
+            found.setdefault(concept, f"{name} run: {text}")
+    return [Remark(text) for text in found.values()]
+
+
+def _faults(run: Run, world: World) -> dict[str, str]:
+    start: Start = world.expected
+    ctrl, nstep = world.arguments
+    faults = {}
+    if not (near(run.qpos, start.qpos, _START) and near(run.qvel, start.qvel, _START)):
+        away = abs(run.qpos - start.qpos).max()
+        faults["start"] = (
+            f"it did not begin at keyframe 0: qpos was up to {away:.2g} away. "
+            "sm.reset(model, data, keyframe=0)"
+        )
+    elif run.time:
+        of = ", the keyframe's time" if run.time == start.time else ""
+        faults["time"] = f"it began at {run.time:g} s{of}: set data.time to zero"
+    if not same_bits(run.ctrl, ctrl):
+        had = "the keyframe's own" if same_bits(run.ctrl, start.ctrl) else listed(run.ctrl)
+        late = ""
+        if run.ctrl_changed is not None:
+            late = f", and was written only after step {run.ctrl_changed}"
+        order = " (a reset overwrites ctrl: write it after)" if not late else ""
+        faults["ctrl"] = (
+            f"at its first step ctrl was {had}{late}; {listed(ctrl)} is asked for{order}"
+        )
+    elif run.ctrl_changed is not None:
+        faults["ctrl"] = f"ctrl was changed after step {run.ctrl_changed}: it must stay fixed"
+    if run.nstep != nstep:
+        faults["steps"] = f"it took {run.nstep} steps where {nstep} are asked for"
+    return faults
+
+
+def _ends(ends: list[Array], runs: tuple[Run, Run]) -> list[Remark]:
+    """Whether what was returned is what the runs ended in."""
+    for name, given, run in zip(_COUNT, ends, runs, strict=True):
+        if same_bits(given, run.end):
+            continue
+        away = float(abs(given - run.end).max())
+        if same_bits(given, run.qpos):
+            why = "that is qpos at the start"
+        elif same_bits(given, runs[0].end):
+            why = "the first run was returned twice"
+        elif away < 1e-3:
+            why = "was it rounded, or read before the last step?"
+        else:
+            why = "return data.qpos.copy() after the last step"
+        return [Remark(f"{name} is up to {away:.1e} away from qpos at the end of its run: {why}")]
+    return []

@@ -1,0 +1,170 @@
+"""demo_state: which slots of qpos and qvel each joint owns, and the time of a keyframe."""
+
+from __future__ import annotations
+
+import operator
+from dataclasses import dataclass
+from itertools import pairwise
+from numbers import Real
+from typing import Any
+
+from ...interface import Model
+from ...records import JointType
+from ...verbs import make_data, reset
+from ..calls import FaultError, Function, Remark, call
+from ..worlds import ELSEWHERE, Scenes, World
+from ._values import kind, parts
+
+SCENE = "so101/scene_box"
+
+Slot = tuple[int, int]  # from, and up to but not with
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What is right on one world: slots of qpos and of qvel by joint, time at keyframe 0 [s].
+
+    `course_time` is that of the course's own scene.
+    """
+
+    slots: dict[str, tuple[Slot, Slot]]
+    time: float
+    course_time: float
+
+
+def worlds(scenes: Scenes) -> list[World]:
+    """The course's scene; a crate before the arm, and a keyframe with another time."""
+    course, crowded = scenes.ordinary(SCENE), scenes.crowded(SCENE)
+    usual = _time(course)
+    return [
+        World("", course, (), Layout(_slots(course), usual, usual)),
+        World(ELSEWHERE, crowded, (), Layout(_slots(crowded), _time(crowded), usual)),
+    ]
+
+
+def _slots(model: Model) -> dict[str, tuple[Slot, Slot]]:
+    # A joint's slots end where the next one's begin: without a table of what a joint has.
+    owned = [
+        list(pairwise([*starts.tolist(), total]))
+        for starts, total in ((model.jnt_qposadr, model.nq), (model.jnt_dofadr, model.nv))
+    ]
+    return dict(zip(model.joint_names, zip(*owned, strict=True), strict=True))
+
+
+def _time(model: Model) -> float:
+    with make_data(model) as data:
+        reset(model, data, keyframe=0)
+        return data.time
+
+
+def judge(function: Function, world: World) -> list[Remark]:
+    """A pair of slices for every joint, and the time."""
+    layout: Layout = world.expected
+    result, _ = call(function, world)
+    slots, time = parts(result, 2, "(slots, time)")
+    remarks = [*_names(slots, layout), *_first_wrong(slots, layout, world.model)]
+    remarks += _clock(time, layout, world.model)
+    if remarks:
+        return remarks
+    frees = [
+        name for name, (one, two) in layout.slots.items() if one[1] - one[0] != two[1] - two[0]
+    ]
+    return [
+        Remark(
+            f"the slots of all {len(layout.slots)} joints, {', '.join(frees)} with 7 numbers in "
+            f"qpos and 6 in qvel; {layout.time:g} s at keyframe 0",
+            True,
+        )
+    ]
+
+
+def _names(slots: Any, layout: Layout) -> list[Remark]:
+    if not isinstance(slots, dict):
+        raise FaultError(
+            "slots: a dict {joint: (slice of qpos, slice of qvel)} is asked for; "
+            f"got {kind(slots)}"
+        )
+    missing = [name for name in layout.slots if name not in slots]
+    unknown = [name for name in slots if name not in layout.slots]
+    if missing:
+        return [
+            Remark(
+                f"slots: {len(missing)} of {len(layout.slots)} joints are missing: "
+                f"{', '.join(missing)}; the keys are model.joint_names"
+            )
+        ]
+    if unknown:
+        return [Remark(f"slots: no joint is called {unknown[0]!r}; see model.joint_names")]
+    return []
+
+
+def _first_wrong(slots: dict[str, Any], layout: Layout, model: Model) -> list[Remark]:
+    """The first joint with a wrong slot, and why it may be."""
+    for name, right in layout.slots.items():
+        if name not in slots:
+            continue
+        pair = parts(slots[name], 2, f"{name}: (slice of qpos, slice of qvel)")
+        given = [_slot(each, name) for each in pair]
+        for which, array in enumerate(("qpos", "qvel")):
+            if given[which] != right[which]:
+                start, stop = given[which]
+                text = (
+                    f"{name}: you return {array}[{start}:{stop}] where "
+                    f"{array}[{right[which][0]}:{right[which][1]}] is expected"
+                )
+                return [Remark(f"{text}: {_why(name, given, which, layout, model)}")]
+    return []
+
+
+def _slot(value: Any, name: str) -> Slot:
+    if not isinstance(value, slice) or value.step not in (None, 1):
+        raise FaultError(f"{name}: a pair of slices is asked for; got {kind(value)}")
+    try:
+        return operator.index(value.start or 0), operator.index(value.stop)
+    except TypeError:
+        raise FaultError(f"{name}: a slice wants two whole numbers; got {value}") from None
+
+
+def _why(name: str, given: list[Slot], which: int, layout: Layout, model: Model) -> str:
+    right = layout.slots[name]
+    number = model.joint_id(name)
+    free = int(model.jnt_type[number]) == int(JointType.FREE)
+    (start, stop), (begins, ends) = given[which], right[which]
+    table = ("model.jnt_qposadr", "model.jnt_dofadr")[which]
+    if start == begins:
+        if free and stop - start == 1:
+            return "a free joint owns more than one number: three and a quaternion, in qvel six"
+        if free and which and stop - start == 7:
+            return "a quaternion has four numbers, a turning speed three: six in qvel, not seven"
+        if free and not which and stop - start == 6:
+            return "a place has three numbers and a quaternion four: seven in qpos, not six"
+        if stop == ends - 1:
+            return "a slice ends one after the last number"
+        return f"it begins at the right place and has {stop - start} numbers, not {ends - begins}"
+    if start == right[1 - which][0]:
+        return f"that is where it begins in {('qvel', 'qpos')[which]}; see {table}"
+    if start == number:
+        return (
+            f"it begins at the joint's number, {number}; a joint before it owns several numbers: "
+            f"see {table}"
+        )
+    return f"it begins elsewhere: see {table}, no arithmetic"
+
+
+def _clock(time: Any, layout: Layout, model: Model) -> list[Remark]:
+    right = layout.time
+    if not isinstance(time, Real) or isinstance(time, bool):
+        return [Remark(f"time: a number of seconds is asked for; got {kind(time)}")]
+    if float(time) == right:
+        return []
+    text = f"time after the reset to keyframe 0 should be {right:g} s, you return {float(time):g}"
+    others = {k: frame.time for k, frame in enumerate(model.keyframes) if k}
+    if time == 0:
+        text += ": that is a new Data, or a reset without keyframe=0"
+    elif time in others.values():
+        text += f": that is keyframe {next(k for k, each in others.items() if each == time)}"
+    elif time == layout.course_time:
+        text += ": that is the course's own scene; ask the model that you got"
+    elif abs(float(time) - right) < 1:
+        text += ": read it right after the reset, before any step"
+    return [Remark(text)]

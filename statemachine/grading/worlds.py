@@ -1,0 +1,106 @@
+"""The worlds that a student's function is called on: the course's own, and others.
+
+The others have the same names and another layout, so that what was counted, typed in or
+taken from the course's own model shows.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from ..backends import load
+from ..interface import Model
+from ..models import resolve
+from .watch import watched
+
+ELSEWHERE = "on a scene with a crate before the arm"
+_CRATE = """
+<body name="crate" pos="-0.4 0.3 0.05">
+  <freejoint name="crate"/>
+  <geom name="crate" type="box" size="0.05 0.05 0.05" mass="0.3" contype="2" conaffinity="1"/>
+</body>
+"""
+_CRATE_QPOS, _CRATE_QVEL = "-0.4 0.3 0.05 1 0 0 0", "0 0 0 0 0 0"
+_TIME = "2.5"  # [s] of the first keyframe there
+_TIP = "0.03 0.01 -0.08"  # [m] of the fingertip in the gripper's frame there
+
+
+@dataclass(frozen=True)
+class World:
+    """One call of a student's function.
+
+    Attributes:
+        where: What sets it apart; nothing on the course's own model.
+        model: What the function gets.
+        arguments: What it gets beside it.
+        expected: What a judge worked out before any code of the student's ran.
+        nudge: See `watch.Watch`.
+    """
+
+    where: str
+    model: Model
+    arguments: tuple[Any, ...]
+    expected: Any
+    nudge: tuple[int, float] | None = None
+
+
+class Scenes:
+    """Makes Models for one backend, from files that it writes into a folder."""
+
+    def __init__(self, backend: str, folder: Path) -> None:
+        self._backend = backend
+        self._folder = folder
+
+    def ordinary(self, name: str) -> Model:
+        """The course's own scene, without what is only seen."""
+        return self._load(name, "ordinary", lambda _: None)
+
+    def crowded(self, name: str) -> Model:
+        """The scene with a free body before the arm, another fingertip and another time."""
+        return self._load(name, "crowded", _crowd)
+
+    def _load(self, name: str, kind: str, edit: Callable[[ElementTree.Element], None]) -> Model:
+        root = _merged(resolve(name))
+        _bare(root)
+        edit(root)
+        file = self._folder / f"{kind}_{name.rpartition('/')[2]}.xml"
+        ElementTree.ElementTree(root).write(file)
+        return watched(load(file, backend=self._backend))
+
+
+def _merged(path: Path) -> ElementTree.Element:
+    """A model's file with those that it includes in their places."""
+    root = ElementTree.parse(path).getroot()
+    for place, child in reversed(list(enumerate(root))):
+        if child.tag == "include":
+            root.remove(child)
+            inner = _merged(path.parent / child.attrib["file"])
+            for part in reversed(list(inner)):
+                root.insert(place, copy.deepcopy(part))
+    return root
+
+
+def _bare(root: ElementTree.Element) -> None:
+    """Leave out the meshes, which touch nothing and take most of the time to load."""
+    for parent in list(root.iter()):
+        for child in list(parent):
+            if child.tag == "mesh" or (child.tag == "geom" and child.get("class") == "look"):
+                parent.remove(child)
+
+
+def _crowd(root: ElementTree.Element) -> None:
+    for body in root.findall("worldbody")[:1]:
+        body.insert(0, ElementTree.fromstring(_CRATE))
+    for site in root.iter("site"):
+        if site.get("name") == "gripperframe":
+            site.set("pos", _TIP)
+    for number, key in enumerate(root.iter("key")):
+        key.set("qpos", f"{_CRATE_QPOS} {key.get('qpos')}")
+        key.set("qvel", f"{_CRATE_QVEL} {key.get('qvel')}")
+        if number == 0:
+            key.set("time", _TIME)

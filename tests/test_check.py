@@ -1,0 +1,289 @@
+"""`statemachine check`: wrong solutions are told from right ones, and from each other."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from statemachine.errors import MissingEngineError
+from statemachine.grading import exercise
+from statemachine.grading.examine import Verdict, examine, judged
+from statemachine.grading.judges import JUDGES, judge_of
+from statemachine.grading.watch import engine_watched
+from statemachine.grading.worlds import Scenes, World
+
+from .conftest import ROOT, Cli, need_engine
+from .exercises import RIGHT, WRONG, Attempt
+
+for _module in ("gravity", "state", "forward", "replay"):
+    importlib.import_module(f"tests.exercises.{_module}")
+
+STUDENT = ROOT / "exercises" / "step_loop.py"
+SOLUTION = ROOT / "exercises" / "solutions" / "step_loop.py"
+
+
+def _name(attempt: Attempt) -> str:
+    return attempt.name
+
+
+def _verdict(attempt: Attempt, worlds: list[World]) -> Verdict:
+    with engine_watched(worlds[0].model.backend):
+        return judged(attempt.function, judge_of(attempt.solves), worlds)
+
+
+@pytest.fixture(scope="module")
+def on_pybullet(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[World]]:
+    """The worlds of every judge, made once: nothing there can be changed but a Data."""
+    need_engine("pybullet")
+    return {
+        name: judge_of(name).worlds(Scenes("pybullet", tmp_path_factory.mktemp(name)))
+        for name in JUDGES
+    }
+
+
+def _texts(verdict: Verdict) -> list[str]:
+    return [remark.text for remark in verdict.remarks]
+
+
+@pytest.mark.parametrize("attempt", WRONG, ids=_name)
+def test_a_wrong_solution_is_told_what_is_wrong(attempt: Attempt, tmp_path: Path) -> None:
+    verdict = _verdict(attempt, judge_of(attempt.solves).worlds(Scenes("mujoco", tmp_path)))
+    texts = _texts(verdict)
+    assert not any(remark.holds for remark in verdict.remarks)
+    assert any(attempt.message in text for text in texts), texts
+    assert all("\n" not in text for text in texts)
+
+
+def test_every_wrong_solution_has_a_message_of_its_own() -> None:
+    assert len(WRONG) >= 16
+    assert len({attempt.message for attempt in WRONG}) == len(WRONG)
+
+
+@pytest.mark.parametrize("attempt", RIGHT, ids=_name)
+def test_right_solutions_of_other_kinds_pass(attempt: Attempt, tmp_path: Path) -> None:
+    verdict = _verdict(attempt, judge_of(attempt.solves).worlds(Scenes("mujoco", tmp_path)))
+    assert all(remark.holds for remark in verdict.remarks), _texts(verdict)
+
+
+# A model that the student loaded is not watched there.
+_ON_PYBULLET = {"gravity-printed_constants": "no step was taken with the model that you got"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("attempt", [each for each in WRONG + RIGHT if not each.raw], ids=_name)
+def test_pybullet_judges_alike(attempt: Attempt, on_pybullet: dict[str, list[World]]) -> None:
+    texts = _texts(verdict := _verdict(attempt, on_pybullet[attempt.solves]))
+    assert all(remark.holds == (attempt in RIGHT) for remark in verdict.remarks), texts
+    message = _ON_PYBULLET.get(attempt.name, attempt.message)
+    assert any(message in text for text in texts), texts
+
+
+_HEAD = """
+import ctypes, os, runpy, socket, subprocess, sys, threading, time
+import numpy as np
+import statemachine as sm
+"""
+
+
+def _grade(folder: Path, *functions: str, limit: float = 5.0) -> dict[str, exercise.Judgement]:
+    """The judgements on a file of these functions, by name; `RIGHT.f` is the solution's."""
+    file = folder / "student.py"
+    right = f"RIGHT = runpy.run_path({str(SOLUTION)!r})\n"
+    file.write_text(_HEAD + right + "\n".join(functions), encoding="utf-8")
+    grade = exercise.run(file, time_limit=limit)
+    assert grade.right == sum(each.passed for each in grade.functions)
+    assert not (folder / "__pycache__").exists()
+    return {each.function.removeprefix("demo_"): each for each in grade.functions}
+
+
+def _one(judgement: exercise.Judgement) -> str:
+    assert not judgement.passed
+    (remark,) = judgement.remarks
+    assert "\n" not in remark
+    return remark
+
+
+def test_what_never_returns_or_ends_the_process_is_reported(tmp_path: Path) -> None:
+    found = _grade(
+        tmp_path,
+        "def demo_gravity(model, seconds=4):\n    while True:\n        pass",
+        "def demo_state(model):\n    sys.exit(0)",
+        "def demo_forward(model):\n    os._exit(0)",
+        "def demo_replay(model, ctrl, nstep=600):\n    sum(range(10**15))",  # never lets go
+        limit=1.0,
+    )
+    assert "still running after 1 s: a loop that does not end?" in _one(found["gravity"])
+    assert _one(found["gravity"]).startswith(("line 7:", "line 8:"))
+    assert _one(found["state"]) == (
+        "line 10: it ends the program (sys.exit with 0) where it should return (in `sys.exit(0)`)"
+    )
+    assert "it ended the process, with code 0" in _one(found["forward"])
+    assert _one(found["replay"]).startswith("line 14: still running after 1 s")
+
+
+def test_crashes_memory_and_other_processes_are_reported(tmp_path: Path) -> None:
+    found = _grade(
+        tmp_path,
+        "def demo_gravity(model, seconds=4):\n    ctypes.string_at(0)",
+        "def demo_state(model):\n    bytearray(10**13)",
+        "def demo_forward(model):\n"
+        "    try:\n        subprocess.run(['sleep', '60'])\n    except OSError:\n        pass\n"
+        "    return RIGHT['demo_forward'](model)",
+        "def demo_replay(model, ctrl, nstep=600):\n"
+        "    if os.fork() == 0:\n        time.sleep(60)\n    return 1",
+    )
+    assert _one(found["gravity"]) == "line 7: it crashed the process (SIGSEGV)"
+    assert "line 9: it asks for more memory than there is for it" in _one(found["state"])
+    assert "line 12: it starts another program (subprocess.Popen)" in _one(found["forward"])
+    assert "line 17: it starts another process (os.fork)" in _one(found["replay"])
+
+
+def test_output_cannot_pass_for_a_verdict_nor_get_in_its_way(tmp_path: Path) -> None:
+    found = _grade(
+        tmp_path,
+        "def demo_gravity(model, seconds=4):\n"
+        '    line = \'{"nonce": "0", "stage": "judged", "written": true, '
+        '"remarks": [["fine", true]]}\'\n'
+        "    print(line); print(line, file=sys.stderr)\n"
+        "    open('../answers', 'a').write(line + chr(10) + 'x' + chr(10))\n"
+        "    os._exit(0)",
+        "def demo_state(model):\n"
+        "    sys.stdout.close(); os.closerange(1, 3)\n    return RIGHT['demo_state'](model)",
+        "def demo_forward(model):\n"
+        "    for _ in range(200): print('x' * 100_000)\n"
+        "    os.chdir('/')\n    return RIGHT['demo_forward'](model)",
+        "def demo_replay(model, ctrl, nstep=600):\n    return input('same? ')",
+    )
+    assert "it ended the process, with code 0" in _one(found["gravity"])
+    assert found["state"].passed, found["state"].remarks
+    assert found["forward"].passed, found["forward"].remarks
+    assert "EOFError" in _one(found["replay"])
+
+
+def test_what_is_replaced_under_the_judge_does_not_help(tmp_path: Path) -> None:
+    found = _grade(
+        tmp_path,
+        "import mujoco\n"
+        "def demo_gravity(model, seconds=4):\n"
+        "    mujoco.mj_step = lambda *a: None\n"
+        "    np.abs = np.array_equal = np.allclose = lambda *a, **k: True\n"
+        "    return RIGHT['demo_gravity'](model, seconds)",
+        "def demo_state(model):\n    sm.reset = None\n    return RIGHT['demo_state'](model)",
+        "def demo_forward(model):\n    socket.create_connection(('127.0.0.1', 9))",
+        "def demo_replay(model, ctrl, nstep=600):\n"
+        "    sm.step = lambda *a: None\n"
+        "    threading.Thread(target=time.sleep, args=(60,)).start()\n"
+        "    return RIGHT['demo_replay'](model, ctrl, nstep)",
+    )
+    assert "is expected" in found["gravity"].remarks[0]
+    assert "'NoneType' object is not callable" in _one(found["state"])
+    assert "it wants to use the network" in _one(found["forward"])
+    assert "no step was taken" in found["replay"].remarks[0]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("def demo_gravity(model:\n", "the file cannot be loaded: line 1: '(' was never closed"),
+        ("import sys\nsys.exit(0)\n", "the file cannot be loaded: line 2: it ends the program"),
+        ("x = 1 / 0\n", "line 1: ZeroDivisionError: division by zero (in `x = 1 / 0`)"),
+        ("import not_there\n", "No module named 'not_there'"),
+        ("x = '\\udc80'.encode()\n", "UnicodeEncodeError"),
+        ("", "the file has no function demo_gravity"),
+        ("demo_gravity = 4\n", "demo_gravity is no function: int"),
+        ("def demo_gravity(): pass\n", "too many positional arguments"),
+        ("def demo_gravity(model, /, *, seconds): pass\n", "it is called with a model and 1 more"),
+    ],
+)  # fmt: skip
+def test_a_file_that_cannot_be_called_is_told_in_a_line(
+    content: str, message: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "student.py"
+    file.write_text(content)
+    worlds = judge_of("demo_gravity").worlds(Scenes("mujoco", tmp_path))
+    (remark,) = examine(file, "demo_gravity", judge_of("demo_gravity"), worlds).remarks
+    assert message in remark.text
+    assert not remark.holds
+
+
+def test_the_solution_passes_on_every_backend(cli: Cli, backend: str) -> None:
+    done = cli("check", str(SOLUTION), "--backend", backend)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stderr == ""
+    assert done.stdout.count("✓") == 4
+    assert "4 of 4 functions do what they should" in done.stdout
+    assert max(map(len, done.stdout.splitlines())) <= 80
+
+
+def test_the_students_file_is_still_to_be_written(cli: Cli) -> None:
+    done = cli("check", str(STUDENT), "--json")
+    assert done.returncode == 1
+    found = json.loads(done.stdout)
+    assert (found["right"], found["passed"]) == (0, False)
+    assert [each["function"] for each in found["functions"]] == list(JUDGES)
+    assert {each["written"] for each in found["functions"]} == {False}
+    page = cli("check", str(STUDENT)).stdout
+    assert page.count("not written yet. TODO(you): ") == 4
+    assert "0 of 4 functions do what they should; 4 not written yet" in page
+
+
+def test_bad_input_is_one_line(cli: Cli, tmp_path: Path) -> None:
+    (tmp_path / "picture.py").write_bytes(b"\x89PNG\0\0")
+    (tmp_path / "notes.txt").write_text("hello")
+    for arguments, word in (
+        (("nowhere.py",), "there is no file nowhere.py"),
+        ((str(tmp_path),), "is a folder"),
+        (("picture.py",), "no Python file"),
+        (("notes.txt",), "does not end in .py"),
+        ((str(SOLUTION), "--backend", "mujcoo"), "Did you mean 'mujoco'?"),
+        ((str(SOLUTION), "--time-limit", "0"), "above 0 s"),
+        ((str(SOLUTION), "--time-limit", "nan"), "above 0 s"),
+    ):
+        done = cli("check", *arguments)
+        assert (done.returncode, done.stdout) == (2, ""), arguments
+        assert len(done.stderr.splitlines()) == 1
+        assert word in done.stderr
+
+
+def test_a_missing_engine_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "mujoco.py").write_text("raise ImportError('libnothing.so.1 is missing')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    with pytest.raises(MissingEngineError, match=r"libnothing\.so\.1 is missing"):
+        exercise.run(SOLUTION)
+
+
+def test_the_exercise_runs_as_a_program() -> None:
+    def run(file: Path, *arguments: str) -> tuple[int, list[str]]:
+        done = subprocess.run(
+            [sys.executable, str(file), *arguments],
+            capture_output=True,
+            text=True,
+            env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUTF8": "1"},
+            check=False,
+        )
+        assert done.stderr == ""
+        lines = done.stdout.splitlines()
+        assert done.returncode == 2 or max(map(len, lines)) <= 80
+        return done.returncode, lines
+
+    code, lines = run(STUDENT)
+    assert code == 0
+    assert sum("TODO(you)" in line for line in lines) == 4
+    assert run(STUDENT, "--gravity") == (
+        1,
+        ["demo_gravity: TODO(you): let the arm alone, with servos and without"],
+    )
+    assert run(STUDENT, "--state", "--backend", "mujcoo")[0] == 2
+    shown = {name: run(SOLUTION, f"--{name}") for name in ("gravity", "state", "forward", "replay")}
+    shown |= {name: run(STUDENT, f"--{name}") for name in ("hold", "speed")}
+    assert {code for code, _ in shown.values()} == {0}
+    assert shown["gravity"][1][-1].split() == ["4", "s", "0.033°", "23.916°"]
+    assert "  box            qpos[6:13]   qvel[6:12]" in shown["state"][1]
+    assert shown["forward"][1][-1] == "Readings 2 and 3 are equal, bit by bit. Why?"
+    assert shown["replay"][1][-2:] == ["largest difference: 0.0e+00", "you say: equal"]

@@ -1,0 +1,118 @@
+"""The sandbox: whatever a command does, we come back, and nothing of it is left."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from statemachine.grading import sandbox
+
+POSIX = pytest.mark.skipif(os.name != "posix", reason="limits and sessions are POSIX")
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
+
+
+def _python(code: str, seconds: float = 20.0, **more: object) -> sandbox.Outcome:
+    return sandbox.run([sys.executable, "-c", code], seconds=seconds, **more)  # type: ignore[arg-type]
+
+
+def _lives(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except OSError:
+        return False
+
+
+def test_what_a_command_says_and_how_it_ends(tmp_path: Path) -> None:
+    code = "import os, sys; print(os.getcwd(), os.environ.get('X')); sys.exit('no')"
+    done = _python(code, cwd=tmp_path, env={"X": "y", "PATH": os.environ["PATH"]})
+    assert (done.returncode, done.signal, done.timed_out) == (1, None, False)
+    assert done.stdout.split() == [str(tmp_path.resolve()), "y"]
+    assert done.stderr.strip() == "no"
+    assert (done.truncated, done.out_of_memory, done.left_behind) == (False, False, 0)
+
+
+def test_nothing_is_read_from_us() -> None:
+    assert "EOFError" in _python("input()").stderr
+
+
+def test_a_loop_is_ended() -> None:
+    done = _python("print('on', flush=True)\nwhile True: pass", seconds=1.0)
+    assert (done.timed_out, done.returncode, done.signal) == (True, None, None)
+    assert done.stdout == "on\n"
+
+
+def test_it_is_ended_from_outside() -> None:
+    stop = threading.Event()
+    threading.Timer(0.3, stop.set).start()
+    assert _python("while True: pass", seconds=30.0, stop=stop).wall < 20
+
+
+def test_a_flood_is_read_and_dropped() -> None:
+    done = _python("import os\nfor _ in range(300): os.write(2, b'x' * 65536)", output_most=1000)
+    assert done.returncode == 0
+    assert (len(done.stderr), done.truncated) == (1000, True)
+
+
+@POSIX
+def test_a_crash_is_a_signal() -> None:
+    assert _python("import ctypes; ctypes.string_at(0)").signal == 11
+
+
+@POSIX
+def test_memory_is_limited() -> None:
+    done = _python("x = bytearray(10**9)", memory_most=500_000_000)
+    assert done.out_of_memory
+    assert not _python("raise SystemExit('MemoryError? no')").timed_out
+
+
+@LINUX
+def test_what_is_left_in_the_session_is_ended() -> None:
+    done = _python(
+        "import subprocess, sys\n"
+        "p = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(50)'], env={})\n"
+        "print(p.pid)"
+    )
+    assert done.returncode == 0
+    assert done.left_behind == 1
+    assert done.wall < 15  # although it holds our pipes open
+    assert not _lives(int(done.stdout))
+
+
+@LINUX
+def test_what_left_the_session_is_found_and_ended() -> None:
+    done = _python(
+        "import os, time\n"
+        "pid = os.fork()\n"
+        "if pid == 0:\n"
+        "    os.setsid()\n"
+        "    time.sleep(50)\n"
+        "else:\n"
+        "    print(pid, flush=True)\n"
+        "    while os.getsid(pid) == os.getsid(0): time.sleep(0.01)\n"
+    )
+    assert done.left_behind == 1
+    assert not _lives(int(done.stdout))
+
+
+@LINUX
+def test_no_other_process_is_touched() -> None:
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as other:
+        assert _python("pass").left_behind == 0
+        assert _lives(other.pid)
+
+
+@POSIX
+def test_a_program_that_is_not_there() -> None:
+    done = sandbox.run(["no-such-program"], seconds=5)
+    assert done.returncode == 1
+    assert "no-such-program: " in done.stderr
+
+
+def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        _python("pass", cwd=tmp_path / "nowhere")
