@@ -22,7 +22,7 @@ from statemachine.report.figures import svg
 from statemachine.report.notebook import Shown, build, station
 from statemachine.report.site import make_path
 
-from .conftest import ROOT, need_engine
+from .conftest import ROOT
 
 _NOTEBOOK = ROOT / "notebooks" / "path.ipynb"
 _PICTURES = [
@@ -180,18 +180,3 @@ def test_a_question_that_went_wrong_in_a_notebook() -> None:
 def test_documentation_on_an_engine_that_is_missing(tmp_path: Path) -> None:
     with pytest.raises(KeyError, match="mujcoo"):
         make_path(tmp_path, ["mujcoo"], say=lambda _: None)
-
-
-def test_every_command_of_the_documentation(tmp_path: Path) -> None:
-    """What docs/exercises.md shows is run elsewhere; here, that each file and flag is there."""
-    text = (ROOT / "docs" / "exercises.md").read_text()
-    commands = [
-        line for block in re.findall(r"```console\n(.*?)```", text, re.DOTALL)
-        for line in block.splitlines()
-    ]  # fmt: skip
-    assert len(commands) >= 4
-    for line in commands:
-        for word in line.split():
-            if word.endswith(".py"):
-                assert (ROOT / word).is_file(), line
-    need_engine("mujoco")

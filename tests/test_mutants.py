@@ -246,10 +246,11 @@ def test_a_file_that_is_no_test_file_is_refused(text: str, message: str, write: 
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
-def test_a_forgotten_fork_takes_no_part(write: Write) -> None:
+def test_a_test_starts_no_process(write: Write) -> None:
     text = "import os\ndef test_a(): assert os.fork() >= 0\ndef test_b(): assert False, 'no'\n"
     found = examine(write(text), only=["xyzw"])
-    assert found.failures == (Failure("test_b", "line 3: no"),)
+    refused = "line 2: PermissionError: it starts another process: not here"
+    assert found.failures == (Failure("test_a", refused), Failure("test_b", "line 3: no"))
 
 
 def test_a_fault_that_cannot_be_put_in_is_not_caught(

@@ -106,7 +106,6 @@ def overview(_options: argparse.Namespace) -> int:
         f"  {PROGRAM} check --mutants exercises/test_arm.py   what your tests catch",
         "",
         "And beside them:",
-        f"  {PROGRAM} check FILE       your exercise, judged by what it does",
         f"  {PROGRAM} fingertip        the engine against an independent witness",
         f"  {PROGRAM} conventions      what each engine takes for granted",
         f"  {PROGRAM} doctor           what this machine has, and what to do",

@@ -22,12 +22,14 @@ import pytest
 
 import statemachine as sm
 
+from ..guard import Guard
 from . import BACKENDS, MUTANTS
 
 if TYPE_CHECKING:
     from statemachine import Data, Model
 
 SCENE = "so101/scene_box"
+_GUARD = pytest.StashKey[Guard]()
 _LONGEST = 300  # characters of what an error says
 
 
@@ -48,6 +50,10 @@ def pytest_configure(config: pytest.Config) -> None:
     if path := config.getoption("record"):
         config.pluginmanager.register(Recorder(Path(path)))
         os.chdir(Path(path).parent)  # what tests write does not end up beside them
+        sm.load(
+            SCENE, backend=str(config.getoption("engine"))
+        )  # engines start processes of their own
+        config.stash[_GUARD] = Guard(Path(str(config.args[0]).partition("::")[0]))
 
 
 @pytest.fixture(scope="session")
