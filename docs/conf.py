@@ -17,17 +17,17 @@ extensions = ["myst_parser"]
 myst_enable_extensions = ["colon_fence"]
 html_theme = "furo"
 html_title = f"statemachine {version}"
-# Nothing is fetched from elsewhere when a page is read.
-html_theme_options = {"source_repository": ""}
+html_show_sourcelink = html_copy_source = False  # the sources are generated
 smartquotes = False  # --realtime is no dash
 exclude_patterns = ["_build"]
 
 
 def _make_pages(_app) -> None:
-    from statemachine.report.site import make_path
+    from statemachine.report.site import make_path, make_reference
 
     backends = os.environ.get("STATEMACHINE_DOCS_BACKENDS", "").split(",")
     make_path(HERE / "path", [name for name in backends if name] or None)
+    make_reference(HERE / "reference")
 
 
 def setup(app) -> None:

@@ -108,6 +108,10 @@ def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
     gravity = (tmp_path / "o" / "path" / "06-gravity.html").read_text()
     assert "53.89°" in gravity
     assert "<details>" in gravity
+    reference = tmp_path / "o" / "reference"
+    assert "xyzw" in (reference / "conventions.html").read_text()
+    assert "mj_forward" in (reference / "calls.html").read_text()
+    assert "✗" not in (reference / "calls.html").read_text()
     assert "--realtime" in (tmp_path / "o" / "path" / "09-time.html").read_text()
 
 

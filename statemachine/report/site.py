@@ -1,18 +1,23 @@
-"""The path as pages of the documentation: one Markdown file a station, and its pictures."""
+"""Pages of the documentation that are made from runs: the path, and the conventions."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from ..backends import backend_names, load
+from ..engines import ENGINES, require
 from ..errors import MissingEngineError
 from ..lessons import LESSONS
 from ..lessons.session import page_of_lesson, take
-from ..page import Page, Picture
+from ..page import Page, Picture, Verdict
+from ..probes import phrasebook
+from ..probes.conventions import probe
+from . import conventions
 from .figures import svg
-from .markdown import markdown
+from .markdown import block_as_markdown, markdown
 
 
 def make_path(
@@ -44,6 +49,44 @@ def make_path(
         page = page_of_lesson(lesson, taken)
         written.append(_write(folder, f"{number:02}-{lesson.name}", page, lesson.question))
     return written
+
+
+def make_reference(folder: Path, say: Callable[[str], None] = print) -> list[Path]:
+    """Ask the installed engines for their conventions, run their calls, and write both down.
+
+    Args:
+        folder: Where the pages go.
+        say: Told what is being run.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    installed = []
+    for name in ENGINES:
+        with suppress(MissingEngineError):
+            require(name)
+            installed.append(name)
+    say("asking the engines ...")
+    asked = conventions.page(probe(installed))
+    table = phrasebook.run(installed)
+    pages = {
+        "conventions": markdown(asked, lambda _: ""),
+        "calls": _phrases(conventions.calls_page(table), table),
+    }
+    for name, text in pages.items():
+        _save(folder / f"{name}.md", text)
+    return [folder / f"{name}.md" for name in pages]
+
+
+def _phrases(page: Page, table: phrasebook.Calls) -> str:
+    """A heading for each concept, and what to type on each engine."""
+    parts = [f"# {page.title}", f"*{page.origin}*"]
+    parts += [block_as_markdown(b, lambda _: "") for b in page.blocks if isinstance(b, Verdict)]
+    for concept in phrasebook.CONCEPTS:
+        parts.append(f"## {concept[0].upper()}{concept[1:]}")
+        for engine, calls in table.engines.items():
+            (call,) = (each for each in calls if each.concept == concept)
+            mark = "✓" if call.works else "✗"
+            parts.append(f"{engine} {mark}\n\n```python\n{call.code}\n```")
+    return "\n\n".join(parts) + "\n"
 
 
 def _write(folder: Path, name: str, page: Page, question: str) -> Path:
