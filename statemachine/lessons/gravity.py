@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..experiments import gravity
-from ..page import Page, Question, Table, Text, Traces, Verdict
+from ..page import Page, Question, Table, Text, Verdict
+from ._fall import longer
 from ._words import angle_or_length, differences, page_of, position, signed, typed, where
 from .session import Session
 
@@ -23,7 +24,6 @@ _PARTS = (
 )
 _BALANCE = 1e-3  # N·m or N; a sum below it is zero
 _SLOW = 0.01  # rad/s or m/s; a joint below it is at rest or creeps
-_CREEP = 0.05  # of the way; a joint that goes on by more has not settled
 _STARTS = 0.02  # rad/s² or m/s²; a joint beyond it is about to move
 
 
@@ -107,7 +107,7 @@ def page(results: Mapping[str, gravity.Gravity], session: Session) -> Page:
         if run.touching:
             touches = (f"{touch} (since {run.touches[touch]:.3f} s)" for touch in run.touching)
             blocks.append(Text(f"{name}: touching at the end: {', '.join(touches)}."))
-    blocks += _longer(results)
+    blocks += longer(results)
     for name, result in results.items():
         if result.alone:
             blocks += _alone(name, result)
@@ -134,81 +134,6 @@ def _question(first: gravity.Gravity) -> Question | None:
         "ctrl is zero, and zero is a target: the servo holds the joint there, with the small "
         "error that it needs to push.",
     )
-
-
-def _longer(results: Mapping[str, gravity.Gravity]) -> list[Any]:
-    """What catches the falling joint: with and without a floor, and for longer."""
-    columns = {
-        f"{where(results, name)}{label}": run
-        for name, result in results.items()
-        for label, run in result.longer.items()
-    }
-    if not columns:
-        return []
-    first = next(iter(results.values()))
-    times = next(iter(columns.values())).time
-    blocks: list[Any] = [
-        Text(
-            "What caught it? Here are two longer runs with the servos off: one as before, and "
-            "one in which nothing can touch anything."
-        ),
-        Table(
-            ("time", *(name.replace(": ", "\n") for name in columns)),
-            [
-                (
-                    f"{time:.2f} s",
-                    *(position(run.position[k], first.slide) for run in columns.values()),
-                )
-                for k, time in enumerate(times)
-            ],
-            title=f"{first.joint}, servos off, for longer",
-        ),
-    ]
-    for name, result in results.items():
-        prefix = where(results, name)
-        floor, free = result.longer.get("floor"), result.longer.get("no floor")
-        if floor is not None and free is not None and result.servos_off.touching:
-            blocks.append(_caught(prefix, result, floor, free))
-    blocks.append(
-        Traces(
-            f"{first.joint} with the servos off",
-            "time [s]",
-            "m" if first.slide else "angle [°]",
-            {
-                name: (
-                    (np.arange(len(run.path)) * first.provenance.timestep)[::20].tolist(),
-                    (run.path if first.slide else np.degrees(run.path))[::20].tolist(),
-                )
-                for name, run in columns.items()
-            },
-        )
-    )
-    return blocks
-
-
-def _caught(
-    prefix: str, result: gravity.Gravity, floor: gravity.Droop, free: gravity.Droop
-) -> Text | Verdict:
-    """Whether it is the contact that catches the joint, and whether it comes to rest."""
-    slide, end = result.slide, float(floor.time[-1])
-    short = float(result.servos_off.time[-1])
-    then = float(result.servos_off.position[-1])
-    gap = abs(float(free.position[-1]) - then)
-    text = (
-        f"{prefix}it is the contact that catches {result.joint}, not damping or friction: without "
-        f"contacts it runs on to {position(free.position[-1], slide)}"
-    )
-    if abs(free.forces.limit or 0.0) > _BALANCE:
-        text += f", where its limit stops it with {abs(free.forces.limit or 0):.4f} {_unit(result)}"
-    drift = float(floor.position[-1]) - then
-    if abs(drift) > abs(then) * _CREEP:
-        text += (
-            f". And it does not settle on what caught it: from {short:g} s to {end:g} s it creeps "
-            f"on, from {position(then, slide)} to {position(floor.position[-1], slide)}"
-        )
-    if gap < abs(then) * _CREEP:
-        return Text(f"{prefix}without contacts {result.joint} ends nearly where it ends with them.")
-    return Verdict(text, True)
 
 
 def _worst(

@@ -8,16 +8,10 @@ from typing import Any
 import numpy as np
 
 from ..experiments import replay
-from ..page import Page, Question, Table, Text, Traces, Verdict
+from ..page import Page, Question, Table, Text, Verdict
+from ._broken import BROKEN, course, growth, in_short, traces
 from ._words import count, degrees, differences, millimetres, page_of, typed, vector, where
 from .session import Session
-
-_STEPS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 300, 600, 1000, 2000, 5000, 10_000, 20_000)
-_SHORT = {"extra-step": "one step more", "late-ctrl": "ctrl one step late"}
-_BROKEN = {
-    "extra-step": "The second run takes one step more before the count begins.",
-    "late-ctrl": "The second run writes its command one step later.",
-}
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> replay.Replay:
@@ -82,19 +76,19 @@ def page(results: Mapping[str, replay.Replay], session: Session) -> Page:
         *typed(session, _question(first)),
     ]
     if first.broken_by:
-        blocks.append(Text(_BROKEN[first.broken_by]))
+        blocks.append(Text(BROKEN[first.broken_by]))
     blocks.append(_outcome(results))
     blocks.append(_contacts(results))
     if first.broken_by:
-        blocks.append(_growth(results, nstep))
-        blocks.append(_traces(results))
+        blocks.append(growth(results, nstep))
+        blocks.append(traces(results))
     for name, result in results.items():
         blocks.append(_finding(where(results, name), result))
     if not first.broken_by:
         blocks.append(_ways(results))
         for name, result in results.items():
             blocks += _own_ways(name, result)
-        blocks += _broken(results)
+        blocks += in_short(results)
         for name, result in results.items():
             blocks += _truth(where(results, name), result)
     blocks += differences(
@@ -113,7 +107,7 @@ def _question(first: replay.Replay) -> Question:
         return Question(
             "one step differs. What becomes of the difference by the end?",
             ("it grows and grows", "it shrinks again", "it stays as large as its peak"),
-            _course(first.difference),
+            course(first.difference),
             f"It peaks at {first.difference.max():.1e} and ends at {first.difference[-1]:.1e}.",
         )
     return Question(
@@ -122,43 +116,6 @@ def _question(first: replay.Replay) -> Question:
         0 if first.identical else None,
         "The same state and the same commands give the same next state, bit by bit.",
     )
-
-
-def _course(difference: Any) -> int:
-    """Number of the choice: grown to the end, shrunk, or stayed near its peak."""
-    peak, end = float(difference.max()), float(difference[-1])
-    if end < peak / 3:
-        return 1
-    return 0 if int(np.argmax(difference)) == len(difference) - 1 else 2
-
-
-def _broken(results: Mapping[str, replay.Replay]) -> list[Any]:
-    """Second runs that were made to differ, in short."""
-    rows = []
-    for name, result in results.items():
-        for each in result.breaks:
-            rows.append(
-                (
-                    f"{where(results, name)}{_SHORT[each.way]}",
-                    f"{each.peak:.1e}, step {each.peak_step}",
-                    f"{each.end:.1e}",
-                    "equal" if each.close else "not equal",
-                    "not equal" if each.end else "equal",
-                )
-            )
-    if not rows:
-        return []
-    return [
-        Table(
-            ("broken on purpose", "largest", "at the end", "allclose", "array_equal"),
-            rows,
-            title="And if the second run is made to differ by one step",
-        ),
-        Text(
-            "A comparison that forgives small differences may miss such a bug; np.array_equal "
-            "does not. How the difference comes and goes: --break extra-step, --break late-ctrl."
-        ),
-    ]
 
 
 def _truth(prefix: str, result: replay.Replay) -> list[Any]:
@@ -174,19 +131,6 @@ def _truth(prefix: str, result: replay.Replay) -> list[Any]:
             True,
         )
     ]
-
-
-def _traces(results: Mapping[str, replay.Replay]) -> Traces:
-    return Traces(
-        "How far the two runs are apart",
-        "step",
-        "largest |Δqpos|",
-        {
-            name: (list(range(len(result.difference))), result.difference.tolist())
-            for name, result in results.items()
-        },
-        log=True,
-    )
 
 
 def _ways(results: Mapping[str, replay.Replay]) -> Table:
@@ -278,23 +222,6 @@ def _contacts(results: Mapping[str, replay.Replay]) -> Table:
             )
         )
     return Table(("", *results), rows, title="What touched, in the first run")
-
-
-def _growth(results: Mapping[str, replay.Replay], nstep: int) -> Table:
-    free = all(result.apart is not None for result in results.values())
-    headers = ["after step"]
-    for name in results:
-        prefix = where(results, name)
-        headers += [f"{prefix}|Δqpos|", f"{prefix}free body"] if free else [f"{prefix}|Δqpos|"]
-    rows = []
-    for k in [k for k in _STEPS if k < nstep] + [nstep]:
-        cells = [str(k)]
-        for result in results.values():
-            cells.append(f"{result.difference[k]:.1e}")
-            if result.apart is not None:
-                cells.append(millimetres(result.apart[k], 4))
-        rows.append(tuple(cells))
-    return Table(headers, rows, title="How far the two runs are apart")
 
 
 def _finding(prefix: str, result: replay.Replay) -> Text | Verdict:
