@@ -16,6 +16,7 @@ import numpy as np
 from .. import __version__
 from ..errors import BadInputError, UnsupportedError
 from ..interface import Data, Model
+from ..probes import conventions, probe
 from ..records import DERIVED, Array, Contacts, JointType
 
 Progress = Callable[[float], None]  # told the fraction that is done
@@ -30,7 +31,8 @@ def silent(_fraction: float) -> None:
 class Provenance:
     """What a result was computed with, so that it can be computed again.
 
-    `model_sha256` is the digest of the model's file and of those it includes.
+    `model_sha256` is the digest of the model's file and of those it includes; `emulated` are
+    the promises of the contract that the backend keeps instead of its engine.
     """
 
     backend: str
@@ -38,6 +40,7 @@ class Provenance:
     model_file: str
     model_sha256: str
     timestep: float
+    emulated: tuple[str, ...]
     seed: int | None = None
 
 
@@ -53,7 +56,32 @@ def provenance(model: Model, seed: int | None = None, **others: str) -> Provenan
     # The folder and name, not the machine's path: a result is read elsewhere.
     name = "/".join(model.path.parts[-2:])
     digest = hashlib.sha256(b"".join(_with_includes(model.path))).hexdigest()
-    return Provenance(model.backend, versions, name, digest, model.timestep, seed)
+    emulated = tuple(
+        name
+        for name, behaviour in model.capabilities.behaviours.items()
+        if behaviour.support == "emulated"
+    )
+    return Provenance(model.backend, versions, name, digest, model.timestep, emulated, seed)
+
+
+@dataclass(frozen=True)
+class Itself:
+    """What an engine itself does, asked of it alone: a question, a part of it, the answer."""
+
+    question: str
+    part: str
+    answer: str
+
+
+def ask_itself(model: Model, *questions: str) -> tuple[Itself, ...]:
+    """Conventions of the engine behind a Model that emulates some of the contract."""
+    if probe(model) is None:  # the interface is the engine's own
+        return ()
+    return tuple(
+        Itself(question, finding.of, finding.answer)
+        for question in questions
+        for finding in conventions.ask(question, model.backend)
+    )
 
 
 def _with_includes(path: Path) -> Iterator[bytes]:

@@ -10,7 +10,7 @@ from ..interface import Model
 from ..records import Array
 from ..verbs import forward, make_data
 from . import stages
-from ._common import Progress, Provenance, provenance, scalar_joint, silent
+from ._common import Itself, Progress, Provenance, ask_itself, provenance, scalar_joint, silent
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +29,9 @@ class Forward:
     Attributes:
         equal: Pairs (i, j), i < j, of readings that are equal bit by bit.
         moved: Distance [m] that the write and the second `forward` moved the fingertip.
+        contacts: How many were found after the second `forward`; deepest: how far the two
+            surfaces of the worst of them are inside each other [m].
+        itself: What the engine does without us, where some of this is emulated.
         stages: What each call changes, and of which moment derived values are.
     """
 
@@ -37,6 +40,9 @@ class Forward:
     readings: tuple[Reading, ...]
     equal: tuple[tuple[int, int], ...]
     moved: float
+    contacts: int
+    deepest: float
+    itself: tuple[Itself, ...]
     stages: stages.Stages
     provenance: Provenance
 
@@ -76,6 +82,8 @@ def run(
         read(f"qpos[{place}] = {value:g}")
         forward(model, data)
         read("forward again")
+        found = data.contacts
+        count, deepest = len(found), max(0.0, -float(found.dist.min(initial=0.0)))
     equal = tuple(
         (i, j)
         for i in range(len(readings))
@@ -84,4 +92,15 @@ def run(
     )
     moved = float(np.linalg.norm(readings[3].fingertip - readings[2].fingertip))
     looked = stages.run(model, joint, value, site, seconds, progress)
-    return Forward(joint, value, tuple(readings), equal, moved, looked, provenance(model))
+    return Forward(
+        joint=joint,
+        value=value,
+        readings=tuple(readings),
+        equal=equal,
+        moved=moved,
+        contacts=count,
+        deepest=deepest,
+        itself=ask_itself(model, "write", "step"),
+        stages=looked,
+        provenance=provenance(model),
+    )

@@ -31,8 +31,9 @@ class Objects:
         nstep: Steps of each.
         alone: Whether each ended bit for bit where it ends when it runs alone.
         different: How many of the worlds' ends are different.
-        arrays: How many arrays the Model holds; constant: whether all are unchanged.
-        shared: Whether the Data share one compiled model in memory.
+        arrays: How many arrays the Model and the engine's own model hold; constant:
+            whether all of them are unchanged.
+        shared: Whether each Data's engine object names the Model's as its own.
     """
 
     loading: float
@@ -74,6 +75,7 @@ def run(model: Model, worlds: int = 10, nstep: int = 200, progress: Progress = s
     made: list[Data] = []
     making = _median(lambda: made.append(make_data(model)))
     stepping = _median(lambda: step(model, made[0], total)) / total
+    shared = all(getattr(data.raw, "model", None) is model.raw for data in made)
     for data in made:
         data.close()
     progress(0.5)
@@ -98,7 +100,7 @@ def run(model: Model, worlds: int = 10, nstep: int = 200, progress: Progress = s
         different=len({end.tobytes() for end in together}),
         arrays=len(before),
         constant=before == after,
-        shared=model.capabilities.shared_model,
+        shared=shared,
         provenance=provenance(model),
     )
 
@@ -126,10 +128,12 @@ def _command(model: Model, data: Data, k: int, count: int) -> None:
 
 
 def _arrays(model: Model) -> dict[str, bytes]:
-    """The bytes of every array of a Model."""
-    return {
-        name: value.tobytes() for name, value in vars(model).items() if hasattr(value, "tobytes")
-    }
+    """The bytes of every array of a Model, and of the engine's own model."""
+    found = {name: getattr(model, name) for name in vars(model)}
+    for name in dir(model.raw):
+        if not name.startswith("_"):
+            found[f"raw.{name}"] = getattr(model.raw, name)
+    return {name: each.tobytes() for name, each in found.items() if isinstance(each, np.ndarray)}
 
 
 def _median(action: Callable[[], object]) -> float:

@@ -21,7 +21,7 @@ class Pace:
         free: Wall time of the run that does not wait [s].
         paced: Wall time of the run that waits [s].
         waited: How much of it was waiting [s].
-        latest: How far the simulation was behind the clock at worst [s].
+        latest: How far behind the clock a step was at worst, after its waiting [s].
         identical: Whether both runs end in the same bits.
         nap: For how long nothing was called [s]; passed: how far `data.time` and the
             state moved in it (0 and False).
@@ -81,10 +81,10 @@ def run(model: Model, seconds: float = 0.5, progress: Progress = silent) -> Pace
         for k in range(total):
             step(model, other)
             ahead = other.time - (time.perf_counter() - began)
-            latest = max(latest, -ahead)
             if ahead > 0:
                 time.sleep(ahead)
                 waited += ahead
+            latest = max(latest, time.perf_counter() - began - other.time)
             if k % 20 == 0:
                 progress(k / total)
         paced = time.perf_counter() - began

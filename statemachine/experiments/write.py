@@ -30,6 +30,7 @@ class Write:
         refused: What was refused, and with which words.
         felt: How much the first step after the write differs from one without it, in
             the velocity of that joint [rad/s or m/s].
+        found: How many contacts it found; otherwise: how many the one without it found.
     """
 
     joint: str
@@ -45,6 +46,8 @@ class Write:
     assigned: float
     refused: tuple[tuple[str, str], ...]
     felt: float
+    found: int
+    otherwise: int
     provenance: Provenance
 
 
@@ -73,6 +76,7 @@ def run(model: Model, joint: str = "shoulder_lift", value: float = 0.8) -> Write
         step(model, data)
         step(model, other)
         felt = float(data.qvel[dof] - other.qvel[dof])
+        found, otherwise = len(data.contacts), len(other.contacts)
         arrays = {name: getattr(data, name) for name in INPUTS}
         state = get_state(model, data)
         calls = {
@@ -100,6 +104,8 @@ def run(model: Model, joint: str = "shoulder_lift", value: float = 0.8) -> Write
             assigned=float(view[place]),
             refused=_refused(data),
             felt=felt,
+            found=found,
+            otherwise=otherwise,
             provenance=provenance(model),
         )
 

@@ -9,10 +9,11 @@ import numpy as np
 
 from ..experiments import gravity
 from ..page import Table, Text, Traces, Verdict
-from ._words import position, where
+from ._words import angle_or_length, position, where
 
 _BALANCE = 1e-3  # N·m or N; a sum below it is zero
 _CREEP = 0.05  # of the way; a joint that goes on by more has not settled
+_FURTHER = 0.02  # rad or m; less is not worth a cause
 
 
 def longer(results: Mapping[str, gravity.Gravity]) -> list[Any]:
@@ -65,27 +66,48 @@ def longer(results: Mapping[str, gravity.Gravity]) -> list[Any]:
     return blocks
 
 
+def longer_apart(results: Mapping[str, gravity.Gravity]) -> list[tuple[str, Any]]:
+    """Rows of the differences: the ends of the longer runs."""
+    first = next(iter(results.values()))
+
+    def say(label: str) -> Any:
+        def gap(one: gravity.Gravity, two: gravity.Gravity) -> str:
+            if label not in one.longer or label not in two.longer:
+                return "–"
+            ends = [each.longer[label].position[-1] for each in (one, two)]
+            return angle_or_length(abs(float(ends[0] - ends[1])), one.slide)
+
+        return gap
+
+    return [
+        (f"servos off, {label}, at {run.time[-1]:g} s", say(label))
+        for label, run in first.longer.items()
+    ]
+
+
 def _caught(
     prefix: str, result: gravity.Gravity, floor: gravity.Droop, free: gravity.Droop
 ) -> Text | Verdict:
-    """Whether it is the contact that catches the joint, and whether it comes to rest."""
+    """Whether it is the contact that catches the joint, and whether it stays there."""
     slide, end = result.slide, float(floor.time[-1])
     short = float(result.servos_off.time[-1])
-    then = float(result.servos_off.position[-1])
-    gap = abs(float(free.position[-1]) - then)
+    then, alone = float(result.servos_off.position[-1]), float(free.position[-1])
+    further = alone * np.sign(then) - abs(then)
+    if further < max(_FURTHER, abs(then) * _CREEP):
+        return Text(
+            f"{prefix}without contacts {result.joint} goes no further that way: it ends at "
+            f"{position(alone, slide)}."
+        )
     text = (
         f"{prefix}it is the contact that catches {result.joint}, not damping or friction: without "
-        f"contacts it runs on to {position(free.position[-1], slide)}"
+        f"contacts it runs on to {position(alone, slide)}"
     )
     if abs(free.forces.limit or 0.0) > _BALANCE:
         unit = "N" if slide else "N·m"
         text += f", where its limit stops it with {abs(free.forces.limit or 0):.4f} {unit}"
-    drift = float(floor.position[-1]) - then
-    if abs(drift) > abs(then) * _CREEP:
+    if abs(float(floor.position[-1]) - then) > abs(then) * _CREEP:
         text += (
-            f". And it does not settle on what caught it: from {short:g} s to {end:g} s it creeps "
-            f"on, from {position(then, slide)} to {position(floor.position[-1], slide)}"
+            f". And it does not stay where it was caught: at {short:g} s it is at "
+            f"{position(then, slide)}, at {end:g} s at {position(floor.position[-1], slide)}"
         )
-    if gap < abs(then) * _CREEP:
-        return Text(f"{prefix}without contacts {result.joint} ends nearly where it ends with them.")
     return Verdict(text, True)

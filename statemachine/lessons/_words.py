@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from ..page import Code, Page, Printed, Question, Table
+from ..page import Code, Page, Printed, Question, Table, Text
 from .session import Session
 
 
@@ -28,6 +28,33 @@ def typed(session: Session, question: Question | None = None) -> list[Code | Que
     """The code of a lesson, a prediction, and what it printed."""
     code = Code(session.code.splitlines())
     return [code, *([question] if question else []), Printed(session.printed)]
+
+
+def emulation(results: Mapping[str, Any], *promises: str) -> list[Text]:
+    """Which of the promises that a page speaks of are kept by us, and not by the engine."""
+    texts = []
+    for name, result in results.items():
+        ours = [each for each in promises if each in result.provenance.emulated]
+        if ours:
+            texts.append(
+                Text(f"On {name} this interface, not the engine, sees to this: {', '.join(ours)}.")
+            )
+    return texts
+
+
+def itself(name: str, asked: Sequence[Any]) -> list[Table]:
+    """What the engine does without us."""
+    if not asked:
+        return []
+    questions = " ".join(dict.fromkeys(each.question for each in asked))
+    return [
+        Table(
+            ("after", "what", "is"),
+            [(f"a {each.question}", each.part, each.answer) for each in asked],
+            title=f"{name} itself, without us (statemachine conventions {questions})",
+            words=frozenset({0, 1, 2}),
+        )
+    ]
 
 
 def duration(seconds: float) -> str:

@@ -10,7 +10,17 @@ import numpy as np
 
 from ..experiments import forward
 from ..page import Page, Pipeline, Question, Table, Text, Traces, Verdict
-from ._words import count, differences, millimetres, page_of, typed, vector, where
+from ._words import (
+    count,
+    differences,
+    emulation,
+    itself,
+    millimetres,
+    page_of,
+    typed,
+    vector,
+    where,
+)
 from .session import Session
 
 _MOMENTS = ("xpos", "site_xpos", "contacts", "qacc")  # shown of what a step leaves behind
@@ -110,6 +120,17 @@ def page(results: Mapping[str, forward.Forward], session: Session) -> Page:
         blocks.append(
             Verdict(f"{where(results, name)}data.time is the same in all four readings", unmoved)
         )
+        if result.deepest > _INSIDE:
+            blocks.append(
+                Text(
+                    f"{where(results, name)}nobody checks whether a robot could be where you write "
+                    f"it: forward finds {count(result.contacts, 'contact')} now, the worst "
+                    f"{millimetres(result.deepest, 1)} inside each other."
+                )
+            )
+    blocks += emulation(results, "zeros when fresh", "stale after a write", "stale after a step")
+    for name, result in results.items():
+        blocks += itself(name, result.itself)
     blocks += _what_changes(results)
     blocks += _moments(results)
     rows = [(f"fingertip, reading {i + 1}", _apart(i)) for i in range(len(first.readings))]
@@ -149,6 +170,18 @@ def _what_changes(results: Mapping[str, forward.Forward]) -> list[Any]:
                 words=frozenset({0, 1, 2, 3}),
             )
         )
+    for name, result in results.items():
+        derived = [each.name for each in result.stages.changes if not each.stored]
+        other = [each for each in derived if each not in result.stages.same]
+        text = f"step computed {len(derived) - len(other)} of {len(derived)} derived arrays with "
+        text += "the same bits as forward"
+        blocks.append(
+            Verdict(
+                f"{where(results, name)}from the written state {text}"
+                + (f", not {', '.join(other)}" if other else "; then it integrated"),
+                {"xpos", "xquat", "site_xpos", "site_xmat"} <= set(result.stages.same),
+            )
+        )
     stored = [each.name for each in first.changes if each.stored]
     derived = [each.name for each in first.changes if not each.stored and each.forward]
     moved = [each.name for each in first.changes if each.stored and each.step]
@@ -163,8 +196,7 @@ def _what_changes(results: Mapping[str, forward.Forward]) -> list[Any]:
 
 
 def _list(names: list[str], stored: bool) -> str:
-    kind = "stored" if stored else "derived"
-    lines = [f"{kind}: "]
+    lines = ["stored: " if stored else "derived: "]
     for name in names:
         if len(lines[-1]) + len(name) > _COLUMN:
             lines.append("  ")
@@ -173,6 +205,7 @@ def _list(names: list[str], stored: bool) -> str:
 
 
 _COLUMN = 44
+_INSIDE = 1e-3  # metres; less is how engines press things together
 
 
 def _moments(results: Mapping[str, forward.Forward]) -> list[Any]:
@@ -200,6 +233,7 @@ def _moments(results: Mapping[str, forward.Forward]) -> list[Any]:
             ],
             title=f"In how many of {count(steps, 'step')} it is that of the state before, or after",
         ),
+        Text("(What did not change in a step, as an empty list of contacts, is of both.)"),
     ]
     for name, result in results.items():
         stages = result.stages

@@ -1,4 +1,4 @@
-"""Leaving ctrl alone is also a command; and who holds the arm up."""
+"""An untouched ctrl commands too; and who holds the arm up."""
 
 from __future__ import annotations
 
@@ -9,8 +9,17 @@ import numpy as np
 
 from ..experiments import gravity
 from ..page import Page, Question, Table, Text, Verdict
-from ._fall import longer
-from ._words import angle_or_length, differences, page_of, position, signed, typed, where
+from ._fall import longer, longer_apart
+from ._words import (
+    angle_or_length,
+    differences,
+    emulation,
+    page_of,
+    position,
+    signed,
+    typed,
+    where,
+)
 from .session import Session
 
 _PARTS = (
@@ -22,6 +31,7 @@ _PARTS = (
     ("joint limit", "limit"),
     ("equality", "equality"),
 )
+_OURS = ("position servo", "joint damping", "dry friction", "joint limits", "forces by part")
 _BALANCE = 1e-3  # N·m or N; a sum below it is zero
 _SLOW = 0.01  # rad/s or m/s; a joint below it is at rest or creeps
 _STARTS = 0.02  # rad/s² or m/s²; a joint beyond it is about to move
@@ -102,6 +112,7 @@ def page(results: Mapping[str, gravity.Gravity], session: Session) -> Page:
             emphasis=frozenset({len(parts)}),
         ),
     ]
+    blocks += emulation(results, *_OURS)
     for name, run in columns.items():
         blocks.append(_finding(name, run, first))
         if run.touching:
@@ -116,7 +127,11 @@ def page(results: Mapping[str, gravity.Gravity], session: Session) -> Page:
         [
             ("servos on, worst", lambda a, b: _worst(a, b, "servos_on")),
             ("servos off, until one touches", lambda a, b: _worst(a, b, "servos_off", False)),
-            ("servos off, after that", lambda a, b: _worst(a, b, "servos_off", True)),
+            (
+                f"servos off, after that, up to {end:g} s",
+                lambda a, b: _worst(a, b, "servos_off", True),
+            ),
+            *longer_apart(results),
         ],
     )
     return page_of("You never wrote ctrl", results, blocks)
@@ -179,22 +194,23 @@ def _alone(name: str, result: gravity.Gravity) -> list[Table | Text]:
     if held.motor and abs(held.position) < min(abs(limp.position), abs(undamped.position)) / 10:
         blocks.append(
             Text(
-                f"At {name}'s own 1/240 s a step. There a freshly loaded arm does not fall, and "
-                "not because of its servos: gravity is zero until it is set, and every joint "
-                "comes with a motor of the engine's own that holds it still, here with "
-                f"{abs(held.motor):.4f} {unit}. With gravity set, the motors off and no joint "
-                f"damping in the URDF, {result.joint} is at "
-                f"{position(undamped.position, result.slide)} then, instead of "
-                f"{position(held.position, result.slide)}."
+                f"At {name}'s own 1/240 s a step. A fresh world of {name} has a gravity of "
+                f"{held.gravity:g} m/s²; and with the model's set, the arm still does not fall, "
+                "not because of its servos: the joints come with motors of the engine's own, which "
+                f"keep them all within {position(held.widest, result.slide)}; that of "
+                f"{result.joint} exerts {abs(held.motor):.4f} {unit}. With the motors off and no "
+                f"joint damping in the URDF it is at {position(undamped.position, result.slide)} "
+                f"then, instead of {position(held.position, result.slide)}."
             )
         )
-    if limp.explicit > 2:
+    if limp.explicit > 2 and limp.turns > limp.steps / 4:
         blocks.append(
             Text(
-                f"With the motors off and the damping in, it flails: {name} takes the damping "
-                "torque of the velocity before the step. In a step that changes the velocity by "
-                f"timestep × damping ÷ inertia, here up to {limp.explicit:.0f} times itself; from "
-                "2 on the joint turns round faster than it was."
+                f"With the motors off and the damping in, it flails: its velocity changes its sign "
+                f"in {limp.turns} of {limp.steps} steps. {name} takes the damping torque of the "
+                "velocity before the step; that changes the velocity by timestep × damping ÷ "
+                f"inertia, here up to {limp.explicit:.0f} times itself, and from 2 on the joint "
+                "turns round faster than it was."
             )
         )
     return blocks
@@ -204,11 +220,11 @@ def _introduction(first: gravity.Gravity) -> str:
     runs = (first.servos_on, first.servos_off)
     text = "Nobody writes ctrl in either run"
     if all(run.ctrl_is_zero for run in runs):
-        text += "; it is zero from the first step to the last"
+        text += "; it is zero, at the end too"
     if first.servo:
         return text + (
-            ". To a position servo zero is a target like any other: there is no setting that "
-            "means nothing. The second run has the servos switched off."
+            ". To a position servo zero is a target like any other: there is no fixed value "
+            "that means nothing. The second run has the servos switched off."
         )
     return f"{text}. No position servo drives {first.joint}."
 
@@ -227,7 +243,7 @@ def _finding(name: str, run: gravity.Droop, first: gravity.Gravity) -> Text | Ve
     total, load = run.forces.total, _part(run, "bias")
     if abs(run.velocity) > _SLOW or abs(run.acceleration) > _STARTS:
         speed = position(run.velocity, first.slide)
-        return Text(f"{name}: {first.joint} still moves, at {speed}/s; nothing holds it yet.")
+        return Text(f"{name}: {first.joint} still moves, at {speed}/s; no balance is drawn.")
     if total is None or load is None:
         return Text(f"{name}: this engine does not tell all the parts, so no sum is drawn.")
     if abs(total) > _BALANCE:

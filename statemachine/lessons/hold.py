@@ -47,12 +47,15 @@ def page(results: Mapping[str, hold.Hold], session: Session) -> Page:
     first = next(iter(results.values()))
     end = float(first.time[-1])
     times = [t for t in _TIMES if t < end] + [end]
-    text = "ctrl is the only wire into this robot: one number for each actuator."
+    text = (
+        "ctrl is how you command this robot: one number for each actuator, in the order of "
+        "model.actuator_names."
+    )
     if first.servo:
         text += (
             " Each is a position servo: it pushes with kp·(ctrl − q) − kv·q̇, within its force "
-            "limit, and the arm follows. Whatever you build, a script, a teleoperation, a "
-            "trained policy, it ends at this assignment."
+            "limit, and the arm follows. A script, a joystick and a trained policy all speak to "
+            "the robot through this array."
         )
     blocks: list[Any] = [
         Text(text),

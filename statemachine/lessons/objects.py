@@ -10,6 +10,8 @@ from ..page import Page, Question, Table, Text, Verdict
 from ._words import count, differences, duration, page_of, typed, where
 from .session import Session
 
+_CHEAP = 5  # times; a Data that is not cheaper than that is no bargain
+
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> objects.Objects:
     """Costs, and several Data of one Model."""
@@ -55,20 +57,24 @@ def page(results: Mapping[str, objects.Objects], session: Session) -> Page:
             ("", *results),
             [
                 ("load: the file, once", *(duration(r.loading) for r in results.values())),
-                ("make_data: memory", *(duration(r.making) for r in results.values())),
+                ("make_data", *(duration(r.making) for r in results.values())),
                 ("step: one timestep", *(duration(r.stepping) for r in results.values())),
                 ("a load costs as much as", *(_steps(r) for r in results.values())),
             ],
             title="What each costs on this machine, now (median of five)",
         ),
-        Text(
-            "So what is slow is done once, and many Data can use it. That is how many worlds "
-            "are simulated at the same time."
-        ),
     ]
     for name, result in results.items():
         prefix = where(results, name)
+        cheap = result.making < result.loading / _CHEAP
         blocks += [
+            Text(
+                f"{prefix}the slow part is done once, and many Data use it. That is how many "
+                "worlds are simulated at the same time."
+                if cheap
+                else f"{prefix}here a Data costs nearly what a load does: the slow part is done "
+                "anew for each."
+            ),
             Verdict(
                 f"{prefix}{result.worlds} Data of one Model, each under a command of its own, took "
                 f"{count(result.nstep, 'step')} in turn: each ended bit for bit where it ends "
@@ -76,14 +82,15 @@ def page(results: Mapping[str, objects.Objects], session: Session) -> Page:
                 result.alone,
             ),
             Verdict(
-                f"{prefix}the Model's {result.arrays} arrays have the same bytes as before",
+                f"{prefix}the Model's arrays, {result.arrays} with the engine's own, have the same "
+                "bytes as before",
                 result.constant,
             ),
             Text(
-                f"{prefix}the Data of a Model share one compiled model in memory."
+                f"{prefix}all Data name the Model's own engine object as theirs: one in memory."
                 if result.shared
-                else f"{prefix}each Data is a world of its own here, which holds its own copy of "
-                "the compiled model: the engine has no two objects. The split is ours."
+                else f"{prefix}the engine has no such two objects; the split is ours, and each "
+                "Data is a world that was loaded for itself."
             ),
         ]
     blocks += differences(

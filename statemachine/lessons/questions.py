@@ -86,10 +86,13 @@ def _slots_answer(answers: questions.Answers) -> tuple[str, bool]:
         if (j.qpos_start, j.qpos_stop) != (j.qvel_start, j.qvel_stop)
     ]
     names = "; ".join(
-        f"{j.name} has qpos[{j.qpos_start}:{j.qpos_stop}] and qvel[{j.qvel_start}:{j.qvel_stop}]"
+        f"{j.name or 'a joint without a name'} has qpos[{j.qpos_start}:{j.qpos_stop}] and "
+        f"qvel[{j.qvel_start}:{j.qvel_stop}]"
         for j in apart
     )
-    return f"{names}: seven numbers of position, six of velocity", bool(apart)
+    if not apart:
+        return "every joint of this model has the same slots in both: not a model to ask of", False
+    return f"the slots differ: {names}", True
 
 
 def _truth(answers: questions.Answers) -> Question:
@@ -113,7 +116,7 @@ def _truth_answer(answers: questions.Answers) -> tuple[str, bool]:
         return text, found.identical
     return (
         f"{text}; with half the timestep two runs agree bit for bit as well, and end off by "
-        f"{found.finer.difference:.1e}. Both cannot be right",
+        f"{found.finer.difference:.1e}. They cannot both be right",
         found.identical and found.finer.identical and found.finer.difference > 0,
     )
 
@@ -144,7 +147,7 @@ def _held_answer(answers: questions.Answers) -> tuple[str, bool]:
     )
     if found.alone:
         text += (
-            ". (As the engine itself comes, the colleague is right, and for another reason: see "
+            ". (Without this interface it is another story: see what the engine itself does, in "
             "statemachine lesson gravity)"
         )
     held = abs(servo - load) < 1e-3 < abs(load)
@@ -160,8 +163,7 @@ def _two(answers: questions.Answers) -> Question:
             "step would otherwise not know its timestep",
         ),
         1,
-        "And it is a clean line: what is in the Model is a fact about the robot, what is in the "
-        "Data a fact about now.",
+        "And the line is clean: the Model knows what the robot is, the Data what it does now.",
     )
 
 

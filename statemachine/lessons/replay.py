@@ -1,4 +1,4 @@
-"""Reset, and reset again to exactly the same place."""
+"""The same start and the same commands, twice: the same bits, or how far apart?"""
 
 from __future__ import annotations
 
@@ -88,6 +88,14 @@ def page(results: Mapping[str, replay.Replay], session: Session) -> Page:
         blocks.append(_ways(results))
         for name, result in results.items():
             blocks += _own_ways(name, result)
+        if all(result.identical for result in results.values()):
+            blocks.append(
+                Text(
+                    "So what a robot does can have a regression test: fix the start and the number "
+                    "of steps, run your controller, and compare the end. The test fails when "
+                    "something has changed, and not by chance."
+                )
+            )
         blocks += in_short(results)
         for name, result in results.items():
             blocks += _truth(where(results, name), result)

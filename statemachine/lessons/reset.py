@@ -7,7 +7,7 @@ from typing import Any
 
 from ..experiments import reset
 from ..page import Page, Question, Table, Text, Verdict
-from ._words import count, differences, millimetres, page_of, typed, where
+from ._words import count, differences, emulation, millimetres, page_of, typed, where
 from .session import Session
 
 
@@ -53,6 +53,7 @@ def page(results: Mapping[str, reset.Reset], session: Session) -> Page:
             ),
             Verdict(f"{prefix}every derived array is zero after a reset", result.empty),
         ]
+    blocks += emulation(results, "zeros when fresh")
     if not first.scenes:
         blocks.append(Text("This model's file names no keyframe: try --model so101/scene_box."))
     for number, scene in enumerate(first.scenes):
@@ -83,7 +84,7 @@ def _question(first: reset.Reset) -> Question | None:
         f"what is data.time after the reset to keyframe 0 ({frame.name!r})?",
         ("0 s: a reset begins anew", f"{frame.time:g} s: what the file says", "0.5 s: as before"),
         1 if "time" in frame.exact else 0,
-        "Time is a number of the state, and a keyframe holds all of the state.",
+        "Time is a number of the state, and a keyframe has one of its own.",
     )
 
 

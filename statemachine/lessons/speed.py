@@ -24,10 +24,12 @@ import statemachine as sm
 
 model = {load}
 data = sm.make_data(model)
+if model.keyframes:
+    sm.reset(model, data, keyframe=0)
 began = time.perf_counter()
 sm.step(model, data, 2000)
 wall = time.perf_counter() - began
-print(round(data.time / wall), "times real time")
+print(round(2000 * model.timestep / wall), "times real time")
 """
 
 
@@ -59,8 +61,8 @@ def page(results: Mapping[str, speed.Speed], session: Session) -> Page:
                 f"{first.simulated:g} simulated seconds, {count(first.nstep, 'step')} of "
                 f"{first.provenance.timestep:g} s, as fast as they "
                 "come. In bulk: one call for many steps. Step by step: a Python loop of single "
-                "calls, as a controller needs it. The ratio of simulated to real time is the "
-                "budget that every experiment of yours is drawn against."
+                "calls, as a controller needs it. How much an experiment may cost follows from "
+                "the ratio of simulated to real time."
             ),
             *typed(session, _question(first)),
             Table(("", *results), rows, title="Wall time, and × real time, on this machine, now"),

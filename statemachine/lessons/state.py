@@ -23,8 +23,7 @@ import statemachine as sm
 
 model = {load}
 print(model.nq, model.nv, model.nu)
-for name in model.joint_names:
-    j = model.joint_id(name)
+for j, name in enumerate(model.joint_names):
     print(model.jnt_qposadr[j], model.jnt_dofadr[j], name)
 """
 
@@ -34,11 +33,11 @@ def page(results: Mapping[str, state.Layout], session: Session) -> Page:
     first = next(iter(results.values()))
     blocks: list[Any] = [
         Text(
-            "All that changes lives in a Data. Its state is two arrays: qpos says where every "
-            "joint is, qvel how fast it moves. A hinge takes one number in each. A free body "
-            "takes seven in qpos (three of position, four of a quaternion) and six in qvel "
-            "(three linear, three angular), because four numbers of a quaternion describe "
-            "only three ways to turn. jnt_qposadr says where in qpos a joint begins, jnt_dofadr "
+            "All that changes lives in a Data. Where its joints are and how they move are two "
+            "arrays: qpos and qvel. A hinge takes one number in each. A free body takes seven in "
+            "qpos (three of position, four of a quaternion) and six in qvel (three linear, three "
+            "angular): a rotation has three degrees of freedom, and a quaternion one number more "
+            "than that. jnt_qposadr says where in qpos a joint begins, jnt_dofadr "
             "where in qvel."
         ),
         *typed(session, _question(first)),

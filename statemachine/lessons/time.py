@@ -40,7 +40,7 @@ import statemachine as sm
 model = {load}
 data = sm.make_data(model)
 began = time.perf_counter()
-while data.time < {options["seconds"]:g}:
+for _ in range(round({options["seconds"]:g} / model.timestep)):
     sm.step(model, data)
     ahead = data.time - (time.perf_counter() - began)
     time.sleep(max(0, ahead))  # the waiting is yours

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..experiments import write
 from ..page import Page, Question, Table, Text, Verdict
-from ._words import page_of, position, typed, where
+from ._words import count, emulation, page_of, position, typed, where
 from .session import Session
 
 
@@ -36,9 +36,9 @@ def page(results: Mapping[str, write.Write], session: Session) -> Page:
     first = next(iter(results.values()))
     blocks: list[Any] = [
         Text(
-            "data.qpos is no copy of the state: it is the state. A second name for it is the "
-            "same array; what you write there is in the simulator, with no call in between. "
-            "(To keep a value, copy it: data.qpos.copy().)"
+            "data.qpos is no copy. A second name for it is the same array, and what you write "
+            "there is what the next call starts from; nothing has to be handed over. (To keep a "
+            "value, copy it: data.qpos.copy().)"
         ),
         *typed(
             session,
@@ -83,15 +83,18 @@ def page(results: Mapping[str, write.Write], session: Session) -> Page:
         )
         blocks.append(
             Text(
-                f"{prefix}the next step does notice: it leaves {result.joint} at another speed "
-                f"than without the write, by {position(result.felt, result.slide, 1)}/s."
+                f"{prefix}the next step starts from what you wrote: it leaves {result.joint} at "
+                f"another speed than without the write, by {position(result.felt, result.slide, 1)}"
+                f"/s, and finds {count(result.found, 'contact')} where there would be "
+                f"{result.otherwise}."
             )
         )
+    blocks += emulation(results, "stale after a write")
     blocks.append(
         Table(
             ("you type", "and read"),
             first.refused,
-            title="What is refused before anything changes",
+            title="What is refused",
             words=frozenset({0, 1}),
         )
     )

@@ -33,6 +33,10 @@ class Alone:
         motor: What the engine's own motor exerts on it [N·m or N].
         explicit: Largest h·D/M of the joint damping that the engine applies explicitly;
             above 2 a joint gains speed from being damped.
+        gravity: Length of the gravity of a fresh world [m/s²].
+        widest: How far any joint of the robot is from zero then [rad or m].
+        turns: In how many steps the joint's velocity changed its sign.
+        steps: Of how many.
     """
 
     label: str
@@ -40,6 +44,10 @@ class Alone:
     position: float
     motor: float
     explicit: float
+    gravity: float
+    widest: float
+    turns: int
+    steps: int
 
 
 @dataclass(frozen=True)

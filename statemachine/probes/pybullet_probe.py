@@ -124,7 +124,7 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[Alone, ...]:
         joint: Id of a hinge or slide.
     """
     steps = max(1, round(seconds / ENGINE_TIMESTEP))
-    found = []
+    found, fresh = [], _fresh_gravity()
     for label, gravity, motors, damping in (
         ("as loadURDF leaves it", False, True, True),
         ("gravity set", True, True, True),
@@ -141,13 +141,36 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[Alone, ...]:
                         tree.body, each, pb.VELOCITY_CONTROL, force=0, physicsClientId=world.client
                     )
             ratio = _explicit(world, tree)
+            speeds = []
             for _ in range(steps):
                 pb.stepSimulation(world.client)
+                speeds.append(pb.getJointState(tree.body, index, world.client)[1])
             state = pb.getJointState(tree.body, index, world.client)
+            places = [s[0] for s in pb.getJointStates(tree.body, tree.joints, world.client)]
             found.append(
-                Alone(label, steps * ENGINE_TIMESTEP, float(state[0]), float(state[3]), ratio)
+                Alone(
+                    label=label,
+                    time=steps * ENGINE_TIMESTEP,
+                    position=float(state[0]),
+                    motor=float(state[3]),
+                    explicit=ratio,
+                    gravity=fresh,
+                    widest=float(np.abs(places).max()),
+                    turns=int((np.diff(np.sign(speeds)) != 0).sum()),
+                    steps=steps,
+                )
             )
     return tuple(found)
+
+
+def _fresh_gravity() -> float:
+    """The length of the gravity that a world has before anybody sets it."""
+    client = pb.connect(pb.DIRECT)
+    try:
+        told = pb.getPhysicsEngineParameters(client)
+        return float(np.linalg.norm([told[f"gravityAcceleration{axis}"] for axis in "XYZ"]))
+    finally:
+        pb.disconnect(client)
 
 
 def _explicit(world: World, tree: Tree) -> float:

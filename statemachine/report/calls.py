@@ -56,7 +56,8 @@ def _heading(recordings: Mapping[str, Recording]) -> Text:
     return Text(
         f"The engine's own words, recorded from this run on {engines}: under each line, the "
         "functions of the engine that it made run, how often, and what differed after a call, "
-        f"bit by bit ({_NOTHING} is nothing). Looked at, before and after each call: {looks}."
+        f"bit by bit ({_NOTHING} is nothing that shows there). Looked at, before and after each "
+        f"call: {looks}. Looking takes time: what the code prints of the clock is not the engine's."
     )
 
 
@@ -144,8 +145,9 @@ def _legend(recordings: Mapping[str, Recording]) -> Iterator[Text]:
     }
     if any("the still copy" in call.on for call in calls):
         yield Text(
-            "The still copy is the same robot in a world of its own: the interface asks it for "
-            "poses, the mass matrix and the bias, so as not to disturb yours. In this run it was "
+            "The still copy is the robot with its true inertias, in a world of its own; the one "
+            "that is stepped carries extra inertia for its servos. The interface asks the copy for "
+            "poses, the mass matrix and the bias. In this run it was "
             f"{_times(stepped['the still copy'])}."
         )
     if any("the look-ahead" in call.on for call in calls):

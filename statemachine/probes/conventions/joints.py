@@ -15,7 +15,7 @@ QUESTION = Question(
     "In which order do the joints come, and does a fixed one take a number?",
     "A command in the order of another engine moves the wrong joints. Look joints up by name.",
 )
-# (name, parent link, kind) in the order of the file; the link under a joint has its name.
+# (name, parent, kind) in the order of the file; the parent is named by the joint above it.
 # Listed, depth first, breadth first, each by file or by alphabet: all different here.
 TREE = (
     ("lima", "zulu", "hinge"),
@@ -82,12 +82,20 @@ _INERTIAL = (
     '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
     "</inertial>"
 )
+
+
+def _link(joint: str) -> str:
+    """The link under a joint: its name backwards, whose alphabet is another one."""
+    return joint if joint == "base" else joint[::-1]
+
+
+# The links stand in the opposite order, so that no rule about links passes for one about joints.
 URDF = (
     f'<robot name="tree"><link name="base">{_INERTIAL}</link>'
-    + "".join(f'<link name="{name}">{_INERTIAL}</link>' for name, _, _ in TREE)
+    + "".join(f'<link name="{_link(name)}">{_INERTIAL}</link>' for name, _, _ in reversed(TREE))
     + "".join(
         f'<joint name="{name}" type="{"continuous" if kind == "hinge" else "fixed"}">'
-        f'<parent link="{parent}"/><child link="{name}"/></joint>'
+        f'<parent link="{_link(parent)}"/><child link="{_link(name)}"/></joint>'
         for name, parent, kind in TREE
     )
     + "</robot>"

@@ -16,7 +16,7 @@ from ._marked import MARKS, MJCF, URDF, in_pinocchio, in_pybullet
 QUESTION = Question(
     "In which order do the four numbers of a quaternion stand?",
     "Four numbers in the wrong order are still a rotation, only another one: nothing complains. "
-    "Do not test with a turn of 90° about z: its w and its z are the same number.",
+    "Do not test with a third of a turn about 1 1 1: its four numbers are the same.",
 )
 # A turn whose four numbers are all different: about (1, 2, 3), by 1 rad.
 _ANGLE, _AXIS = 1.0, np.array([1.0, 2, 3]) / np.sqrt(14)

@@ -54,7 +54,8 @@ def _after(way: bullet.Reset, name: str) -> Finding:
         bodies = pb.getNumBodies(client)
         way.call(scene)
         kept += ["bodies"] if pb.getNumBodies(client) == bodies else []
-    return _found(kept, [each for each in names if each not in kept], name)
+    gone = [each for each in names if each not in kept]
+    return _found(kept, [f"{each} (gone)" if each == "bodies" else each for each in gone], name)
 
 
 def pinocchio() -> Findings:

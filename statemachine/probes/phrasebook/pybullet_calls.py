@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import Any
 
-from ..conventions._pendulum import URDF, tip_at
+from ..conventions._pendulum import GRAVITY, INERTIA, URDF, tip_at
 from . import ANGLE, Cell, near
 from ._law import accelerated
 
@@ -56,7 +56,14 @@ def _read(n: Any) -> bool:
 
 
 def _was_reset(n: Any) -> bool:
-    return n.pb.getNumBodies(n.w) == 1 and _joint(n) == (0, 0)
+    told = n.pb.getPhysicsEngineParameters(n.w)
+    inertia = n.pb.getDynamicsInfo(n.arm, 0, n.w)[2]
+    return (
+        n.pb.getNumBodies(n.w) == 1
+        and _joint(n) == (0, 0)
+        and told["gravityAccelerationZ"] == -GRAVITY
+        and near(inertia, (INERTIA, INERTIA, INERTIA), _SINGLE)
+    )
 
 
 def _restored(n: Any) -> bool:
@@ -93,13 +100,16 @@ CELLS = {
     "step": Cell("pb.stepSimulation(w)", _stepped),
     "recompute": Cell(
         "pb.getLinkState(arm, 0, computeForwardKinematics=1,\n"
-        "                physicsClientId=w)  # of all links of the body",
+        "                physicsClientId=w)  # poses of all its links\n"
+        "pb.performCollisionDetection(w)     # and contacts",
         _recomputed,
     ),
     "read a site": Cell("tip = pb.getLinkState(arm, 1, physicsClientId=w)[4]", _read),
     "reset": Cell(
-        "pb.resetSimulation(physicsClientId=w)  # and load again\n"
-        "arm = pb.loadURDF(file, useFixedBase=True, physicsClientId=w)",
+        "pb.resetSimulation(physicsClientId=w)  # and all of load again\n"
+        "pb.setGravity(0, 0, -9.81, w)\n"
+        "arm = pb.loadURDF(file, useFixedBase=True, physicsClientId=w,\n"
+        "                  flags=pb.URDF_USE_INERTIA_FROM_FILE)",
         _was_reset,
     ),
     "save": Cell(
