@@ -1,4 +1,4 @@
-# make lesson       set everything up and run the main lessons
+# make lesson       set everything up and walk the guided path
 # make test         set everything up and run all checks and tests
 # make check        lint, format, layers and types only
 # make bench        the speed budget, as ratios
@@ -19,17 +19,18 @@ help:
 	@sed -n 's/^# make /  make /p' Makefile
 
 lesson: $(VENV)/run.stamp
+	@# In a terminal it asks and waits; q ends it at any question.
+	@$(BIN)/statemachine lesson
 	@# Both engines; one that cannot be had here is named in one line and left out.
-	@$(BIN)/statemachine lesson forward --backend all --no-questions
-	@$(BIN)/statemachine lesson gravity --backend all --no-questions
 	@# 3: the witness cannot be had here; it has said so in one line.
 	@$(BIN)/statemachine fingertip --backend all || [ $$? -eq 3 ]
 	@echo "Where to go next:"
-	@echo "  source $(BIN)/activate   makes statemachine a command of your shell"
-	@echo "  statemachine lesson         the guided path: ten stations, about 35 minutes"
-	@echo "  python exercises/step_loop.py    then four functions for you to write"
-	@echo "  statemachine                everything that there is"
-	@echo "  statemachine doctor         what this machine has, and what to do"
+	@echo "  source $(BIN)/activate       makes statemachine a command of your shell"
+	@echo "  statemachine                    everything that there is"
+	@echo "  statemachine lesson gravity --backend all     on all engines, side by side"
+	@echo "  statemachine lesson questions   check yourself"
+	@echo "  python exercises/step_loop.py   then four functions for you to write"
+	@echo "  statemachine doctor             what this machine has, and what to do"
 
 test: check
 	@$(BIN)/python -m pytest -n auto

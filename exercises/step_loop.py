@@ -82,8 +82,9 @@ def demo_state(model):
 
     Returns:
         (slots, time): slots is a dict {name of the joint: (slice of qpos, slice of qvel)},
-        with one entry for every joint, so that data.qpos[slots["gripper"][0]] is its
-        position. time is data.time [s] right after a reset to keyframe 0.
+        with one entry for every joint, as {"gripper": (slice(5, 6), slice(5, 6)), …}, so that
+        data.qpos[slots["gripper"][0]] is its position. time is data.time [s] right after a
+        reset to keyframe 0.
     """
     raise NotImplementedError("TODO(you): tell which slots each joint owns")
 
@@ -234,7 +235,7 @@ def main(functions):
     if options.name is None:
         for name, words in about.items():
             print(f"  --{name:<8} {words}")
-        print("Start with: python step_loop.py --gravity")
+        print(f"Start with: python {sys.argv[0]} --gravity")
         return 0
     show, scene, more = SHOWS[options.name]
     called = f"demo_{options.name}"
@@ -250,7 +251,11 @@ def main(functions):
     if result is None:
         print(f"{called} returned nothing: it must hand its result over with `return`")
         return 1
-    show(model, result)
+    try:
+        show(model, result)
+    except (TypeError, ValueError, AttributeError, IndexError) as error:
+        print(f"{called}: what it returned cannot be shown ({error}); see what its docstring asks")
+        return 1
     return 0
 
 

@@ -10,6 +10,13 @@ A test is a function test_…, as pytest takes it. It gets, if it asks for them:
 
     model    the arm on a floor, with a box (sm.load("so101/scene_box"))
     data     a new Data of it: zero pose, nothing derived yet
+    backend  the name of the engine that it runs on
+
+Beside what step_loop.py names you may need: data.xpos and data.xquat[model.body_id("box")] (where
+a body's frame is, and how it is turned: w x y z), model.body_names, model.gravity, and
+`statemachine conventions velocity`, which says what the six velocities of a free body mean on an
+engine itself (this interface has MuJoCo's everywhere). The arm's file is
+models/so101/so101.xml: where each body sits on the one before it.
 
     pytest -p statemachine.grading.mutants.plugin exercises/test_arm.py
 

@@ -39,7 +39,12 @@ class _Parser(argparse.ArgumentParser):
             message = f"{wrong}no {given!r}; known: {', '.join(known)}{hint}"
         if "expected one argument" in message:
             flag = message.split(":")[0].removeprefix("argument ").split("/")[0]
-            message += f" (one that begins with a minus: {flag}={_after(flag)})"
+            if typed := _after(flag):
+                message += f" (one that begins with a minus: {flag}={typed})"
+        if message.startswith("unrecognized arguments: -"):
+            given = message.split()[2].partition("=")[0]
+            close = difflib.get_close_matches(given, _flags(self), n=1, cutoff=0.6)
+            message += f". Did you mean {close[0]}?" if close else ""
         print(f"{self.prog}: {message}", file=sys.stderr)
         raise SystemExit(BAD_INPUT)
 
@@ -47,7 +52,18 @@ class _Parser(argparse.ArgumentParser):
 def _after(flag: str) -> str:
     """What was typed after a flag, to show it as it would be taken."""
     typed = sys.argv[sys.argv.index(flag) + 1 :] if flag in sys.argv else []
-    return typed[0] if typed else "-1"
+    return typed[0] if typed else ""
+
+
+def _flags(parser: argparse.ArgumentParser) -> set[str]:
+    """All options of a parser and of those below it."""
+    found: set[str] = set()
+    for action in parser._actions:
+        found.update(action.option_strings)
+        if isinstance(action, argparse._SubParsersAction):
+            for below in action.choices.values():
+                found |= _flags(below)
+    return found
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -60,7 +76,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="replace")
     warnings.showwarning = _show_warning
     parser = _parser()
-    options = parser.parse_args(arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    for k, word in enumerate(words[1:], start=1):
+        if words[k - 1] == "lesson":  # a station may be called by its number
+            words[k] = lesson.by_number(word)
+    options = parser.parse_args(words)
     if getattr(options, "run", None) is None:
         options.run = lesson.overview
     try:

@@ -31,6 +31,9 @@ class Printed:
     by_engine: Mapping[str, str]
 
 
+LETTERS = "abcdefgh"  # of the choices of a question
+
+
 @dataclass(frozen=True)
 class Question:
     """A prediction to make before one reads on.

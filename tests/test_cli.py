@@ -164,7 +164,7 @@ def test_lessons_on_the_public_scenes(cli: Cli, menagerie: Path) -> None:
     page = cli("lesson", "gravity", "--menagerie", str(menagerie)).stdout
     assert "robotstudio_so101/scene.xml" in page
     assert re.search(r"0\.033°\s+23\.92°", page)
-    inside = cli("lesson", "state", MENAGERIE=str(menagerie / "robotstudio_so101"))
+    inside = cli("lesson", "reset", MENAGERIE=str(menagerie / "robotstudio_so101"))
     assert "'pickup'" in inside.stdout
     for lesson in LESSONS:
         done = cli("lesson", lesson, "--menagerie", str(menagerie), *QUICK.get(lesson, ()))

@@ -168,7 +168,7 @@ def test_a_station_in_a_notebook(backend: str) -> None:
     text = shown._repr_markdown_()
     assert backend in text
     assert "import statemachine" not in text
-    assert "The run says: 0.8." in text
+    assert "The run says: a) 0.8." in text
     assert "notebook" in repr(shown)
     with pytest.raises(KeyError, match="Did you mean 'gravity'"):
         station("gravty")
@@ -178,7 +178,7 @@ def test_a_station_in_a_notebook(backend: str) -> None:
 
 def test_a_question_that_went_wrong_in_a_notebook() -> None:
     page = Page("t", "o", [Text("first"), Question("q", ("a", "b"), None, "because")])
-    assert "None of them. because" in Shown(page)._repr_markdown_()
+    assert "none of them. because" in Shown(page)._repr_markdown_()
 
 
 def test_documentation_on_an_engine_that_is_missing(tmp_path: Path) -> None:

@@ -31,6 +31,7 @@ def add(commands: Any) -> None:
     path.add_argument(
         "--from",
         dest="start",
+        type=by_number,
         choices=[lesson.name for lesson in STATIONS],
         default=STATIONS[0].name,
         metavar="STATION",
@@ -40,6 +41,12 @@ def add(commands: Any) -> None:
     named = path.add_subparsers(metavar="name")
     for lesson in LESSONS.values():
         _add_lesson(named, lesson)
+
+
+def by_number(word: str) -> str:
+    """The name of a station that was given by its number."""
+    names = [lesson.name for lesson in STATIONS]
+    return names[int(word) - 1] if word.isdecimal() and 0 < int(word) <= len(names) else word
 
 
 def _add_shared(parser: argparse.ArgumentParser, default: Any = None) -> None:
@@ -123,32 +130,43 @@ def run(options: argparse.Namespace) -> int:
     page, results = _compute(options, lesson, options.model, values)
     names = list(LESSONS)
     later = names[names.index(lesson.name) + 1 :]
-    following = f"lesson {later[0]}" if later else "check exercises/step_loop.py"
-    return show(page, results, options.json, f"Next: {PROGRAM} {following}", _asking(options))
+    following = f"{PROGRAM} lesson {later[0]}" if later else "python exercises/step_loop.py"
+    from ..report.quiz import Stopped
+
+    try:
+        return show(page, results, options.json, f"Next: {following}", _asking(options))
+    except Stopped:
+        return 0
 
 
-_AFTER = f"Check yourself: {PROGRAM} lesson questions. Then write your own: exercises/step_loop.py"
+_AFTER = f"Check yourself: {PROGRAM} lesson questions. Then: python exercises/step_loop.py"
 
 
 def run_path(options: argparse.Namespace) -> int:
     """All stations, one after the other."""
     from ..report import terminal
-    from ..report.quiz import go_on
+    from ..report.quiz import Stopped, go_on
 
     ask, code, everything = _asking(options), 0, {}
     first = [lesson.name for lesson in STATIONS].index(options.start)
     for number, lesson in enumerate(STATIONS[first:], start=first + 1):
-        if ask and number > first + 1 and not go_on(f"station {number}: {lesson.question}"):
-            print(f"Go on later with: {PROGRAM} lesson --from {lesson.name}")
-            break
-        values = {option.key: option.default for option in lesson.options}
-        page, results = _compute(options, lesson, lesson.model, values)
-        everything[lesson.name] = results
-        code = code if page.holds else SAYS_NO
-        if not options.json:
-            title = f"{number} of {len(STATIONS)}: {page.title}"
-            last = number == len(STATIONS)
-            terminal.show(replace(page, title=title), _AFTER if last else "", ask)
+        try:
+            if ask and number > first + 1:
+                go_on(f"station {number}: {lesson.question}")
+            values = {option.key: option.default for option in lesson.options}
+            page, results = _compute(options, lesson, lesson.model, values)
+            everything[lesson.name] = results
+            code = code if page.holds else SAYS_NO
+            if not options.json:
+                title = f"{number} of {len(STATIONS)}: {page.title}"
+                last = number == len(STATIONS)
+                terminal.show(replace(page, title=title), _AFTER if last else "", ask)
+        except (Stopped, KeyboardInterrupt) as stop:
+            if ask:
+                print(f"\nGo on later with: {PROGRAM} lesson --from {lesson.name}")
+            if isinstance(stop, KeyboardInterrupt):
+                raise
+            return code
     if options.json:
         from ..report.as_json import dumps
 

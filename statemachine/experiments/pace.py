@@ -11,6 +11,8 @@ from ..interface import Model
 from ..verbs import make_data, step
 from ._common import Progress, Provenance, provenance, silent, steps_in
 
+_NAP = 0.2  # seconds in which nothing is called
+
 
 @dataclass(frozen=True)
 class Pace:
@@ -25,6 +27,7 @@ class Pace:
         identical: Whether both runs end in the same bits.
         nap: For how long nothing was called [s]; passed: how far `data.time` and the
             state moved in it (0 and False).
+        end: `data.time` at the end of a run [s].
         exact: Whether `data.time` is the running sum of the timestep, bit for bit.
     """
 
@@ -38,6 +41,7 @@ class Pace:
     nap: float
     passed: float
     moved: bool
+    end: float
     exact: bool
     provenance: Provenance
 
@@ -73,7 +77,7 @@ def run(model: Model, seconds: float = 0.5, progress: Progress = silent) -> Pace
         free = time.perf_counter() - began
         before = data.time, data.qpos.tobytes()
         began = time.perf_counter()
-        time.sleep(0.05)
+        time.sleep(_NAP)
         nap = time.perf_counter() - began
         after = data.time, data.qpos.tobytes()
         waited = latest = 0.0
@@ -99,6 +103,7 @@ def run(model: Model, seconds: float = 0.5, progress: Progress = silent) -> Pace
             nap=nap,
             passed=after[0] - before[0],
             moved=after[1] != before[1],
+            end=data.time,
             exact=data.time == added,
             provenance=provenance(model),
         )

@@ -76,6 +76,7 @@ class Replay:
         keyframe: Name of the keyframe; its time was set to zero.
         breaks: Second runs that were made to differ, if this one was not.
         finer: The same with half the timestep; None where the backend cannot set it.
+        state: What a State of this engine holds.
         ways: Ways to go back through this interface, tried.
         own_ways: The engine's own ways, tried on the raw engine where that differs.
     """
@@ -95,6 +96,7 @@ class Replay:
     keyframe: str
     breaks: tuple[Broken, ...]
     finer: Finer | None
+    state: tuple[str, ...]
     ways: tuple[WayBack, ...]
     own_ways: tuple[WayBack, ...]
     provenance: Provenance
@@ -168,6 +170,7 @@ def run(
         keyframe=model.keyframes[0].name,
         breaks=tuple(broken),
         finer=finer,
+        state=_components(model),
         ways=ways_back(model, goal),
         own_ways=own.ways_back(model) if own else (),
         provenance=provenance(model),
@@ -226,14 +229,20 @@ def ways_back(model: Model, ctrl: Array, steps: int = 100) -> tuple[WayBack, ...
         found["a new Data, same keyframe"] = future(other, steps) - whole
         set_state(model, data, state)
         restored = future(data, steps)
-        found["set_state: on as before?"] = restored - rest
+        found["set_state, against going on"] = restored - rest
         set_state(model, other, state)
-        found["set_state, and once more"] = future(other, steps) - restored
+        found["set_state, done twice"] = future(other, steps) - restored
         reset(model, other)
         for name in ("qpos", "qvel", "ctrl"):
             setattr(other, name, state[name])
         found["qpos, qvel, ctrl put back"] = future(other, steps) - rest
     return tuple(WayBack(name, float(np.abs(gap).max())) for name, gap in found.items())
+
+
+def _components(model: Model) -> tuple[str, ...]:
+    """Names of what a State holds."""
+    with make_data(model) as data:
+        return tuple(name for name, size in get_state(model, data).layout if size)
 
 
 def _once(

@@ -12,7 +12,7 @@ from ..page import Table, Text, Traces
 from ._words import millimetres, where
 
 _STEPS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 300, 600, 1000, 2000, 5000, 10_000, 20_000)
-_SHORT = {"extra-step": "one step more", "late-ctrl": "ctrl one step late"}
+_SHORT = {"extra-step": "one step more", "late-ctrl": "late ctrl"}
 BROKEN = {
     "extra-step": "The second run takes one step more before the count begins.",
     "late-ctrl": "The second run writes its command one step later.",

@@ -9,6 +9,14 @@ from typing import Any
 from ..page import Code, Page, Printed, Question, Table, Text
 from .session import Session
 
+WORDS = (
+    "A few words first. A model file says what a robot is made of. A body is a rigid piece of "
+    "it; a joint connects two bodies (a hinge turns, a slide shifts; a free body has a free "
+    "joint, and nothing holds it). A geom is a body's shape, which can touch others. A servo, the "
+    "actuator of this arm, pushes a joint towards the number in ctrl. A site is a named place on a "
+    "body, like the fingertip gripperframe. A keyframe is a state that the model file names."
+)
+
 
 def origin(results: Mapping[str, Any]) -> str:
     """What a page was computed with: model and engine versions."""
@@ -128,6 +136,11 @@ def vector(values: Iterable[float], digits: int = 4) -> str:
 def count(number: int, thing: str) -> str:
     """A number of things: 1 step, 2 steps."""
     return f"{number:,} {thing}" + ("" if number == 1 else "s")
+
+
+def sentence(results: Mapping[str, Any], backend: str, text: str) -> Text:
+    """A paragraph about one engine; alone, it begins with a capital."""
+    return Text(f"{backend}: {text}" if len(results) > 1 else text[0].upper() + text[1:])
 
 
 def where(results: Mapping[str, Any], backend: str) -> str:

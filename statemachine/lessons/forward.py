@@ -17,12 +17,14 @@ from ._words import (
     itself,
     millimetres,
     page_of,
+    sentence,
     typed,
     vector,
     where,
 )
 from .session import Session
 
+_WHEN = ("before it", "after it")
 _MOMENTS = ("xpos", "site_xpos", "contacts", "qacc")  # shown of what a step leaves behind
 
 
@@ -61,13 +63,7 @@ def page(results: Mapping[str, forward.Forward], session: Session) -> Page:
     """The readings, which are equal, what each call changes, and of which moment it is."""
     first = next(iter(results.values()))
     blocks: list[Any] = [
-        Text(
-            "qpos, qvel, ctrl and time are stored. Where the fingertip is, what touches what, "
-            "which forces act: that is derived from them. Nothing derived is computed until you "
-            "ask: a write to qpos marks nothing as out of date, and what you read keeps saying "
-            "what it said before. forward recomputes all of it, and takes no time. step does "
-            "the same, and then integrates: it makes the next qpos and qvel."
-        ),
+        Text("A fresh arm. Where is its fingertip, and who works that out, and when?"),
         *typed(
             session,
             Question(
@@ -76,6 +72,15 @@ def page(results: Mapping[str, forward.Forward], session: Session) -> Page:
                 _CHOICES.get(first.equal),
                 "The write changed qpos at once, and nothing that is derived from it.",
             ),
+        ),
+        Text(
+            "qpos, qvel, ctrl and time are stored. Where the fingertip is (site_xpos), where the "
+            "bodies are (xpos), what touches what, which forces act (qfrc_…): that is derived "
+            "from them, and nothing derived is computed until you ask. So the first reading is "
+            "no place: nothing had been computed, and the memory was still empty. A write to "
+            "qpos marks nothing as out of date; what you read keeps saying what it said before. "
+            "forward recomputes all of it, and takes no time. step does the same, and then "
+            "integrates: it makes the next qpos and qvel."
         ),
     ]
     twins = {index for result in results.values() for pair in result.equal for index in pair}
@@ -109,23 +114,25 @@ def page(results: Mapping[str, forward.Forward], session: Session) -> Page:
         )
         moved = millimetres(result.moved, 1)
         if result.moved:
-            text = f"The second forward moved the fingertip by {moved}"
+            text = f"the second forward moved the fingertip by {moved}"
         else:
             text = (
-                f"The second forward moved the fingertip by {moved}: {result.joint} was there "
+                f"the second forward moved the fingertip by {moved}: {result.joint} was there "
                 "already, or does not carry it"
             )
-        blocks.append(Text(f"{where(results, name)}{text}."))
+        blocks.append(sentence(results, name, f"{text}."))
         unmoved = all(reading.time == result.readings[0].time for reading in result.readings)
         blocks.append(
             Verdict(f"{where(results, name)}data.time is the same in all four readings", unmoved)
         )
         if result.deepest > _INSIDE:
             blocks.append(
-                Text(
-                    f"{where(results, name)}nobody checks whether a robot could be where you write "
-                    f"it: forward finds {count(result.contacts, 'contact')} now, the worst "
-                    f"{millimetres(result.deepest, 1)} inside each other."
+                sentence(
+                    results,
+                    name,
+                    "nobody checks whether a robot could be where you write it: forward finds "
+                    f"{count(result.contacts, 'contact')} now, the worst "
+                    f"{millimetres(result.deepest, 1)} inside each other.",
                 )
             )
     blocks += emulation(results, "zeros when fresh", "stale after a write", "stale after a step")
@@ -219,7 +226,14 @@ def _moments(results: Mapping[str, forward.Forward]) -> list[Any]:
             "the step left is compared with what forward says before and after it, bit by bit."
         ),
         Table(
-            ("after a step", *(f"{name}: of {m}" for name in results for m in ("before", "after"))),
+            (
+                "after a step",
+                *(
+                    f"{where(results, name)}{m}"
+                    for name in results
+                    for m in ("before it", "after it")
+                ),
+            ),
             [
                 (
                     name,
@@ -231,7 +245,7 @@ def _moments(results: Mapping[str, forward.Forward]) -> list[Any]:
                 )
                 for name in _MOMENTS
             ],
-            title=f"In how many of {count(steps, 'step')} it is that of the state before, or after",
+            title=f"In how many of {count(steps, 'step')} it is that of the state before, after",
         ),
         Text("(What did not change in a step, as an empty list of contacts, is of both.)"),
     ]
@@ -242,8 +256,8 @@ def _moments(results: Mapping[str, forward.Forward]) -> list[Any]:
             Verdict(
                 f"{where(results, name)}after each step site_xpos and contacts are those of the "
                 f"state before it: the fingertip is {millimetres(stages.lag[worst])} behind at "
-                f"worst (in the step from {stages.time[worst]:.3f} s). A picture in which step "
-                "delivers the next state's xpos and contacts is wrong: call forward before you "
+                f"worst (in the step from {stages.time[worst]:.3f} s). Drawings in which step "
+                "delivers the next state's xpos and contacts are wrong: call forward before you "
                 "read",
                 all(stages.of_before[each] == steps for each in ("site_xpos", "contacts")),
             )

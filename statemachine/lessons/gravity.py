@@ -144,8 +144,8 @@ def _question(first: gravity.Gravity) -> Question | None:
     return Question(
         f"nobody writes ctrl. Where is {first.joint} after {first.servos_on.time[-1]:g} s "
         "with the servos on?",
-        ("it has fallen", "it has sagged by less than a degree", "at 0, exactly"),
-        0 if droop >= np.radians(1) else 2 if droop == 0 else 1,
+        ("it has fallen", "at 0, exactly", "it has sagged by less than a degree"),
+        0 if droop >= np.radians(1) else 1 if droop == 0 else 2,
         "ctrl is zero, and zero is a target: the servo holds the joint there, with the small "
         "error that it needs to push.",
     )

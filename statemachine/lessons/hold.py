@@ -14,6 +14,7 @@ from ._words import angle_or_length, differences, page_of, position, typed, wher
 from .session import Session
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
+_THERE = np.radians(0.1)  # rad, or m
 _STILL = 1e-6  # rad/s or m/s
 
 
@@ -103,21 +104,21 @@ def page(results: Mapping[str, hold.Hold], session: Session) -> Page:
 
 
 def _question(first: hold.Hold) -> Question:
-    worst = float(first.error[-1])
-    bounds = (1e-6, 0.02, 0.2)
-    right = next((k for k, bound in enumerate(bounds) if worst < bound), len(bounds))
-    unit = "mm" if all(first.slides) else "degree"
+    gaps = np.abs(first.qpos[-1] - first.goal)
+    away, worst = int((gaps > _THERE).sum()), int(np.argmax(gaps))
+    because = f"{away} of {len(gaps)} are farther away; the worst, {first.joints[worst]}, by "
+    because += _at(first, gaps[worst], worst)
+    if first.without_contacts is not None:
+        free = np.abs(first.without_contacts - first.goal)
+        because += f". If nothing could touch, it would be {_at(first, free[worst], worst)}"
+        if free[worst] < gaps[worst] / 2:
+            because += ": what the robot touches pushes too"
     return Question(
-        f"how far from its goal is the worst joint after {first.time[-1]:g} s?",
-        (
-            "it is there",
-            f"about a {unit} or less",
-            "some, visibly",
-            "it fell",
-        ),
-        right,
-        f"It is {_at(first, worst, int(np.argmax(np.abs(first.qpos[-1] - first.goal))))} away: a "
-        "servo pushes only where there is an error, and here something else pushes too.",
+        f"which joints are within {_at(first, _THERE, worst)} of their goals after "
+        f"{first.time[-1]:g} s? Think of what is around the robot, too.",
+        ("all", "some", "none"),
+        0 if away == 0 else 2 if away == len(gaps) else 1,
+        because + ".",
     )
 
 
@@ -163,7 +164,7 @@ def _at(result: hold.Hold, value: float, joint: int) -> str:
 def _end(result: hold.Hold) -> str:
     fastest = int(np.argmax(np.abs(result.speed)))
     speed = position(abs(result.speed[fastest]), result.slides[fastest], 3)
-    text = f"At the end {result.joints[fastest]} is the fastest, at {speed}/s."
+    text = f"At the end {result.joints[fastest]} is the fastest joint; it still moves by {speed}/s."
     if abs(result.speed[fastest]) < _STILL:
         text = "At the end everything stands still."
     if result.first_contact is None:

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..experiments import objects
 from ..page import Page, Question, Table, Text, Verdict
-from ._words import count, differences, duration, page_of, typed, where
+from ._words import WORDS, count, differences, duration, page_of, sentence, typed, where
 from .session import Session
 
 _CHEAP = 5  # times; a Data that is not cheaper than that is no bargain
@@ -28,7 +28,7 @@ one = sm.make_data(model)
 two = sm.make_data(model)
 sm.step(model, one, 100)
 print(model)
-print(one.time, two.time)
+print(round(one.time, 6), round(two.time, 6))
 """
 
 
@@ -37,21 +37,26 @@ def page(results: Mapping[str, objects.Objects], session: Session) -> Page:
     first = next(iter(results.values()))
     stepped = first.provenance.timestep * 100
     blocks: list[Any] = [
+        Text(WORDS),
         Text(
-            "A Model is everything that never changes while a simulation runs: shapes, masses, "
-            "limits, gains, the length of a timestep. A Data is everything that does change: "
-            "positions, velocities, your command, the time, and what follows from them. step "
-            "reads both and overwrites the Data with the next state. That is all; nothing runs "
-            "in the background."
+            "Here a robot's file is loaded once, two of something are made of it, and one of "
+            "them is advanced by 100 steps."
         ),
         *typed(
             session,
             Question(
                 "only `one` was stepped. What is two.time?",
-                (f"{stepped:g} s, like one.time", "0 s", "an error: a Model has one Data"),
-                1 if first.alone else 0,
+                ("0 s", f"{stepped:g} s, like one.time", "an error: a Model has one Data"),
+                0 if first.alone else 1,
                 f"Each of {first.worlds} Data, stepped in turn, ended where it ends alone.",
             ),
+        ),
+        Text(
+            "A Model is everything that never changes while a simulation runs: shapes, masses, "
+            "limits, gains of the servos, the length of a timestep. A Data is everything that "
+            "does change: positions, velocities, your command, the time, and what follows from "
+            "them. step reads both and overwrites the Data with the next state. That is all; "
+            "nothing runs in the background."
         ),
         Table(
             ("", *results),
@@ -68,12 +73,14 @@ def page(results: Mapping[str, objects.Objects], session: Session) -> Page:
         prefix = where(results, name)
         cheap = result.making < result.loading / _CHEAP
         blocks += [
-            Text(
-                f"{prefix}the slow part is done once, and many Data use it. That is how many "
-                "worlds are simulated at the same time."
+            sentence(
+                results,
+                name,
+                "the slow part is done once, and many Data use it. That is how many worlds are "
+                "simulated at the same time."
                 if cheap
-                else f"{prefix}here a Data costs nearly what a load does: the slow part is done "
-                "anew for each."
+                else "here a Data costs nearly what a load does: the slow part is done anew for "
+                "each.",
             ),
             Verdict(
                 f"{prefix}{result.worlds} Data of one Model, each under a command of its own, took "
@@ -86,11 +93,13 @@ def page(results: Mapping[str, objects.Objects], session: Session) -> Page:
                 "bytes as before",
                 result.constant,
             ),
-            Text(
-                f"{prefix}all Data name the Model's own engine object as theirs: one in memory."
+            sentence(
+                results,
+                name,
+                "all Data name the Model's own engine object as theirs: one in memory."
                 if result.shared
-                else f"{prefix}the engine has no such two objects; the split is ours, and each "
-                "Data is a world that was loaded for itself."
+                else "the engine has no such two objects; the split is ours, and each Data is a "
+                "world that was loaded for itself.",
             ),
         ]
     blocks += differences(

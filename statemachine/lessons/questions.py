@@ -48,10 +48,10 @@ def _stale(answers: questions.Answers) -> Question:
         "moved. Why?",
         (
             "data.qpos is a copy; the simulator did not get the number",
-            "site_xpos holds what was computed before; nothing has computed it since",
             "the servos hold the arm where it was",
+            "site_xpos holds what was computed before; nothing has computed it since",
         ),
-        1,
+        2,
         "Call forward to see the consequences of a state, step to let time pass as well.",
     )
 
@@ -97,11 +97,11 @@ def _slots_answer(answers: questions.Answers) -> tuple[str, bool]:
 
 def _truth(answers: questions.Answers) -> Question:
     return Question(
-        "Two runs end in the same bits. What does that not tell you?",
+        "A run is repeated, and ends in the same bits. What can you not conclude from that?",
         (
-            "whether a later change of your controller changes the result",
-            "whether the result is right",
-            "whether both runs had the same commands",
+            "that no clock and no dice had a part in it",
+            "that it is what the world would do",
+            "that a test may compare its end exactly",
         ),
         1,
         "Determinism makes a test of a robot's behaviour possible; it does not make it true.",
@@ -127,11 +127,11 @@ def _held(answers: questions.Answers) -> Question:
         f"A colleague makes a Data, steps it for {end:g} s without writing ctrl, sees the arm stay "
         "up, and says that gravity is off. What is going on?",
         (
-            "gravity has to be switched on first",
             "ctrl is zero, and the servos hold the arm at zero",
+            "gravity has to be switched on first",
             "the arm rests on its joint limits",
         ),
-        1,
+        0,
         "There is no neutral value of ctrl for a position servo.",
     )
 
@@ -159,10 +159,10 @@ def _two(answers: questions.Answers) -> Question:
         "Why two objects, a Model and a Data, and not one?",
         (
             "a Model is for reading files, a Data for writing them",
-            "the costly and constant part is made once, and many Data use it",
             "step would otherwise not know its timestep",
+            "what is constant is compiled once, and many Data use it",
         ),
-        1,
+        2,
         "And the line is clean: the Model knows what the robot is, the Data what it does now.",
     )
 
@@ -180,11 +180,11 @@ def _fast(answers: questions.Answers) -> Question:
     return Question(
         "Your loop brings data.time to 100 s in 5 s by the clock. Is the simulation too fast?",
         (
-            "yes: the physics is wrong at that speed",
             "no: data.time is a number that step adds to; nothing reads a clock",
+            "yes: the physics is wrong at that speed",
             "only if it runs on more than one core",
         ),
-        1,
+        0,
         "Wait in your loop if somebody watches; the physics is the same.",
     )
 

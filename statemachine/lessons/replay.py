@@ -10,7 +10,17 @@ import numpy as np
 from ..experiments import replay
 from ..page import Page, Question, Table, Text, Verdict
 from ._broken import BROKEN, course, growth, in_short, traces
-from ._words import count, degrees, differences, millimetres, page_of, typed, vector, where
+from ._words import (
+    count,
+    degrees,
+    differences,
+    millimetres,
+    page_of,
+    sentence,
+    typed,
+    vector,
+    where,
+)
 from .session import Session
 
 
@@ -86,6 +96,15 @@ def page(results: Mapping[str, replay.Replay], session: Session) -> Page:
         blocks.append(_finding(where(results, name), result))
     if not first.broken_by:
         blocks.append(_ways(results))
+        for name, result in results.items():
+            blocks.append(
+                sentence(
+                    results,
+                    name,
+                    "get_state and set_state carry all that decides the future and that the "
+                    f"engine shows: {', '.join(result.state)}.",
+                )
+            )
         for name, result in results.items():
             blocks += _own_ways(name, result)
         if all(result.identical for result in results.values()):

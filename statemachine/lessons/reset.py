@@ -28,7 +28,7 @@ sm.reset(model, data)
 print(data.time, data.qpos[:3])
 for frame in model.keyframes[:1]:
     sm.reset(model, data, keyframe=frame.name)
-    print(frame.name, data.time, data.qpos[:3].round(3))
+    print(frame.name, data.time, data.qpos[:3].round(3) + 0.0)
 """
 
 
@@ -36,12 +36,13 @@ def page(results: Mapping[str, reset.Reset], session: Session) -> Page:
     """What a reset takes back, and what the keyframes show."""
     first = next(iter(results.values()))
     blocks: list[Any] = [
+        Text("Half a second is simulated, then taken back; then a state is taken from the file."),
+        *typed(session, _question(first)),
         Text(
             "reset puts a Data back to the model's default state: positions, velocities, "
             "command and time. With keyframe=… it goes to a state that the model file names. "
             "Nothing derived is computed by it: that is forward's work."
         ),
-        *typed(session, _question(first)),
     ]
     for name, result in results.items():
         prefix, steps = where(results, name), count(result.steps, "step")
@@ -82,8 +83,8 @@ def _question(first: reset.Reset) -> Question | None:
         return None
     return Question(
         f"what is data.time after the reset to keyframe 0 ({frame.name!r})?",
-        ("0 s: a reset begins anew", f"{frame.time:g} s: what the file says", "0.5 s: as before"),
-        1 if "time" in frame.exact else 0,
+        ("0 s: a reset begins anew", "0.5 s: as before", f"{frame.time:g} s: what the file says"),
+        2 if "time" in frame.exact else 0,
         "Time is a number of the state, and a keyframe has one of its own.",
     )
 
@@ -104,7 +105,8 @@ def _contacts(number: int, first: reset.Scene, scenes: Mapping[str, reset.Scene]
 def _finding(prefix: str, number: int, scene: reset.Scene, file: str) -> Text | Verdict:
     """What a keyframe is, by what touches what, then and in the steps that follow."""
     if scene.body is None:
-        return Text(f"{prefix}there is no free body in this scene.")
+        return Text(f"{prefix}There is no free body in this scene.")
+    the = "the" if prefix else "The"
     after = f"in {count(scene.nstep, 'step')} under the keyframe's own ctrl"
     moved = f"it {'rises' if scene.rise > 0 else 'sinks'} by {millimetres(abs(scene.rise))}"
     steps = f"{scene.robot_steps} of {scene.nstep} steps"
@@ -116,7 +118,7 @@ def _finding(prefix: str, number: int, scene: reset.Scene, file: str) -> Text | 
         )
     if scene.on_robot == 0 and scene.on_world:
         text = (
-            f"{prefix}the {scene.body} is not held: {count(scene.on_world, 'contact')} with what "
+            f"{prefix}{the} {scene.body} is not held: {count(scene.on_world, 'contact')} with what "
             f"does not move, none with the robot; {after} the robot touches it in {steps}, and "
             f"{moved}"
         )
@@ -124,7 +126,7 @@ def _finding(prefix: str, number: int, scene: reset.Scene, file: str) -> Text | 
             text += ". A lesson that calls this a grasp with the box lifted is mistaken"
         return Text(text + ".")
     return Text(
-        f"{prefix}the {scene.body} has {count(scene.on_robot, 'contact')} with the robot and "
+        f"{prefix}{the} {scene.body} has {count(scene.on_robot, 'contact')} with the robot and "
         f"{scene.on_world} with what does not move; {after} the robot touches it in {steps}, "
         f"and {moved}."
     )

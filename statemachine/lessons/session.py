@@ -80,9 +80,12 @@ def take(
 
 def page_of_lesson(lesson: Lesson, taken: Mapping[str, Taken]) -> Page:
     """The page of a lesson that was taken on one backend or several."""
-    session = Session(
-        next(iter(taken.values())).code, {name: each.printed for name, each in taken.items()}
-    )
+    first, *others = taken
+    code = taken[first].code
+    if others:  # each ran with its own name there
+        both = ", then ".join(f'"{name}"' for name in others)
+        code = code.replace(f'backend="{first}")', f'backend="{first}")  # then {both}')
+    session = Session(code, {name: each.printed for name, each in taken.items()})
     return module(lesson.name).page({name: t.result for name, t in taken.items()}, session)
 
 

@@ -82,13 +82,14 @@ def page(results: Mapping[str, speed.Speed], session: Session) -> Page:
 
 
 def _question(first: speed.Speed) -> Question:
-    bounds = (2, 20, 200)
-    factor = first.bulk_factor
+    ratio = first.one_by_one / first.bulk
+    bounds = (1.5, 5)
     return Question(
-        "how many seconds of simulation does one second of this machine buy?",
-        ("about one", "two to twenty", "twenty to two hundred", "more"),
-        next((k for k, bound in enumerate(bounds) if factor < bound), len(bounds)),
-        f"{factor:.0f} in bulk, here and now; another machine has another figure.",
+        "a Python loop with one call a step: how much slower is it than one call for all steps?",
+        ("hardly", "two to five times", "more than that"),
+        next((k for k, bound in enumerate(bounds) if ratio < bound), len(bounds)),
+        f"{ratio:.2f} times as long, here and now; in a step of "
+        f"{first.bulk / first.nstep * 1e6:.0f} µs a call of Python's is little or much.",
     )
 
 

@@ -33,14 +33,17 @@ def page(results: Mapping[str, state.Layout], session: Session) -> Page:
     first = next(iter(results.values()))
     blocks: list[Any] = [
         Text(
-            "All that changes lives in a Data. Where its joints are and how they move are two "
-            "arrays: qpos and qvel. A hinge takes one number in each. A free body takes seven in "
-            "qpos (three of position, four of a quaternion) and six in qvel (three linear, three "
-            "angular): a rotation has three degrees of freedom, and a quaternion one number more "
-            "than that. jnt_qposadr says where in qpos a joint begins, jnt_dofadr "
-            "where in qvel."
+            "Where the joints of a Data are stands in the array qpos, how fast they move in "
+            "qvel. How long are the two? In this model: nq numbers and nv numbers; nu is the "
+            "length of ctrl. jnt_qposadr says where in qpos a joint begins, jnt_dofadr where in "
+            "qvel."
         ),
         *typed(session, _question(first)),
+        Text(
+            "A hinge takes one number in each. A free body takes seven in qpos (three of "
+            "position, four of a quaternion) and six in qvel (three linear, three angular): a "
+            "rotation has three degrees of freedom, and a quaternion one number more than that."
+        ),
         Table(
             ("", "nq", "nv", "nu", "nbody"),
             [
@@ -93,16 +96,6 @@ def page(results: Mapping[str, state.Layout], session: Session) -> Page:
         blocks.append(
             Text("In this model every joint has the same slots in qpos and qvel; in others not.")
         )
-    for names, layout in _alike(results, lambda each: (each.keyframe_time, each.fresh_time)):
-        if layout.keyframe_time is None:
-            continue
-        times = f"{layout.keyframe_time:g} s; on a fresh Data it is {layout.fresh_time:g} s"
-        blocks.append(
-            Text(
-                f"{names}After a reset to keyframe 0 ({layout.keyframe!r}), "
-                f"data.time is {times}. Time is a number of the state like any other."
-            )
-        )
     for name, layout in results.items():
         if layout.terms:
             blocks.append(
@@ -114,7 +107,7 @@ def page(results: Mapping[str, state.Layout], session: Session) -> Page:
                 )
             )
     blocks += differences(results, [("names, sizes and slots", _layouts)])
-    return page_of("The state is two arrays", results, blocks)
+    return page_of("Positions and velocities do not line up", results, blocks)
 
 
 def _alike(
@@ -138,8 +131,8 @@ def _layouts(one: state.Layout, two: state.Layout) -> str:
 def _question(first: state.Layout) -> Question:
     return Question(
         f"qpos has nq = {first.nq} numbers. How many has qvel?",
-        (f"{first.nq}: one velocity for each position", f"{first.nv}", f"{first.nu}, as ctrl has"),
-        {first.nq: 0}.get(first.nv, 1),
+        (f"{first.nq}: one velocity for each position", f"{first.nu}, as ctrl has", f"{first.nv}"),
+        {first.nq: 0}.get(first.nv, 2),
         f"nv = {first.nv}: a free body has seven positions and six velocities."
         if first.nv != first.nq
         else "Here no joint has more positions than velocities; a free body would.",

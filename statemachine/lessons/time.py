@@ -10,6 +10,7 @@ from ..page import Page, Question, Table, Text, Verdict
 from ._words import count, duration, page_of, typed, where
 from .session import Session
 
+_BEFORE = "A simulation, a pause of the program, and the time on the simulator's own clock."
 _BRIEF = 0.5  # simulated seconds; with --realtime as many as were asked for
 
 
@@ -53,11 +54,7 @@ def page(results: Mapping[str, pace.Pace], session: Session) -> Page:
     """Nothing waits unless the loop does, and waiting changes nothing."""
     first = next(iter(results.values()))
     blocks: list[Any] = [
-        Text(
-            "data.time grows because step adds the timestep to it. Nothing in the simulator "
-            "looks at a clock, and nothing waits. If a person is to watch, the loop has to wait "
-            "until the clock has caught up."
-        ),
+        Text(_BEFORE),
         *typed(
             session,
             None
@@ -69,8 +66,21 @@ def page(results: Mapping[str, pace.Pace], session: Session) -> Page:
                 f"While nobody called anything for {first.nap:.2f} s, nothing moved.",
             ),
         ),
+        Text(
+            "data.time grows because step adds the timestep to it. Nothing in the simulator "
+            "looks at a clock, and nothing waits. If a person is to watch, the loop has to wait "
+            "until the clock has caught up."
+        ),
         _table(results),
     ]
+    if first.end != round(first.end, 9):
+        blocks.append(
+            Text(
+                f"After {count(first.nstep, 'step')} data.time is {first.end!r}: a timestep like "
+                f"{first.provenance.timestep:g} has no exact binary form, and the errors add up. "
+                "Count steps; do not compare times."
+            )
+        )
     for name, result in results.items():
         prefix = where(results, name)
         blocks += [

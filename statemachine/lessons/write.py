@@ -7,7 +7,7 @@ from typing import Any
 
 from ..experiments import write
 from ..page import Page, Question, Table, Text, Verdict
-from ._words import count, emulation, page_of, position, typed, where
+from ._words import count, emulation, page_of, position, sentence, typed, where
 from .session import Session
 
 
@@ -35,11 +35,7 @@ def page(results: Mapping[str, write.Write], session: Session) -> Page:
     """The same memory, what it changes, what is refused."""
     first = next(iter(results.values()))
     blocks: list[Any] = [
-        Text(
-            "data.qpos is no copy. A second name for it is the same array, and what you write "
-            "there is what the next call starts from; nothing has to be handed over. (To keep a "
-            "value, copy it: data.qpos.copy().)"
-        ),
+        Text("One number is written, by way of a second name for data.qpos."),
         *typed(
             session,
             Question(
@@ -48,6 +44,11 @@ def page(results: Mapping[str, write.Write], session: Session) -> Page:
                 0 if first.view == first.value else 1,
                 f"The view and data.qpos are one array; the copy still says {first.copy:g}.",
             ),
+        ),
+        Text(
+            "data.qpos is no copy. A second name for it is the same array, and what you write "
+            "there is what the next call starts from; nothing has to be handed over. (To keep a "
+            "value, copy it: data.qpos.copy().)"
         ),
     ]
     for name, result in results.items():
@@ -61,9 +62,11 @@ def page(results: Mapping[str, write.Write], session: Session) -> Page:
         )
         if result.in_engine is None:
             blocks.append(
-                Text(
-                    f"{prefix}the engine keeps its state to itself; the arrays are the "
-                    "interface's, and the next call takes over what they say."
+                sentence(
+                    results,
+                    name,
+                    "the engine keeps its state to itself; the arrays are the interface's, and "
+                    "the next call takes over what they say.",
                 )
             )
         else:
@@ -82,11 +85,12 @@ def page(results: Mapping[str, write.Write], session: Session) -> Page:
             )
         )
         blocks.append(
-            Text(
-                f"{prefix}the next step starts from what you wrote: it leaves {result.joint} at "
-                f"another speed than without the write, by {position(result.felt, result.slide, 1)}"
-                f"/s, and finds {count(result.found, 'contact')} where there would be "
-                f"{result.otherwise}."
+            sentence(
+                results,
+                name,
+                f"the next step starts from what you wrote: it leaves {result.joint} at another "
+                f"speed than without the write, by {position(result.felt, result.slide, 1)}/s, and "
+                f"finds {count(result.found, 'contact')} where there would be {result.otherwise}.",
             )
         )
     blocks += emulation(results, "stale after a write")

@@ -16,7 +16,13 @@ _SHOWN = {"m": (1e3, "mm"), "s": (1e3, "ms"), "rad": (180 / math.pi, "°")}
 
 def page(result: Conventions) -> Page:
     """One table for each question, and why it matters."""
-    blocks: list[Block] = []
+    blocks: list[Block] = [
+        Text(
+            "The engines themselves were asked, on small models of the question's own; not this "
+            "project's backends, which make every engine keep one contract. So what is said here "
+            "may differ from what a lesson shows on the same engine."
+        )
+    ]
     for answered in result.questions:
         blocks += [_table(answered), Text(answered.question.why)]
     return Page("What the engines take for granted", _origin(result.versions), blocks)

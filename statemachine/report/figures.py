@@ -37,10 +37,16 @@ def svg(picture: Picture) -> str:
 
 
 def _traces(axes: Any, picture: Traces) -> None:
-    for k, (name, (x, y)) in enumerate(picture.curves.items()):
-        style = "-" if k < len(_COLOURS) else "--"
+    # "engine: what": one colour for what, one kind of line for an engine.
+    parts = {name: name.rpartition(": ")[::2] for name in picture.curves}
+    engines = list(dict.fromkeys(engine for engine, _ in parts.values()))
+    things = list(dict.fromkeys(thing for _, thing in parts.values()))
+    for name, (x, y) in picture.curves.items():
+        engine, thing = parts[name]
+        style = ("-", "--", ":", "-.")[engines.index(engine) % 4]
+        colour = _COLOURS[things.index(thing) % len(_COLOURS)]
         shown = [(a, b) for a, b in zip(x, y, strict=True) if b > 0 or not picture.log]
-        axes.plot(*zip(*shown, strict=True), style, color=_COLOURS[k % len(_COLOURS)], label=name)
+        axes.plot(*zip(*shown, strict=True), style, color=colour, label=name)
     if picture.log:
         axes.set_yscale("log")
     axes.set_xlabel(picture.across)
@@ -48,7 +54,8 @@ def _traces(axes: Any, picture: Traces) -> None:
     axes.grid(alpha=0.3)
     axes.spines[["top", "right"]].set_visible(False)
     if len(picture.curves) > 1:
-        axes.legend(fontsize="small", frameon=False)
+        beside = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0)}
+        axes.legend(fontsize="small", frameon=False, **beside)
 
 
 def _slots(axes: Any, picture: Slots) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
-from ..page import Block, Code, Page, Picture, Printed, Question, Table, Text, Verdict
+from ..page import LETTERS, Block, Code, Page, Picture, Printed, Question, Table, Text, Verdict
 from .terminal import together
 
 # What Markdown would take for its own; underscores within words it leaves alone.
@@ -20,16 +20,23 @@ def markdown(page: Page, picture: Callable[[Picture], str], level: int = 1) -> s
         picture: Where the file of a picture is, or a data address; "" to leave it out.
         level: Of the page's heading.
     """
-    return "\n\n".join([f"{'#' * level} {_escaped(page.title)}", *body(page, picture)]) + "\n"
+    parts = [f"{'#' * level} {_escaped(page.title)}", *filter(None, body(page, picture))]
+    return "\n\n".join(parts) + "\n"
 
 
 def body(page: Page, picture: Callable[[Picture], str]) -> Iterator[str]:
     """The page under its heading, block by block."""
     yield f"*{_escaped(page.origin)}*"
-    for block in page.blocks:
-        text = block_as_markdown(block, picture)
-        if text:
-            yield text
+    blocks = list(page.blocks)
+    while blocks:
+        block = blocks.pop(0)
+        if not isinstance(block, Question):
+            yield block_as_markdown(block, picture)
+            continue
+        hidden: list[Block] = []  # what would give the answer away
+        while blocks and isinstance(blocks[0], Verdict if block.always else Printed):
+            hidden.append(blocks.pop(0))
+        yield _question(block, [block_as_markdown(each, picture) for each in hidden])
 
 
 def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
@@ -45,7 +52,7 @@ def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
                 for names, text in together(by_engine)
             )
         case Question():
-            return _question(block)
+            return _question(block, [])
         case Table():
             return _table(block)
         case Verdict(text, holds):
@@ -55,13 +62,26 @@ def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
             return f"![{_escaped(block.title)}]({where})" if where else ""
 
 
-def _question(block: Question) -> str:
-    choices = "\n".join(f"- {_escaped(choice)}" for choice in block.choices)
-    right = "None of them" if block.right is None else block.choices[block.right]
+def asked(block: Question) -> str:
+    """A question and its choices, without the answer."""
+    text = "" if block.always else "**Before you read on:** "
+    lines = [f"{text}{_escaped(block.text)}", ""]
+    for letter, choice in zip(LETTERS, block.choices, strict=False):
+        lines.append(f"- {letter}) {_escaped(choice)}")
+    return "\n".join(lines)
+
+
+def answer(block: Question) -> str:
+    """What the run says about it."""
+    right = "none of them" if block.right is None else block.choices[block.right]
+    letter = "" if block.right is None else f"{LETTERS[block.right]}) "
+    return f"{letter}{_escaped(right)}. {_escaped(block.because)}"
+
+
+def _question(block: Question, hidden: list[str]) -> str:
+    inside = "\n\n".join([*hidden, answer(block)])
     return (
-        f"**Before you read on:** {_escaped(block.text)}\n\n{choices}\n\n"
-        f"<details><summary>What the run says</summary>\n\n{_escaped(right)}. "
-        f"{_escaped(block.because)}\n\n</details>"
+        f"{asked(block)}\n\n<details><summary>What the run says</summary>\n\n{inside}\n\n</details>"
     )
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import base64
 import json
-from dataclasses import replace
+from itertools import takewhile
 from typing import Any
 
 from ..backends import load
@@ -18,7 +18,7 @@ from ..lessons import LESSONS, Lesson, module
 from ..lessons.session import page_of_lesson, take
 from ..page import Code, Page, Picture, Printed, Question, Text
 from .figures import svg
-from .markdown import block_as_markdown, body
+from .markdown import answer, asked, block_as_markdown
 
 _START = """\
 from statemachine.report.notebook import station
@@ -30,6 +30,14 @@ _INTRODUCTION = """\
 
 Ten stations. Each has a few sentences, code to run and to change, and a question: **make your
 prediction before you run the cell.** The cell after it measures the same on your engine, now.
+
+It needs the package: `pip install -c constraints.txt -e '.[notebook]'` in the project's folder.
+"""
+_END = """\
+## Your turn
+
+`exercises/step_loop.py` in this project has four functions for you to write, and
+`statemachine check exercises/step_loop.py` says what they do. In a cell: `!statemachine check ...`
 """
 
 
@@ -40,17 +48,14 @@ class Shown:
         self.page = page
 
     def _repr_markdown_(self) -> str:
-        blocks: list[Any] = []
-        for block in self.page.blocks:
+        parts = [f"*{self.page.origin}*"]
+        for block in self.page.blocks[len(_leading(self.page)) :]:  # they stand there already
             if isinstance(block, Question):
-                right = "None of them" if block.right is None else block.choices[block.right]
-                if block.always:
-                    blocks.append(Text(block.text))
-                blocks.append(Text(f"The run says: {right}. {block.because}"))
+                parts += [block.text] if block.always else []
+                parts.append(f"The run says: {answer(block)}")
             elif not isinstance(block, (Code, Printed)):
-                blocks.append(block)
-        # The first text stands in the notebook already.
-        return "\n\n".join(body(replace(self.page, blocks=blocks[1:]), _inline))
+                parts.append(block_as_markdown(block, _inline))
+        return "\n\n".join(filter(None, parts))
 
     def __repr__(self) -> str:
         return f"<Shown {self.page.title!r}: a notebook renders it>"
@@ -90,6 +95,7 @@ def build() -> str:
         if code:
             cells.append(_cell(f"{lesson.name}-code", "code", code))
         cells.append(_cell(f"{lesson.name}-run", "code", f'station("{lesson.name}", BACKEND)'))
+    cells.append(_cell("end", "markdown", _END))
     notebook = {
         "cells": cells,
         "metadata": {
@@ -107,15 +113,18 @@ def _page(lesson: Lesson, backend: str, options: dict[str, Any]) -> Page:
     return page_of_lesson(lesson, {backend: taken})
 
 
+def _leading(page: Page) -> list[Text]:
+    """The paragraphs with which a page begins."""
+    return list(takewhile(lambda block: isinstance(block, Text), page.blocks))  # pyright: ignore
+
+
 def _opening(page: Page) -> str:
-    """The first text and the question, without what answers it."""
-    parts = [block_as_markdown(page.blocks[0], _inline)]
-    for block in page.blocks:
-        if isinstance(block, Question) and not block.always:
-            choices = "\n".join(f"- {choice}" for choice in block.choices)
-            parts.append(f"**Before you run it:** {block.text}\n\n{choices}")
-            break
-    return "\n\n".join(parts)
+    """The first paragraphs and the questions, without what answers them."""
+    blocks = [*_leading(page), *(each for each in page.blocks if isinstance(each, Question))]
+    return "\n\n".join(
+        asked(each) if isinstance(each, Question) else block_as_markdown(each, _inline)
+        for each in blocks
+    )
 
 
 def _inline(picture: Picture) -> str:

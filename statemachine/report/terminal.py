@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from ..page import Block, Code, Page, Printed, Question, Table, Text, Verdict
+from ..page import LETTERS, Block, Code, Page, Printed, Question, Table, Text, Verdict
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -43,18 +43,22 @@ def show(page: Page, footer: str = "", ask: Callable[[Question], int | None] | N
     """
     _write([], heading=page)
     said: tuple[Question, int] | None = None
+    answered: list[bool] = []
     for block in page.blocks:
         if isinstance(block, Question):
             choice = ask(block) if ask else None
             said = None if choice is None else (block, choice)
+            answered += [choice == block.right] if said else []
             if ask is None and block.always:
                 right = "none of the above" if block.right is None else block.choices[block.right]
-                _write([Text(block.text), Text(f"{right[0].upper()}{right[1:]}. {block.because}")])
+                _write([Text(block.text), Text(f"Answer: {right}. {block.because}")])
             continue
         _write([block])
         if said:  # first what the run says, then who was right
             _write([_judged(*said)])
             said = None
+    if len(answered) > 1:
+        _write([Text(f"You had {sum(answered)} of {len(answered)} right.")])
     if footer:
         _write([], footer=footer)
     else:
@@ -65,9 +69,8 @@ def _judged(question: Question, choice: int) -> Verdict:
     """What became of a prediction."""
     if choice == question.right:
         return Verdict(f"as you said. {question.because}", True)
-    letters = "abcdefgh"
-    right = "none of them" if question.right is None else letters[question.right]
-    return Verdict(f"you said {letters[choice]}; it is {right}. {question.because}", False)
+    right = "none of them" if question.right is None else LETTERS[question.right]
+    return Verdict(f"you said {LETTERS[choice]}; it is {right}. {question.because}", False)
 
 
 def _write(blocks: Sequence[Block], heading: Page | None = None, footer: str = "") -> None:

@@ -66,8 +66,9 @@ def kind(value: Any) -> str:
         return f"an array of shape {value.shape}"
     if isinstance(value, (tuple, list, dict, set)):
         return f"a {type(value).__name__} of {len(value)}"
-    text = repr(value)
-    return f"a {type(value).__name__}: {text}" if len(text) < 40 else f"a {type(value).__name__}"
+    text, name = repr(value), type(value).__name__
+    name = f"{'an' if name[0] in 'aeiou' else 'a'} {name}"
+    return f"{name}: {text}" if len(text) < 40 else name
 
 
 def owner(model: Model, place: int) -> str:
