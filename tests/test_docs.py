@@ -82,6 +82,9 @@ class _Links(HTMLParser):
 def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
     source = tmp_path / "docs"
     source.mkdir()
+    picture = Path("models", "so101", "so101.png")
+    (tmp_path / picture.parent).mkdir(parents=True)
+    (tmp_path / picture).write_bytes((ROOT / picture).read_bytes())
     for name in ("conf.py", "index.md", "exercises.md"):
         (source / name).write_text((ROOT / "docs" / name).read_text())
     done = subprocess.run(
