@@ -77,6 +77,16 @@ FACTS = {
         "pybullet": {"as loaded": "held", "motor off": "falls"},
         "pinocchio": {"aba at zero torque": "falls"},
     },
+    "command": {
+        "mujoco": {"ctrl": "stays"},
+        "pybullet": {"TORQUE_CONTROL": "lasts one step", "VELOCITY_CONTROL": "stays"},
+        "pinocchio": {"": NO_ANSWER},
+    },
+    "damping": {
+        "mujoco": {"a body at 1 m/s": "keeps it", "a joint at 200 rad/s": "keeps it"},
+        "pybullet": {"a body at 1 m/s": "loses 7.5 %", "a joint at 200 rad/s": "cut to 100 rad/s"},
+        "pinocchio": {"": NO_ANSWER},
+    },
     "write": {
         "mujoco": {"the tip": "stale", "the contact": "stale"},
         "pybullet": {"the tip": "fresh", "the contact": "stale"},
@@ -315,6 +325,59 @@ def test_an_engine_that_tells_what_it_does_not_do(pb: Any, monkeypatch: pytest.M
     monkeypatch.setattr(pb, "getPhysicsEngineParameters", lambda client: tell(client) | lie)
     assert answers("gravity", "pybullet") == {"": "told 0 0 -9.81, felt 0 0 0"}
     assert answers("timestep", "pybullet")["one step"] == "told 2 ms, moves 4.167 ms"
+
+
+def test_a_command_that_is_forgotten_or_kept(pb: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    mj = require("mujoco")
+    step, control, advance, given = mj.mj_step, pb.setJointMotorControl2, pb.stepSimulation, []
+
+    def forgetful(model: Any, data: Any, *count: int) -> None:
+        step(model, data, *count)
+        data.ctrl[:] = 0
+
+    def remember(*words: Any, **named: Any) -> None:
+        given[:] = [(words, named)]
+        control(*words, **named)
+
+    def repeated(client: int) -> None:
+        advance(client)
+        for words, named in given:
+            control(*words, **named)
+
+    monkeypatch.setattr(mj, "mj_step", forgetful)
+    assert answers("command", "mujoco") == {"ctrl": "lasts one step"}
+    monkeypatch.setattr(pb, "setJointMotorControl2", remember)
+    monkeypatch.setattr(pb, "stepSimulation", repeated)
+    assert answers("command", "pybullet")["TORQUE_CONTROL"] == "stays"
+
+
+def test_a_body_that_is_not_damped_and_one_that_is(
+    pb: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mj = require("mujoco")
+    step, put = mj.mj_step, pb.loadURDF
+
+    def damped(model: Any, data: Any, *count: int) -> None:
+        step(model, data, *count)
+        data.qvel[0] = min(0.9 * data.qvel[0], 50)
+
+    def free(*words: Any, **named: Any) -> int:
+        body = put(*words, **named)
+        client = named["physicsClientId"]
+        for link in range(-1, pb.getNumJoints(body, client)):
+            pb.changeDynamics(
+                body, link, linearDamping=0, maxJointVelocity=1e3, physicsClientId=client
+            )
+        return body
+
+    monkeypatch.setattr(mj, "mj_step", damped)
+    assert answers("damping", "mujoco") == {
+        "a body at 1 m/s": "loses 10.0 %",
+        "a joint at 200 rad/s": "cut to 50 rad/s",
+    }
+    monkeypatch.setattr(pb, "loadURDF", free)
+    assert answers("damping", "pybullet")["a body at 1 m/s"] == "keeps it"
+    assert answers("damping", "pybullet")["a joint at 200 rad/s"] != "cut to 100 rad/s"
 
 
 def test_an_engine_with_a_clock(pb: Any, monkeypatch: pytest.MonkeyPatch) -> None:

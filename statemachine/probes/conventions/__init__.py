@@ -23,6 +23,8 @@ QUESTIONS = (
     "gravity",
     "timestep",
     "actuation",
+    "command",
+    "damping",
     "write",
     "step",
     "joints",
