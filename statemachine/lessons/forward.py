@@ -76,13 +76,19 @@ def page(results: Mapping[str, forward.Forward], session: Session) -> Page:
         Text(
             "qpos, qvel, ctrl and time are stored. Where the fingertip is (site_xpos), where the "
             "bodies are (xpos), what touches what, which forces act (qfrc_…): that is derived "
-            "from them, and nothing derived is computed until you ask. So the first reading is "
-            "no place: nothing had been computed, and the memory was still empty. A write to "
-            "qpos marks nothing as out of date; what you read keeps saying what it said before. "
+            "from them, and nothing derived is computed until you ask. A write to qpos marks "
+            "nothing as out of date; what you read keeps saying what it said before. "
             "forward recomputes all of it, and takes no time. step does the same, and then "
             "integrates: it makes the next qpos and qvel."
         ),
     ]
+    if not any(first.readings[0].fingertip):
+        blocks.append(
+            Text(
+                "So the first reading is no place at all: nothing had been computed yet, and the "
+                "memory was still empty."
+            )
+        )
     twins = {index for result in results.values() for pair in result.equal for index in pair}
     several = len(results) > 1
     headers = [f"{name} [m]" for name in results] if several else ["fingertip [m]"]
@@ -245,7 +251,7 @@ def _moments(results: Mapping[str, forward.Forward]) -> list[Any]:
                 )
                 for name in _MOMENTS
             ],
-            title=f"In how many of {count(steps, 'step')} it is that of the state before, after",
+            title=f"In how many of {count(steps, 'step')} it is that of the state before the step, and of after",
         ),
         Text("(What did not change in a step, as an empty list of contacts, is of both.)"),
     ]
