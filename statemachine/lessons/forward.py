@@ -251,7 +251,7 @@ def _moments(results: Mapping[str, forward.Forward]) -> list[Any]:
                 )
                 for name in _MOMENTS
             ],
-            title=f"In how many of {count(steps, 'step')} it is that of the state before the step, and of after",
+            title=f"Of {count(steps, 'step')}: how often that of the state before it, and after it",
         ),
         Text("(What did not change in a step, as an empty list of contacts, is of both.)"),
     ]
