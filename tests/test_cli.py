@@ -15,7 +15,11 @@ from statemachine.lessons import LESSONS
 
 from .conftest import Cli, need_engine
 
-QUICK = {"speed": ("--steps", "200")}
+QUICK = {
+    "speed": ("--steps", "200"),
+    "gravity": ("--longer", "0"),
+    "replay": ("--steps", "100"),
+}
 
 
 def _json(cli: Cli, *arguments: str) -> Any:
