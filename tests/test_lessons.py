@@ -232,6 +232,27 @@ def test_what_keyframe_0_of_the_public_scene_is(cli: Cli, menagerie: Path) -> No
     assert "is mistaken" in said
 
 
+@pytest.mark.parametrize(
+    "body",
+    ["", "<body><freejoint/><geom size='.1'/></body>", "<body><joint/><geom size='.1'/></body>"],
+)
+def test_a_reset_of_a_model_that_lacks_something(cli: Cli, tmp_path: Path, body: str) -> None:
+    file = tmp_path / "small.xml"
+    file.write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    for lesson in ("reset", "objects", "state", "time"):
+        done = cli("lesson", lesson, "--model", str(file))
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_calls_beside_a_lesson(cli: Cli, backend: str) -> None:
+    done = cli("lesson", "forward", "--backend", backend, "--calls")
+    assert done.returncode == 0, done.stderr
+    words = {"mujoco": "mj_forward", "pybullet": "getLinkStates"}
+    assert words[backend] in done.stdout
+    assert max(map(cell_len, done.stdout.splitlines())) <= 80
+    assert "own words" not in cli("lesson", "questions", "--calls").stdout
+
+
 def test_our_keyframe_holds_the_box(backend: str) -> None:
     held, pickup = _take("reset", backend)[1].result.scenes
     assert held.held

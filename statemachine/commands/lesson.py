@@ -193,8 +193,9 @@ def _compute(
         return page, {name: each.result for name, each in taken.items()}
     from ..report import calls
 
-    recordings = {name: each.calls for name, each in taken.items() if each.calls}
-    page = replace(page, blocks=[*page.blocks, *calls.blocks(recordings)])
+    recordings = {name: t.calls for name, t in taken.items() if t.calls and t.calls.statements}
+    if recordings:
+        page = replace(page, blocks=[*page.blocks, *calls.blocks(recordings)])
     return page, {name: {"result": t.result, "calls": t.calls} for name, t in taken.items()}
 
 

@@ -98,8 +98,11 @@ def run(model: Model, steps: int = 100, progress: Progress = silent) -> Reset:
         step(model, data, steps)
         changed = _inputs(data)
         reset(model, data)
-        restored = tuple(
-            name for name in start if _inputs(data)[name] == start[name] != changed[name]
+        again = _inputs(data)
+        restored = tuple(  # an array without entries could not be changed
+            name
+            for name, bits in start.items()
+            if again[name] == bits and (changed[name] != bits or not bits)
         )
         empty = read_derived(data) == blank and not any(map(any, blank.values()))
         step(model, data, steps)

@@ -47,7 +47,7 @@ def page(results: Mapping[str, hold.Hold], session: Session) -> Page:
     """Error over time, pose at the end, what is in the way."""
     first = next(iter(results.values()))
     end = float(first.time[-1])
-    times = [t for t in _TIMES if t < end] + [end]
+    times = [t for t in _TIMES if t < end - 1e-6] + [end]
     text = (
         "ctrl is how you command this robot: one number for each actuator, in the order of "
         "model.actuator_names."

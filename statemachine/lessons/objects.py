@@ -85,7 +85,7 @@ def page(results: Mapping[str, objects.Objects], session: Session) -> Page:
             Verdict(
                 f"{prefix}{result.worlds} Data of one Model, each under a command of its own, took "
                 f"{count(result.nstep, 'step')} in turn: each ended bit for bit where it ends "
-                f"alone, at {result.different} different ends",
+                f"alone, at {count(result.different, 'different end')}",
                 result.alone,
             ),
             Verdict(

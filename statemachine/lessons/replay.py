@@ -101,8 +101,8 @@ def page(results: Mapping[str, replay.Replay], session: Session) -> Page:
                 sentence(
                     results,
                     name,
-                    "get_state and set_state carry all that decides the future and that the "
-                    f"engine shows: {', '.join(result.state)}.",
+                    "a State, which get_state gives and set_state takes, holds all that decides "
+                    f"the future and that the engine shows: {', '.join(result.state)}.",
                 )
             )
         for name, result in results.items():
