@@ -18,6 +18,7 @@ from nbclient import NotebookClient
 from statemachine.lessons import LESSONS
 from statemachine.page import Page, Pipeline, Printed, Question, Slots, Table, Text, Traces
 from statemachine.report import markdown as md
+from statemachine.report import terminal
 from statemachine.report.figures import svg
 from statemachine.report.notebook import Shown, build, station
 from statemachine.report.site import make_path
@@ -164,6 +165,11 @@ def test_the_notebook_runs_headless(backend: str) -> None:
     assert all("run says" in text for text in shown)
     assert not any("✗" in text for text in shown)
     assert any("data:image/svg+xml;base64," in text for text in shown)
+
+
+def test_what_would_drive_a_terminal_is_shown_as_text(capsys: pytest.CaptureFixture[str]) -> None:
+    terminal.show(Page("t", "o", [Text("a\x1b[2Jb\x07 [red]c[/] [/")]))
+    assert "a?[2Jb? [red]c[/] [/" in capsys.readouterr().out
 
 
 def test_a_station_in_a_notebook(backend: str) -> None:

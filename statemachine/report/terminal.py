@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -28,6 +29,8 @@ _ASCII = str.maketrans(
         "✗": "NO",
     }
 )
+# What would make a terminal do something instead of showing it (a student's text may hold it).
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
 _WIDTH_PIPED = 80
 _WIDTH_MOST = 100
 
@@ -94,6 +97,7 @@ def _print(console: Console, blocks: Sequence[Block], heading: Page | None, foot
     plain = _plain()
 
     def escape(text: str) -> str:
+        text = _CONTROL.sub("?", text)
         return escaped(text.translate(_ASCII) if plain else text)
 
     good, bad = ("yes", "NO ") if plain else ("✓", "✗")
