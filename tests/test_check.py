@@ -241,6 +241,7 @@ def test_bad_input_is_one_line(cli: Cli, tmp_path: Path) -> None:
         ((str(tmp_path),), "is a folder"),
         (("picture.py",), "no Python file"),
         (("notes.txt",), "does not end in .py"),
+        ((str(STUDENT.with_name("test_arm.py")),), "did you mean statemachine check --mutants"),
         ((str(SOLUTION), "--backend", "mujcoo"), "Did you mean 'mujoco'?"),
         ((str(SOLUTION), "--time-limit", "0"), "above 0 s"),
         ((str(SOLUTION), "--time-limit", "nan"), "above 0 s"),

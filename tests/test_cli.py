@@ -249,6 +249,11 @@ def test_alone_it_lists_the_lessons_in_order(cli: Cli) -> None:
     ("arguments", "word"),
     [
         (("lesson", "gravty"), "Did you mean gravity?"),
+        (("lesson", "hold", "--bakend", "pybullet"), "Did you mean --backend?"),
+        (("lesson", "11"), "no '11'"),
+        (("lesson", "--from", "gravty"), "Did you mean gravity?"),
+        (("check",), "expected one of FILE"),
+        (("check", "--mutants"), "expected one argument"),
         (("lessn",), "Did you mean lesson?"),
         (("gravity",), "Did you mean statemachine lesson gravity?"),
         (("lesson", "fingertip"), "Did you mean statemachine fingertip?"),

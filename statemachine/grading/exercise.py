@@ -138,6 +138,11 @@ def _python_file(path: Path) -> Path:
         raise BadInputError(f"{path.name} cannot be read: {error.strerror}") from None
     if len(content) > _LARGEST or b"\0" in content:
         raise BadInputError(f"{path.name} is no Python file, or far too large for one")
+    if re.search(rb"^def test_", content, re.M) and not re.search(rb"demo_\w+", content):
+        raise BadInputError(
+            f"{path.name} holds tests and none of the functions: did you mean "
+            f"statemachine check --mutants {path.name}?"
+        )
     return path
 
 
