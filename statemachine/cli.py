@@ -9,6 +9,7 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, NoReturn
 
 from . import __version__
@@ -92,7 +93,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except StateMachineError as error:
         return complain(error, BAD_INPUT)
     except KeyboardInterrupt:
-        print(file=sys.stderr)
+        with suppress(KeyboardInterrupt):  # a second one
+            print(file=sys.stderr)
         return 130
     except BrokenPipeError:  # the reader of a pipe left (`| head`)
         _let_go_of_output()

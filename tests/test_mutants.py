@@ -245,6 +245,16 @@ def test_a_file_that_is_no_test_file_is_refused(text: str, message: str, write: 
     assert "\n" not in str(caught.value)
 
 
+def test_a_test_that_looks_for_the_fault_finds_none(write: Write) -> None:
+    text = """import os, sys
+def test_a(request):
+    words = [*sys.argv, *os.environ, *request.config.invocation_params.args]
+    assert not any(word in ("--fault", "STATEMACHINE_FAULT", "xyzw", "degrees") for word in words)
+"""
+    found = examine(write(text), only=["xyzw", "degrees"])
+    assert (found.failures, found.caught) == ((), 0)
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
 def test_a_test_starts_no_process(write: Write) -> None:
     text = "import os\ndef test_a(): assert os.fork() >= 0\ndef test_b(): assert False, 'no'\n"

@@ -99,6 +99,9 @@ def run(
         BadInputError: It is neither a hinge nor a slide, or `seconds` is not above 0.
         UnsupportedError: The backend cannot switch the actuators off.
     """
+    for name, time in (("seconds", seconds), ("longer", longer)):
+        if time or name == "seconds":
+            steps_in(model, time)  # says what is wrong with it
     limp = model.replace(actuation=False)
     runs = {"on": (model, seconds), "off": (limp, seconds)}
     if longer:

@@ -7,8 +7,9 @@ import inspect
 import linecache
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from .worlds import World
 
 Function = Callable[..., Any]
 _MODULE = "the_students_file"
+_MOST = 10_000  # values that a generator may give
 _LONGEST = 200  # characters of an error's own text
 
 
@@ -96,7 +98,7 @@ def call(function: Function, world: World) -> tuple[Any, Watch]:
     ]
     try:
         with watching(world.nudge) as watch:
-            result = function(world.model, *given)
+            result = _taken(function(world.model, *given))
     except BaseException as error:
         if isinstance(error, NotImplementedError) and not isinstance(error, UnsupportedError):
             raise FaultError(f"not written yet. {error}".strip(), written=False) from None
@@ -104,6 +106,21 @@ def call(function: Function, world: World) -> tuple[Any, Watch]:
     if result is None:
         raise FaultError("it returns nothing: print shows a result, `return` hands it over")
     return result, watch
+
+
+def _taken(result: Any) -> Any:
+    """What is worked out only when somebody asks is asked for now, while it is watched."""
+    if isinstance(result, Iterator):
+        result = tuple(islice(result, _MOST))
+    if isinstance(result, (tuple, list)):
+        return (
+            type(result)(
+                list(islice(each, _MOST)) if isinstance(each, Iterator) else each for each in result
+            )
+            if type(result) in (tuple, list)
+            else result
+        )
+    return result
 
 
 def said(error: BaseException, file: Path) -> str:

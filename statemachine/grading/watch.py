@@ -56,6 +56,21 @@ class Run:
         )
 
 
+@dataclass(frozen=True)
+class Nudge:
+    """The next double towards something, in one entry of qpos, at the end of a run.
+
+    Attributes:
+        place: The entry.
+        towards: Where to.
+        after: How many steps a run must have.
+    """
+
+    place: int
+    towards: float
+    after: int
+
+
 @dataclass
 class Watch:
     """What was done while a function ran.
@@ -63,11 +78,11 @@ class Watch:
     Attributes:
         runs: In the order in which they began.
         datas: Every Data of the Model, or raw one that was used, in order.
-        nudge: (place in qpos, amount): what every run but the first is pushed by after each
-            call of step, so that an engine that repeats itself to the bit does not.
+        nudge: What every run but the first is pushed by, so that an engine that repeats
+            itself to the bit does not.
     """
 
-    nudge: tuple[int, float] | None = None
+    nudge: Nudge | None = None
     runs: list[Run] = field(default_factory=list)
     datas: list[Any] = field(default_factory=list)
     _current: dict[int, Run] = field(default_factory=dict)
@@ -87,8 +102,9 @@ class Watch:
             run.ctrl_changed = run.nstep
         result = advance()
         run.nstep += nstep
-        if self.nudge and run is not self.runs[0]:
-            data.qpos[self.nudge[0]] += self.nudge[1]
+        if self.nudge and run is not self.runs[0] and run.nstep >= self.nudge.after:
+            place = self.nudge.place
+            data.qpos[place] = np.nextafter(data.qpos[place], self.nudge.towards)
         run.end, run.end_qvel = np.array(data.qpos), np.array(data.qvel)
         run.end_time = float(data.time)
         return result
@@ -106,7 +122,7 @@ _watch: Watch | None = None
 
 
 @contextmanager
-def watching(nudge: tuple[int, float] | None = None) -> Iterator[Watch]:
+def watching(nudge: Nudge | None = None) -> Iterator[Watch]:
     """What happens meanwhile on Models that `watched` gave, and on MuJoCo itself."""
     global _watch  # noqa: PLW0603  (the engine's functions are the process's too)
     _watch = Watch(nudge)

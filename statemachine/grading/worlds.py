@@ -16,13 +16,25 @@ from xml.etree import ElementTree
 from ..backends import load
 from ..interface import Model
 from ..models import resolve
-from .watch import watched
+from .watch import Nudge, watched
 
 ELSEWHERE = "on a scene with a crate before the arm"
 _CRATE = """
 <body name="crate" pos="-0.4 0.3 0.05">
   <freejoint name="crate"/>
   <geom name="crate" type="box" size="0.05 0.05 0.05" mass="0.3" contype="2" conaffinity="1"/>
+</body>
+"""
+_BALL = """
+<body name="globe" pos="-0.4 -0.3 0.3">
+  <joint name="globe" type="ball"/>
+  <geom name="globe" size="0.05" mass="0.2" contype="0" conaffinity="0"/>
+</body>
+"""
+_DRAWER = """
+<body name="drawer" pos="-0.5 0 0.3">
+  <joint name="drawer" type="slide" axis="1 0 0"/>
+  <geom name="drawer" type="box" size="0.05 0.05 0.02" mass="0.2" contype="0" conaffinity="0"/>
 </body>
 """
 _CRATE_QPOS, _CRATE_QVEL = "-0.4 0.3 0.05 1 0 0 0", "0 0 0 0 0 0"
@@ -46,7 +58,7 @@ class World:
     model: Model
     arguments: tuple[Any, ...]
     expected: Any
-    nudge: tuple[int, float] | None = None
+    nudge: Nudge | None = None
 
 
 class Scenes:
@@ -62,7 +74,7 @@ class Scenes:
 
     def crowded(self, name: str) -> Model:
         """The scene with a free body before the arm, another fingertip and another time."""
-        return self._load(name, "crowded", _crowd)
+        return self._load(name, "crowded", lambda root: _crowd(root, self._backend))
 
     def _load(self, name: str, kind: str, edit: Callable[[ElementTree.Element], None]) -> Model:
         root = _merged(resolve(name))
@@ -93,14 +105,19 @@ def _bare(root: ElementTree.Element) -> None:
                 parent.remove(child)
 
 
-def _crowd(root: ElementTree.Element) -> None:
+def _crowd(root: ElementTree.Element, backend: str) -> None:
+    # A ball joint only where the backend takes one; last a slide that nothing drives or limits.
+    last = [(_BALL, " 1 0 0 0", " 0 0 0")] if backend == "mujoco" else []
+    last.append((_DRAWER, " 0", " 0"))
     for body in root.findall("worldbody")[:1]:
         body.insert(0, ElementTree.fromstring(_CRATE))
+    for body in root.findall("worldbody")[-1:]:
+        body.extend(ElementTree.fromstring(text) for text, _, _ in last)
     for site in root.iter("site"):
         if site.get("name") == "gripperframe":
             site.set("pos", _TIP)
     for number, key in enumerate(root.iter("key")):
-        key.set("qpos", f"{_CRATE_QPOS} {key.get('qpos')}")
-        key.set("qvel", f"{_CRATE_QVEL} {key.get('qvel')}")
+        key.set("qpos", f"{_CRATE_QPOS} {key.get('qpos')}" + "".join(q for _, q, _ in last))
+        key.set("qvel", f"{_CRATE_QVEL} {key.get('qvel')}" + "".join(v for _, _, v in last))
         if number == 0:
             key.set("time", _TIME)

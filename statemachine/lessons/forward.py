@@ -258,14 +258,19 @@ def _moments(results: Mapping[str, forward.Forward]) -> list[Any]:
     for name, result in results.items():
         stages = result.stages
         worst = int(np.argmax(stages.lag))
+        if stages.lag[worst] == 0:
+            blocks.append(sentence(results, name, f"{stages.site} did not move in this run."))
+            continue
+        # Contacts of step and forward may be found with another memory of what touched before.
+        left = ["site_xpos"] + ["contacts"] * (stages.of_before["contacts"] == steps)
         blocks.append(
             Verdict(
-                f"{where(results, name)}after each step site_xpos and contacts are those of the "
-                f"state before it: the fingertip is {millimetres(stages.lag[worst])} behind at "
-                f"worst (in the step from {stages.time[worst]:.3f} s). Drawings in which step "
-                "delivers the next state's xpos and contacts are wrong: call forward before you "
-                "read",
-                all(stages.of_before[each] == steps for each in ("site_xpos", "contacts")),
+                f"{where(results, name)}after each step {' and '.join(left)} "
+                f"{'are' if len(left) > 1 else 'is'} of the state before it: the fingertip is "
+                f"{millimetres(stages.lag[worst])} behind at worst (in the step from "
+                f"{stages.time[worst]:.3f} s). Drawings in which step delivers the next state's "
+                "xpos and contacts are wrong: call forward before you read",
+                all(stages.of_before[each] == steps > stages.of_after[each] for each in left),
             )
         )
     blocks.append(

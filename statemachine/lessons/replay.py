@@ -37,7 +37,7 @@ def run(model: Any, options: Mapping[str, Any], progress: Any) -> replay.Replay:
 
 def code(options: Mapping[str, Any], load: str) -> str:
     """Two runs from the keyframe, compared."""
-    write = "data.ctrl[:2] += (0.4, -0.2)  # pan and lift"
+    write = "data.ctrl[:2] += np.array((0.4, -0.2))[: model.nu]  # pan and lift"
     if options["ctrl"]:
         write = f"data.ctrl[:] = {[float(x) for x in options['ctrl']]}"
     steps = options["steps"]

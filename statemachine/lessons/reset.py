@@ -27,7 +27,7 @@ sm.step(model, data, 100)
 sm.reset(model, data)
 print(data.time, data.qpos[:3])
 for frame in model.keyframes[:1]:
-    sm.reset(model, data, keyframe=frame.name)
+    sm.reset(model, data, keyframe=0)
     print(frame.name, data.time, data.qpos[:3].round(3) + 0.0)
 """
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,6 +95,14 @@ def judge(function: Function, world: World) -> list[Remark]:
             remarks.append(Remark(f"{name}: {text}"))
     if not watch.runs:
         remarks.append(Remark(_NO_STEP))
+    elif not remarks and sum(run.nstep >= fall.marks[-1] for run in watch.runs) < 2:
+        steps = ", ".join(str(run.nstep) for run in watch.runs[:4])
+        remarks.append(
+            Remark(
+                f"your runs took {steps} steps; {count - 1} s are {fall.marks[-1]} steps of "
+                f"{world.model.timestep:g} s, with the servos on and again with them off"
+            )
+        )
     if remarks:
         return remarks
     return [
@@ -167,26 +176,32 @@ def _command(watch: Watch) -> list[Remark]:
 
 
 def _settings(model: Model) -> dict[str, list[float]]:
-    """What of the engine's own options a student can reach."""
+    """What of the engine's own model a student can reach: its options, and its arrays' sums."""
     if model.backend != "mujoco":
         return {}
     options = model.raw.opt
     names = ("disableflags", "enableflags", "timestep", "gravity", "integrator")
-    return {name: np.atleast_1d(getattr(options, name)).tolist() for name in names}
+    found = {f"opt.{name}": np.atleast_1d(getattr(options, name)).tolist() for name in names}
+    for name in dir(model.raw):
+        value = None if name.startswith("_") else getattr(model.raw, name)
+        if isinstance(value, np.ndarray):
+            found[name] = [float(zlib.crc32(value.tobytes()))]
+    return found
 
 
 def _left(before: dict[str, list[float]], after: dict[str, list[float]]) -> list[Remark]:
     """Whether the Model was given back as it was."""
     changed = [name for name in before if before[name] != after[name]]
-    if "disableflags" in changed:
+    if "opt.disableflags" in changed:
         return [
             Remark(
                 "the model was given back with its servos off (model.raw.opt.disableflags is "
-                f"{after['disableflags'][0]:.0f}, it was {before['disableflags'][0]:.0f}): switch "
+                f"{after['opt.disableflags'][0]:.0f}, it was "
+                f"{before['opt.disableflags'][0]:.0f}): switch "
                 "the bit back, or use model.replace(actuation=False)"
             )
         ]
     return [
-        Remark(f"the model was given back with another model.raw.opt.{name}: a Model never changes")
+        Remark(f"the model was given back with another model.raw.{name}: a Model never changes")
         for name in changed
     ]

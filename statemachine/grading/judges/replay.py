@@ -11,16 +11,14 @@ from ...interface import Model
 from ...records import Array
 from ...verbs import make_data, reset
 from ..calls import Function, Remark, call
-from ..watch import Run, Watch
+from ..watch import Nudge, Run, Watch
 from ..worlds import ELSEWHERE, Scenes, World
 from ._values import address, kind, listed, near, numbers, parts, same_bits
 
 SCENE = "so101/scene_box"
 _CTRL = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)
 _OTHER = (-0.2, -0.5, 0.4, 1.5, 1.5, 0.28)
-# So little that nearly equal passes for equal; the engine itself repeats every bit.
-_NUDGE = 1e-10  # [rad]
-_UNSTEADY = "with an engine made to end the second run elsewhere"
+_STEPS = 100  # of the runs that are made to end apart
 _COUNT = ("first", "second")
 _START = 1e-9  # a keyframe's quaternion may be normalised
 
@@ -43,12 +41,20 @@ def worlds(scenes: Scenes) -> list[World]:
     return [
         World("", course, (np.array(_CTRL), 600), start),
         World(ELSEWHERE, crowded, (np.array(_OTHER), 150), _start(crowded)),
-        World(
-            _UNSTEADY,
-            course,
-            (np.array(_CTRL), 300),
-            start,
-            nudge=(address(course, "shoulder_pan"), _NUDGE),
+        # One bit, in the middle and upwards, at the end and downwards: nearly equal, equal in
+        # part, equal in sum and not smaller all pass for equal in one of the two.
+        *(
+            World(
+                f"with {what} of the second run one bit off",
+                course,
+                (np.array(_CTRL), _STEPS),
+                start,
+                nudge=Nudge(place, towards, _STEPS),
+            )
+            for what, place, towards in (
+                ("a joint", address(course, "elbow_flex"), np.inf),
+                ("the box", course.nq - 1, -np.inf),
+            )
         ),
     ]
 

@@ -4,7 +4,7 @@ The record goes to a file of its own, one JSON object a line, so that what tests
 part of it, and what was written before a crash is there.
 
 A student's tests get the fixtures `backend`, `model` (the arm, a floor and a box; made once)
-and `data` (a new one for each test). Without `--fault` the arm is healthy:
+and `data` (a new one for each test). Without a fault in the environment the arm is healthy:
 `pytest -p statemachine.grading.mutants.plugin test_arm.py`.
 """
 
@@ -23,7 +23,7 @@ import pytest
 import statemachine as sm
 
 from ..guard import Guard
-from . import BACKENDS, MUTANTS
+from . import BACKENDS, FAULT
 
 if TYPE_CHECKING:
     from statemachine import Data, Model
@@ -36,14 +36,13 @@ _LONGEST = 300  # characters of what an error says
 def pytest_addoption(parser: pytest.Parser) -> None:
     """The options with which `run` starts it."""
     group = parser.getgroup("statemachine")
-    group.addoption("--fault", choices=sorted(MUTANTS), help="what is wrong with the arm")
     group.addoption("--engine", choices=BACKENDS, default=BACKENDS[0], help="backend of `model`")
     group.addoption("--record", metavar="FILE", help="write down there what happens")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Put the fault in; nothing of the student's is imported yet."""
-    if name := config.getoption("fault"):
+    if name := os.environ.pop(FAULT, ""):
         from .faults import FAULTS
 
         FAULTS[name](pytest.MonkeyPatch())  # for the life of the process

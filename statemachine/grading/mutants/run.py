@@ -16,7 +16,7 @@ from ...backends import backend_names
 from ...engines import engine_version, require
 from ...errors import BadInputError, EngineError, MissingEngineError, ModelFileError, unknown_name
 from .. import sandbox
-from . import BACKENDS, MUTANTS, Mutant
+from . import BACKENDS, FAULT, MUTANTS, Mutant
 
 _SECONDS = 60.0  # for the tests on the healthy arm
 # Under a fault they may take longer, and the machine may be busy with others.
@@ -195,9 +195,9 @@ def _run(path: Path, backend: str, fault: str | None, seconds: float) -> _Record
         command = [sys.executable, "-P", "-m", "pytest", "-c", str(settings), "--rootdir", folder]
         command += ["--noconftest", "--tb=no", "-q", "-p", "no:cacheprovider"]
         command += ["-p", f"{__package__}.plugin", "--engine", backend, "--record", str(record)]
-        command += ["--fault", fault] if fault else []
         command += [os.path.join(os.curdir, path.name)]  # brackets in a whole path confuse pytest
-        outcome = sandbox.run(command, seconds=seconds, cwd=path.parent, env=_environment())
+        env = _environment() | ({FAULT: fault} if fault else {})  # where no test looks for it
+        outcome = sandbox.run(command, seconds=seconds, cwd=path.parent, env=env)
         return _read(record, outcome, seconds)
 
 
