@@ -466,19 +466,12 @@ def test_ctrl_c_ends_a_long_run(tmp_path: Path) -> None:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        # Ignored where the tests run in the background of a shell, and that is inherited.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509
     )
-    # One that falls into the import of a C extension may be lost there: press again.
-    for _ in range(3):
-        time.sleep(2.0)
-        run.send_signal(signal.SIGINT)
-        try:
-            _, errors = run.communicate(timeout=10)
-            break
-        except subprocess.TimeoutExpired:
-            continue
-    else:
-        run.kill()
-        pytest.fail("three Ctrl-C did not end it")
+    time.sleep(2.0)
+    run.send_signal(signal.SIGINT)
+    _, errors = run.communicate(timeout=30)
     assert run.returncode == 130
     assert "Traceback" not in errors
 
