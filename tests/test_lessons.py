@@ -398,3 +398,28 @@ def test_answers_that_are_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("builtins.input", lambda _: "q")
     with pytest.raises(quiz.Stopped):
         quiz.ask(question)
+
+
+def test_a_station_that_says_no_is_the_exit_code_of_the_path(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from statemachine.cli import main
+    from statemachine.commands import lesson as command
+
+    ran = []
+
+    def compute(options: Any, lesson: Any, model: str, values: Any) -> tuple[Page, dict[str, Any]]:
+        ran.append(lesson.name)
+        return Page("t", "o", [Verdict("v", lesson.name != "hold")]), {"mujoco": lesson.name}
+
+    monkeypatch.setattr(command, "_compute", compute)
+    assert main(["lesson"]) == 1
+    assert ran == [lesson.name for lesson in STATIONS]
+    ran.clear()
+    assert main(["lesson", "--from", "gravity", "--json"]) == 0
+    assert ran == [lesson.name for lesson in STATIONS[5:]]
+    assert '"gravity": {\n    "mujoco": "gravity"' in capsys.readouterr().out
+
+
+def test_answers_are_told_where_nobody_is_asked(cli: Cli) -> None:
+    assert cli("lesson", "questions").stdout.count("Answer: ") == 6
