@@ -17,7 +17,7 @@ from .. import __version__
 from ..errors import BadInputError, UnsupportedError
 from ..interface import Data, Model
 from ..probes import conventions, probe
-from ..records import DERIVED, Array, Contacts, JointType
+from ..records import DERIVED, INPUTS, Array, Contacts, JointType
 
 Progress = Callable[[float], None]  # told the fraction that is done
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)  # a command to the arm [rad]
@@ -25,6 +25,11 @@ TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)  # a command to the arm [rad]
 
 def silent(_fraction: float) -> None:
     """The Progress that shows nothing."""
+
+
+def part_of(progress: Progress, start: float, share: float) -> Progress:
+    """The Progress of a run that is a share of the whole."""
+    return lambda fraction: progress(start + share * fraction)
 
 
 @dataclass(frozen=True)
@@ -157,6 +162,11 @@ def forces_on(data: Data, dof: int) -> Forces:
     )
 
 
+def read_stored(data: Data) -> dict[str, bytes]:
+    """The bytes of every input, and of the time."""
+    return {name: np.array(getattr(data, name)).tobytes() for name in (*INPUTS, "time")}
+
+
 def read_derived(data: Data) -> dict[str, bytes]:
     """The bytes of every derived array that this engine gives, contacts among them."""
     found = {}
@@ -211,6 +221,11 @@ def touching(model: Model, contacts: Contacts, bodies: frozenset[int]) -> tuple[
             ours, other = pair if inside[0] else pair[::-1]
             seen[f"{label(ours)} on {label(other)}"] = None
     return tuple(seen)
+
+
+def is_slide(model: Model, joint: str) -> bool:
+    """Whether a joint is a slide: its position is in metres."""
+    return int(model.jnt_type[model.joint_id(joint)]) == int(JointType.SLIDE)
 
 
 def scalar_joint(model: Model, name: str) -> tuple[int, int]:

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import UnsupportedError
 from ..interface import Model
 from ..probes import Alone, probe
-from ..records import Array, JointType
+from ..records import Array
 from ..verbs import forward, make_data, step
 from ._common import (
     Forces,
@@ -18,7 +18,9 @@ from ._common import (
     Provenance,
     carried_by,
     forces_on,
+    is_slide,
     milestones,
+    part_of,
     provenance,
     scalar_joint,
     silent,
@@ -110,7 +112,7 @@ def run(
             runs["no floor"] = limp.replace(contacts=False), longer
     total, done, droops = sum(time for _, time in runs.values()), 0.0, {}
     for name, (each, time) in runs.items():
-        part = _part_of(progress, done / total, time / total)
+        part = part_of(progress, done / total, time / total)
         droops[name] = _droop(each, time, joint, part, watch=name in ("on", "off"))
         done += time
     on, off = droops.pop("on"), droops.pop("off")
@@ -118,7 +120,7 @@ def run(
     own = probe(model)
     return Gravity(
         joint=joint,
-        slide=int(model.jnt_type[which]) == int(JointType.SLIDE),
+        slide=is_slide(model, joint),
         servo=bool(np.isfinite(model.actuator_kp[model.actuator_jntid == which]).any()),
         servos_on=on,
         servos_off=off,
@@ -126,11 +128,6 @@ def run(
         alone=own.left_alone(model, seconds, which) if own else (),
         provenance=provenance(model),
     )
-
-
-def _part_of(progress: Progress, start: float, share: float) -> Progress:
-    """The progress of a run that is a share of the whole."""
-    return lambda part: progress(start + share * part)
 
 
 def _droop(model: Model, seconds: float, joint: str, progress: Progress, watch: bool) -> Droop:

@@ -9,13 +9,14 @@ import numpy as np
 
 from ..errors import BadInputError, UnsupportedError
 from ..interface import Model
-from ..records import Array, Ints, JointType
+from ..records import Array, Ints
 from ..verbs import forward, make_data, step
 from ._common import (
     TARGET,
     Progress,
     Provenance,
     command,
+    is_slide,
     moved_by_actuators,
     provenance,
     scalar_joint,
@@ -123,9 +124,7 @@ def run(
             speed=data.qvel[addresses[:, 1]].copy(),
             without_contacts=None if first is None else _freely(model, goal, total, addresses),
             joints=tuple(names),
-            slides=tuple(
-                int(model.jnt_type[model.joint_id(name)]) == int(JointType.SLIDE) for name in names
-            ),
+            slides=tuple(is_slide(model, name) for name in names),
             servo=bool(np.isfinite(model.actuator_kp).all()),
             provenance=provenance(model),
         )

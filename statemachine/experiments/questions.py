@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ..interface import Model
 from . import forward, gravity, objects, pace, replay, state
-from ._common import Progress, Provenance, provenance, silent
+from ._common import Progress, Provenance, part_of, provenance, silent
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,16 +29,13 @@ def run(model: Model, progress: Progress = silent) -> Answers:
         model: The arm in a scene with a free body and a keyframe.
         progress: Told the fraction that is done.
     """
-
-    def part_of(number: int) -> Progress:
-        return lambda part: progress((number + part) / 5)
-
+    parts = [part_of(progress, k / 5, 1 / 5) for k in range(5)]
     return Answers(
-        forward=forward.run(model, seconds=0.1, progress=part_of(0)),
+        forward=forward.run(model, seconds=0.1, progress=parts[0]),
         state=state.run(model),
-        replay=replay.run(model, progress=part_of(1)),
-        gravity=gravity.run(model, seconds=10.0, longer=0.0, progress=part_of(2)),
-        objects=objects.run(model, worlds=3, progress=part_of(3)),
-        pace=pace.run(model, seconds=0.2, progress=part_of(4)),
+        replay=replay.run(model, progress=parts[1]),
+        gravity=gravity.run(model, seconds=10.0, longer=0.0, progress=parts[2]),
+        objects=objects.run(model, worlds=3, progress=parts[3]),
+        pace=pace.run(model, seconds=0.2, progress=parts[4]),
         provenance=provenance(model),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,7 +15,7 @@ from ..interface import Data, Model
 from ..probes import WayBack, probe
 from ..records import Array, Ints, JointType
 from ..verbs import get_state, make_data, reset, set_state, step
-from ._common import Progress, Provenance, body_pairs, command, provenance, silent
+from ._common import Progress, Provenance, body_pairs, command, part_of, provenance, silent
 
 Break = Literal["extra-step", "late-ctrl"]
 BREAKS: tuple[Break, ...] = ("extra-step", "late-ctrl")
@@ -135,17 +135,15 @@ def run(
         goal = command(model, ctrl)
     shares = 2 if break_with else 7  # of the runs below, about
 
-    def part_of(number: int) -> Progress:
-        return lambda part: progress((number + part) / shares)
-
-    first, contacts, pairs = _once(model, goal, nstep, None, part_of(0))
-    second, _, _ = _once(model, goal, nstep, break_with, part_of(1))
+    parts = [part_of(progress, k / shares, 1 / shares) for k in range(shares)]
+    first, contacts, pairs = _once(model, goal, nstep, None, parts[0])
+    second, _, _ = _once(model, goal, nstep, break_with, parts[1])
     broken, finer = [], None
     if not break_with:
         for number, way in enumerate(BREAKS):
-            other, _, _ = _once(model, goal, nstep, way, part_of(2 + number))
+            other, _, _ = _once(model, goal, nstep, way, parts[2 + number])
             broken.append(_broken(way, first, other))
-        finer = _finer(model, goal, nstep, first, part_of)
+        finer = _finer(model, goal, nstep, first, parts)
     free = [
         int(place)
         for kind, place in zip(model.jnt_type, model.jnt_qposadr, strict=True)
@@ -185,14 +183,14 @@ def _broken(way: str, first: Array, other: Array) -> Broken:
 
 
 def _finer(
-    model: Model, goal: Array, nstep: int, first: Array, part_of: Callable[[int], Progress]
+    model: Model, goal: Array, nstep: int, first: Array, parts: list[Progress]
 ) -> Finer | None:
     """Determinism is not truth: half the timestep replays as exactly, and ends elsewhere."""
     try:
         finer = model.replace(timestep=model.timestep / 2)
     except UnsupportedError:
         return None
-    ends = [_once(finer, goal, 2 * nstep, None, part_of(4 + k))[0][-1] for k in range(2)]
+    ends = [_once(finer, goal, 2 * nstep, None, parts[4 + k])[0][-1] for k in range(2)]
     apart = float(np.abs(ends[0] - first[-1]).max())
     return Finer(finer.timestep, bool(np.array_equal(*ends)), apart)
 

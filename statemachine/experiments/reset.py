@@ -18,6 +18,7 @@ from ._common import (
     moved_by_actuators,
     provenance,
     read_derived,
+    read_stored,
     silent,
 )
 
@@ -91,14 +92,14 @@ def run(model: Model, steps: int = 100, progress: Progress = silent) -> Reset:
         progress: Told the fraction that is done.
     """
     with make_data(model) as data, make_data(model) as fresh:
-        start = _inputs(fresh)
+        start = read_stored(fresh)
         blank = read_derived(fresh)
         data.qvel += 0.1
         data.ctrl += 0.1
         step(model, data, steps)
-        changed = _inputs(data)
+        changed = read_stored(data)
         reset(model, data)
-        again = _inputs(data)
+        again = read_stored(data)
         restored = tuple(  # an array without entries could not be changed
             name
             for name, bits in start.items()
@@ -107,7 +108,7 @@ def run(model: Model, steps: int = 100, progress: Progress = silent) -> Reset:
         empty = read_derived(data) == blank and not any(map(any, blank.values()))
         step(model, data, steps)
         step(model, fresh, steps)
-        same = _inputs(data) == _inputs(fresh)
+        same = read_stored(data) == read_stored(fresh)
     scenes = []
     for key in range(len(model.keyframes)):
         scenes.append(_scene(model, key))
@@ -122,10 +123,6 @@ def run(model: Model, steps: int = 100, progress: Progress = silent) -> Reset:
     )
 
 
-def _inputs(data: Data) -> dict[str, bytes]:
-    return {name: np.array(getattr(data, name)).tobytes() for name in (*INPUTS, "time")}
-
-
 def _scene(model: Model, key: int) -> Scene:
     frame = model.keyframes[key]
     free = np.flatnonzero(model.jnt_type == int(JointType.FREE))
@@ -135,7 +132,7 @@ def _scene(model: Model, key: int) -> Scene:
         reset(model, data, keyframe=key)
         wanted = {name: getattr(frame, name).tobytes() for name in INPUTS}
         wanted["time"] = np.array(frame.time).tobytes()
-        now = _inputs(data)
+        now = read_stored(data)
         began = 0.0 if height is None else float(data.qpos[height])
         forward(model, data)
         contacts = body_pairs(model, data.contacts)

@@ -15,6 +15,7 @@ from ._common import (
     Provenance,
     provenance,
     read_derived,
+    read_stored,
     scalar_joint,
     silent,
     steps_in,
@@ -132,8 +133,7 @@ def run(
 
 def _look(data: Data) -> dict[str, bytes]:
     """The bytes of every array of a Data, and of its time."""
-    stored = {name: np.array(getattr(data, name)).tobytes() for name in STORED}
-    return {**stored, **read_derived(data)}
+    return read_stored(data) | read_derived(data)
 
 
 def _changes(name: str, forwarded: _Looks, stepped: _Looks) -> Changes:

@@ -8,9 +8,9 @@ import numpy as np
 
 from ..errors import StateMachineError
 from ..interface import Data, Model
-from ..records import DERIVED, INPUTS, JointType
+from ..records import DERIVED, INPUTS
 from ..verbs import forward, get_state, make_data, reset, set_state, step
-from ._common import Provenance, provenance, read_derived, scalar_joint
+from ._common import Provenance, is_slide, provenance, read_derived, scalar_joint
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def run(model: Model, joint: str = "shoulder_lift", value: float = 0.8) -> Write
         data.qpos = copy
         return Write(
             joint=joint,
-            slide=int(model.jnt_type[model.joint_id(joint)]) == int(JointType.SLIDE),
+            slide=is_slide(model, joint),
             place=place,
             value=value,
             view=said[0],

@@ -112,13 +112,9 @@ def _taken(result: Any) -> Any:
     """What is worked out only when somebody asks is asked for now, while it is watched."""
     if isinstance(result, Iterator):
         result = tuple(islice(result, _MOST))
-    if isinstance(result, (tuple, list)):
-        return (
-            type(result)(
-                list(islice(each, _MOST)) if isinstance(each, Iterator) else each for each in result
-            )
-            if type(result) in (tuple, list)
-            else result
+    if type(result) in (tuple, list):
+        return type(result)(
+            list(islice(each, _MOST)) if isinstance(each, Iterator) else each for each in result
         )
     return result
 

@@ -102,15 +102,15 @@ def judge(function: Function, world: World) -> list[Remark]:
 
 
 def _time_passed(watch: Watch) -> list[Remark]:
-    for run in watch.runs:
-        passed = run.end_time - run.time
-        return [
-            Remark(
-                f"{passed:g} s passed: step was called. forward recomputes what is derived and "
-                "takes no time"
-            )
-        ]
-    return []
+    if not watch.runs:
+        return []
+    passed = watch.runs[0].end_time - watch.runs[0].time
+    return [
+        Remark(
+            f"{passed:g} s passed: step was called. forward recomputes what is derived and "
+            "takes no time"
+        )
+    ]
 
 
 def _is_one_memory(result: Any, given: Array, tips: Tips) -> bool:
