@@ -97,6 +97,20 @@ def require(name: str) -> ModuleType:
     return module
 
 
+def available() -> tuple[list[str], list[MissingEngineError]]:
+    """Names of the engines that load here, and for each other what is wrong with it."""
+    found: list[str] = []
+    missing: list[MissingEngineError] = []
+    for name in ENGINES:
+        try:
+            require(name)
+        except MissingEngineError as error:
+            missing.append(error)
+        else:
+            found.append(name)
+    return found, missing
+
+
 def raise_if_interrupted(error: BaseException) -> None:
     """Raise KeyboardInterrupt if that is what made an import fail.
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..engines import ENGINES, require
-from ..errors import BadInputError, MissingEngineError
+from ..engines import available, require
+from ..errors import BadInputError
 from ._common import MISSING, PROGRAM, add_json, complain, show
 
 
@@ -53,15 +53,7 @@ def _engines(asked: str) -> list[str]:
     if asked != "all":
         require(asked)
         return [asked]
-    found: list[str] = []
-    missing: list[MissingEngineError] = []
-    for name in ENGINES:
-        try:
-            require(name)
-        except MissingEngineError as error:
-            missing.append(error)
-        else:
-            found.append(name)
+    found, missing = available()
     for error in missing if found else missing[:-1]:
         complain(error, MISSING)
     if not found:

@@ -11,6 +11,8 @@ from ._words import count, degrees, duration, millimetres, page_of, where
 from .session import Session
 
 _Results = Mapping[str, questions.Answers]
+# What is asked, what the run says, and whether that bears out the right choice.
+_Answered = tuple[Question, str, bool]
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> questions.Answers:
@@ -25,25 +27,25 @@ def code(options: Mapping[str, Any], load: str) -> str:
 
 def page(results: _Results, session: Session) -> Page:
     """Question, answer, and the figures behind it."""
-    first = next(iter(results.values()))
     blocks: list[Any] = [
         Text("Think first, then read: under each question stands what the run says about it.")
     ]
     for number, ask in enumerate((_stale, _slots, _truth, _held, _two, _fast), start=1):
-        asked, answers = ask(first), []
-        for name, result in results.items():
-            text, holds = _ANSWERS[ask](result)
-            answers.append(Verdict(f"{where(results, name)}{text}", holds))
-        right = asked.right if answers[0].holds else None
+        found = {name: ask(result) for name, result in results.items()}
+        asked, _, holds = next(iter(found.values()))
+        right = asked.right if holds else None
         blocks.append(
             Question(f"{number}. {asked.text}", asked.choices, right, asked.because, always=True)
         )
-        blocks += answers
+        blocks += [
+            Verdict(f"{where(results, name)}{text}", true)
+            for name, (_, text, true) in found.items()
+        ]
     return page_of("Check yourself", results, blocks)
 
 
-def _stale(answers: questions.Answers) -> Question:
-    return Question(
+def _stale(answers: questions.Answers) -> _Answered:
+    asked = Question(
         "You write data.qpos[1] = 0.8 and read the fingertip from data.site_xpos. It has not "
         "moved. Why?",
         (
@@ -54,20 +56,18 @@ def _stale(answers: questions.Answers) -> Question:
         2,
         "Call forward to see the consequences of a state, step to let time pass as well.",
     )
-
-
-def _stale_answer(answers: questions.Answers) -> tuple[str, bool]:
     found = answers.forward
     return (
+        asked,
         "before and after the write site_xpos has the same bits; forward then moves it by "
         f"{millimetres(found.moved, 1)}, and data.time stays at {found.readings[3].time:g} s",
         (1, 2) in found.equal and found.moved > 0,
     )
 
 
-def _slots(answers: questions.Answers) -> Question:
+def _slots(answers: questions.Answers) -> _Answered:
     layout = answers.state
-    return Question(
+    asked = Question(
         f"nq is {layout.nq} and nv is {layout.nv}. What must you not do?",
         (
             "use one index for both qpos and qvel",
@@ -77,9 +77,6 @@ def _slots(answers: questions.Answers) -> Question:
         0,
         "Take qpos addresses from jnt_qposadr and qvel addresses from jnt_dofadr.",
     )
-
-
-def _slots_answer(answers: questions.Answers) -> tuple[str, bool]:
     apart = [
         j
         for j in answers.state.joints
@@ -91,12 +88,16 @@ def _slots_answer(answers: questions.Answers) -> tuple[str, bool]:
         for j in apart
     )
     if not apart:
-        return "every joint of this model has the same slots in both: not a model to ask of", False
-    return f"the slots differ: {names}", True
+        return (
+            asked,
+            "every joint of this model has the same slots in both: not a model to ask of",
+            False,
+        )
+    return asked, f"the slots differ: {names}", True
 
 
-def _truth(answers: questions.Answers) -> Question:
-    return Question(
+def _truth(answers: questions.Answers) -> _Answered:
+    asked = Question(
         "A run is repeated, and ends in the same bits. What can you not conclude from that?",
         (
             "that no clock and no dice had a part in it",
@@ -106,24 +107,22 @@ def _truth(answers: questions.Answers) -> Question:
         1,
         "Determinism makes a test of a robot's behaviour possible; it does not make it true.",
     )
-
-
-def _truth_answer(answers: questions.Answers) -> tuple[str, bool]:
     found = answers.replay
     text = f"after {count(len(found.contacts), 'step')} the largest difference is "
     text += f"{found.difference.max():.1e}"
     if found.finer is None:
-        return text, found.identical
+        return asked, text, found.identical
     return (
+        asked,
         f"{text}; with half the timestep two runs agree bit for bit as well, and end off by "
         f"{found.finer.difference:.1e}. They cannot both be right",
         found.identical and found.finer.identical and found.finer.difference > 0,
     )
 
 
-def _held(answers: questions.Answers) -> Question:
+def _held(answers: questions.Answers) -> _Answered:
     end = answers.gravity.servos_on.time[-1]
-    return Question(
+    asked = Question(
         f"A colleague makes a Data, steps it for {end:g} s without writing ctrl, sees the arm stay "
         "up, and says that gravity is off. What is going on?",
         (
@@ -134,9 +133,6 @@ def _held(answers: questions.Answers) -> Question:
         0,
         "There is no neutral value of ctrl for a position servo.",
     )
-
-
-def _held_answer(answers: questions.Answers) -> tuple[str, bool]:
     found = answers.gravity
     on, off = found.servos_on, found.servos_off
     servo, load = on.forces.actuator or 0.0, on.forces.bias or 0.0
@@ -151,11 +147,11 @@ def _held_answer(answers: questions.Answers) -> tuple[str, bool]:
             "statemachine lesson gravity)"
         )
     held = abs(servo - load) < 1e-3 < abs(load)
-    return text, held and abs(off.position[-1]) > abs(on.position[-1])
+    return asked, text, held and abs(off.position[-1]) > abs(on.position[-1])
 
 
-def _two(answers: questions.Answers) -> Question:
-    return Question(
+def _two(answers: questions.Answers) -> _Answered:
+    asked = Question(
         "Why two objects, a Model and a Data, and not one?",
         (
             "a Model is for reading files, a Data for writing them",
@@ -165,19 +161,17 @@ def _two(answers: questions.Answers) -> Question:
         2,
         "And the line is clean: the Model knows what the robot is, the Data what it does now.",
     )
-
-
-def _two_answer(answers: questions.Answers) -> tuple[str, bool]:
     found = answers.objects
     return (
+        asked,
         f"load takes {duration(found.loading)}, as long as {found.ratio:,.0f} steps; "
         f"{found.worlds} Data of one Model went {found.different} ways, each as if it were alone",
         found.ratio > 1 and found.alone and found.constant,
     )
 
 
-def _fast(answers: questions.Answers) -> Question:
-    return Question(
+def _fast(answers: questions.Answers) -> _Answered:
+    asked = Question(
         "Your loop brings data.time to 100 s in 5 s by the clock. Is the simulation too fast?",
         (
             "no: data.time is a number that step adds to; nothing reads a clock",
@@ -187,22 +181,10 @@ def _fast(answers: questions.Answers) -> Question:
         0,
         "Wait in your loop if somebody watches; the physics is the same.",
     )
-
-
-def _fast_answer(answers: questions.Answers) -> tuple[str, bool]:
     found = answers.pace
     return (
+        asked,
         f"{found.simulated:g} s took {duration(found.free)} without waiting and {found.paced:.3f} "
         "s paced by the clock, and both runs end in the same bits",
         found.identical and found.passed == 0,
     )
-
-
-_ANSWERS = {
-    _stale: _stale_answer,
-    _slots: _slots_answer,
-    _truth: _truth_answer,
-    _held: _held_answer,
-    _two: _two_answer,
-    _fast: _fast_answer,
-}

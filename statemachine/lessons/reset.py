@@ -7,7 +7,7 @@ from typing import Any
 
 from ..experiments import reset
 from ..page import Page, Question, Table, Text, Verdict
-from ._words import count, differences, emulation, millimetres, page_of, typed, where
+from ._words import count, differences, emulation, millimetres, page_of, sentence, typed, where
 from .session import Session
 
 
@@ -60,10 +60,7 @@ def page(results: Mapping[str, reset.Reset], session: Session) -> Page:
     for number, scene in enumerate(first.scenes):
         scenes = {name: result.scenes[number] for name, result in results.items()}
         blocks.append(_contacts(number, scene, scenes))
-        blocks += [
-            _finding(where(results, name), number, each, first.provenance.model_file)
-            for name, each in scenes.items()
-        ]
+        blocks += [_finding(results, name, number, first.provenance.model_file) for name in results]
     blocks += differences(
         results,
         [
@@ -102,33 +99,36 @@ def _contacts(number: int, first: reset.Scene, scenes: Mapping[str, reset.Scene]
     )
 
 
-def _finding(prefix: str, number: int, scene: reset.Scene, file: str) -> Text | Verdict:
+def _finding(
+    results: Mapping[str, reset.Reset], name: str, number: int, file: str
+) -> Text | Verdict:
     """What a keyframe is, by what touches what, then and in the steps that follow."""
+    scene = results[name].scenes[number]
     if scene.body is None:
-        return Text(f"{prefix}There is no free body in this scene.")
-    the = "the" if prefix else "The"
+        return sentence(results, name, "there is no free body in this scene.")
     after = f"in {count(scene.nstep, 'step')} under the keyframe's own ctrl"
     moved = f"it {'rises' if scene.rise > 0 else 'sinks'} by {millimetres(abs(scene.rise))}"
     steps = f"{scene.robot_steps} of {scene.nstep} steps"
     if scene.held:
         return Verdict(
-            f"{prefix}the {scene.body} is held: it touches the robot and nothing else, then and "
-            f"in {steps} under the keyframe's own ctrl; {moved}",
+            f"{where(results, name)}the {scene.body} is held: it touches the robot and nothing "
+            f"else, then and in {steps} under the keyframe's own ctrl; {moved}",
             True,
         )
     if scene.on_robot == 0 and scene.on_world:
         text = (
-            f"{prefix}{the} {scene.body} is not held: {count(scene.on_world, 'contact')} with what "
-            f"does not move, none with the robot; {after} the robot touches it in {steps}, and "
-            f"{moved}"
+            f"the {scene.body} is not held: {count(scene.on_world, 'contact')} with what does not "
+            f"move, none with the robot; {after} the robot touches it in {steps}, and {moved}"
         )
         if number == 0 and file.startswith("robotstudio_so101"):
             text += ". A lesson that calls this a grasp with the box lifted is mistaken"
-        return Text(text + ".")
-    return Text(
-        f"{prefix}{the} {scene.body} has {count(scene.on_robot, 'contact')} with the robot and "
+        return sentence(results, name, f"{text}.")
+    return sentence(
+        results,
+        name,
+        f"the {scene.body} has {count(scene.on_robot, 'contact')} with the robot and "
         f"{scene.on_world} with what does not move; {after} the robot touches it in {steps}, "
-        f"and {moved}."
+        f"and {moved}.",
     )
 
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from pathlib import Path
 
 from ..backends import backend_names, load
-from ..engines import ENGINES, require
+from ..engines import available
 from ..errors import MissingEngineError
 from ..lessons import LESSONS
 from ..lessons.session import page_of_lesson, take
@@ -59,11 +58,7 @@ def make_reference(folder: Path, say: Callable[[str], None] = print) -> list[Pat
         say: Told what is being run.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    installed = []
-    for name in ENGINES:
-        with suppress(MissingEngineError):
-            require(name)
-            installed.append(name)
+    installed, _ = available()
     say("asking the engines ...")
     asked = conventions.page(probe(installed))
     table = phrasebook.run(installed)
