@@ -1,0 +1,214 @@
+"""Two descriptions of a robot, side by side, as a page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+
+from ..compare.models import Agreement, Compared, Difference, Side
+from ..compare.models.ledger import SUBJECTS, Value
+from ..page import Block, Page, Table, Text, Verdict
+
+_ROWS = 8  # of a table, unless all are asked for
+# Units as a reader has them, of differences; a result has SI.
+_APART = {
+    "rad": (180 / math.pi, "°"),
+    "m": (1e3, "mm"),
+    "m³": (1e6, "cm³"),
+    "kg m²": (1e6, "kg mm²"),
+}
+# ... and of the figures themselves.
+_SHOWN = {unit: _APART[unit] for unit in ("m", "m³", "kg m²")}
+_LAST = {
+    "places": "moves the rest by",
+    "armature": "share",
+    "drive": "holds",
+    "effort": "ratio",
+    "damping": "slows in, A / B",
+    "dry friction": "share",
+    "limits": "so",
+    "mass": "share",
+    "centre of mass": "load",
+    "inertia": "share",
+    "settings": "",
+    "structure": "",
+}
+_WHY = {
+    "places": "In the frame of the link that carries the joint. A zero position of x: where A "
+    "reads 0, B reads x.",
+    "tool frame": "In the frame of B's link.",
+    "armature": "M_ii is the inertia that the joint's motor feels, at zero, armature included.",
+    "drive": "sags: by how much the servo gives way to the weight of what the joint carries, its "
+    "axis level. damping ratio: of the joint alone, with M_ii at zero.",
+    "damping": "slows in: the time M_ii / damping in which a joint that nothing drives comes to "
+    "1/e of its speed.",
+    "centre of mass": "load: weight times distance, what the shift adds to the joint at most.",
+    "inertia": "Principal moments of the rigid part, about its centre of mass. M_ii as above: of "
+    "the joint that carries it, at zero, armature included.",
+    "mass": "Of rigid parts: links without a joint between them are weighed together.",
+    "shapes": "In the frame of B's link; sizes are half edges, radius, or radius and half length.",
+}
+
+
+def page(result: Compared, everything: bool = False) -> Page:
+    """What differs, the weightiest first; then what is equal, and how well.
+
+    Args:
+        result: Of `compare`.
+        everything: Whether every figure has a row of its own.
+    """
+    blocks: list[Block] = [_sides(result), _verdict(result)]
+    for subject, group in groupby(result.found.differences, key=lambda each: each.subject):
+        blocks += _subject(subject, list(group), everything)
+    blocks += _equal(result)
+    notes = [
+        *(f"A: {note}" for note in result.one.notes),
+        *(f"B: {note}" for note in result.two.notes),
+        *result.found.notes,
+    ]
+    blocks += [Text(f"{note[0].upper()}{note[1:]}.") for note in notes]
+    origin = ", ".join(f"{name} {version}" for name, version in result.versions.items())
+    return Page(
+        f"Before anything moves: {result.one.file} against {result.two.file}", origin, blocks
+    )
+
+
+def _sides(result: Compared) -> Text:
+    def said(side: Side) -> str:
+        how = (
+            f"loaded into {side.reader}"
+            if side.format == "engine"
+            else f"{side.format}, by {side.reader}"
+        )
+        return (
+            f"{side.file} ({how}; {side.links} links, {side.joints} joints, {side.shapes} shapes)"
+        )
+
+    weigh = [f"{mass:.4g} kg" for mass in result.found.mass]
+    alike = (
+        "Both weigh " + weigh[0] if weigh[0] == weigh[1] else f"They weigh {' and '.join(weigh)}"
+    )
+    return Text(f"A is {said(result.one)}. B is {said(result.two)}. {alike}.")
+
+
+def _verdict(result: Compared) -> Verdict:
+    matter = [each for each in result.found.differences if each.matters]
+    if not matter:
+        return Verdict(f"nothing differs that matters, to {result.digits} digits", True)
+    subjects = dict.fromkeys(SUBJECTS[each.subject].partition(":")[0] for each in matter)
+    count = f"{len(matter)} figures differ" if len(matter) > 1 else "1 figure differs"
+    return Verdict(f"{count}. Most first: {'; '.join(subjects)}", False)
+
+
+def _subject(subject: str, found: list[Difference], everything: bool) -> Iterator[Block]:
+    rows = (
+        [_row(subject, [each]) for each in found] if everything else list(_together(subject, found))
+    )
+    shown = rows if everything else rows[:_ROWS]
+    headers: list[str] = ["", "A", "B", "apart", _LAST.get(subject, "")]
+    keep = [k for k in range(5) if k < 3 or any(row[k] for row in shown)]
+    title = SUBJECTS[subject]
+    if not any(each.matters for each in found):
+        title += " (for the record)"
+    yield Table(
+        [headers[k] for k in keep],
+        [[row[k] for k in keep] for row in shown],
+        title,
+        frozenset(range(len(keep))),
+    )
+    if len(rows) > len(shown):
+        yield Text(f"… and {len(rows) - len(shown)} smaller ones: --all shows them.")
+    if subject == "armature":
+        yield from _faster(found)
+    if subject in _WHY:
+        yield Text(_WHY[subject])
+
+
+def _faster(found: list[Difference]) -> Iterator[Block]:
+    """What the absence of armature does, at its worst."""
+    worst = max(found, key=lambda each: each.share)
+    if 0 < worst.share < 1 and not (worst.one and worst.two):
+        side = "B" if worst.two is None or not worst.two else "A"
+        times = 1 / (1 - worst.share)
+        yield Text(
+            f"The same torque accelerates {worst.where} {times:.3g} times as fast in {side}."
+        )
+
+
+def _together(subject: str, found: Sequence[Difference]) -> Iterator[list[str]]:
+    """Rows; where three or more places have one figure with the same values, one for all."""
+    groups: dict[tuple[object, ...], list[Difference]] = {}
+    for each in found:
+        groups.setdefault((each.figure, each.one, each.two, each.size, each.unit), []).append(each)
+    for group in groups.values():
+        if len(group) < 3:
+            for each in group:
+                yield _row(subject, [each])
+        else:
+            yield _row(subject, group)
+
+
+def _row(subject: str, group: Sequence[Difference]) -> list[str]:
+    first, last = group[0], group[-1]
+    where = first.where if len(group) == 1 else f"{first.where} … ({len(group)})"
+    effect = first.effect
+    if len(group) > 1 and last.effect != effect:
+        effect = f"{effect} … {last.effect}"
+    label = first.figure if not where else f"{where} {first.figure}".strip()
+    shows = first.size is not None and first.one is not None and first.two is not None
+    turned = first.size is not None and first.one is None and first.two is None
+    # What one of them does not say is no distance.
+    apart = _number(first.size or 0.0, first.unit, _APART) if shows or turned else ""
+    values = ["", ""] if turned else [_value(each, first.unit) for each in (first.one, first.two)]
+    return [label, *values, apart, effect]
+
+
+def _value(value: Value, unit: str) -> str:
+    if value is None:
+        return "not said"
+    if isinstance(value, str):
+        return value
+    if isinstance(value, tuple):
+        factor, shown = _SHOWN.get(unit, (1.0, unit))
+        words = " ".join(_digits(each * factor) for each in value)
+        return f"{words} {shown}".strip()
+    return _number(value, unit, _SHOWN)
+
+
+def _number(value: float, unit: str, units: dict[str, tuple[float, str]]) -> str:
+    factor, shown = units.get(unit, (1.0, unit))
+    gap = "" if shown in ("", "°") else " "
+    return f"{_digits(value * factor)}{gap}{shown}"
+
+
+def _digits(value: float) -> str:
+    return f"{value + 0.0:.4g}"
+
+
+def _equal(result: Compared) -> Iterator[Block]:
+    found = result.found
+    if found.agreements:
+        rows = [_agreement(each) for each in found.agreements]
+        yield Table(
+            ("", "figures", "apart, at most", "to digits"), rows, "What is equal", frozenset({0})
+        )
+    posed = found.posed
+    if posed.joints:
+        yield Text(
+            f"The same positions of {posed.joints} joints put every link within "
+            f"{_tiny(posed.distance * 1e3)} mm and {_tiny(math.degrees(posed.angle))}° of the same "
+            f"pose, at {posed.poses} poses (seed {posed.seed})"
+            + (f"; {posed.link} is the furthest off." if posed.distance > 1e-5 else ".")
+        )
+
+
+def _tiny(value: float) -> str:
+    return f"{value:.2g}"
+
+
+def _agreement(each: Agreement) -> list[str]:
+    factor, unit = _APART.get(each.unit, (1.0, each.unit))
+    name = SUBJECTS[each.subject].partition(":")[0]
+    worst = f"{each.worst * factor:.2g} {unit}".replace(" °", "°").strip() if each.worst else "0"
+    return [name, str(each.count), worst, "all" if each.digits == 17 else str(each.digits)]
