@@ -1,0 +1,1 @@
+"""Where two runs part, by how much, and why."""
