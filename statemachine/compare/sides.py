@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -28,7 +29,7 @@ class Request:
         options: For `Model.replace`, on both sides.
     """
 
-    what: tuple[str, ...]
+    what: Sequence[str]
     backends: tuple[str, str] = ("mujoco", "pybullet")
     defaults: Literal["model", "engine"] = "model"
     model: str | None = None
@@ -86,16 +87,15 @@ def sides_of(
     """
     if isinstance(request, str):
         request = Request((request,))
-    if not request.what or len(request.what) > 2:
+    if not 1 <= len(request.what) <= 2:
         raise BadInputError("compare takes one experiment, or one or two traces")
     if request.is_traces:
         return _of_traces(request, progress)
-    experiment, *more = request.what
-    if more:
+    if len(request.what) == 2:
         raise BadInputError(
             "compare takes one experiment: it runs on both engines; two traces are files"
         )
-    scenario(experiment)
+    scenario(request.what[0])
     for name in request.backends:
         if name not in backend_names():
             raise unknown_name("backend", name, backend_names())
