@@ -53,7 +53,10 @@ _HOMES = {
     "State": "records",
     "Kinematics": "kinematics",
 }
-_MODULES = ("backends", "conformance", "errors", "experiments", "kinematics", "models", "rotations")
+_MODULES = (
+    "backends", "compare", "conformance", "errors", "experiments", "kinematics", "models",
+    "rotations", "traces",
+)  # fmt: skip
 
 __all__ = [
     "Data",

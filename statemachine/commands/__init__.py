@@ -9,4 +9,4 @@ from __future__ import annotations
 from . import check, compare, conventions, doctor, fingertip, lesson
 
 # In the order in which --help shows them.
-COMMANDS = (lesson, check, compare, conventions, fingertip, doctor)
+COMMANDS = (lesson, check, conventions, fingertip, compare, doctor)

@@ -9,16 +9,14 @@ from ._common import show
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of this half of the command; --json, --seed and --menagerie are shared."""
+    """Those of this half of the command; --backends, --seed, --menagerie, --json are shared."""
     group = parser.add_argument_group("comparing descriptions of a robot")
     group.add_argument(
         "--models",
         nargs="+",
         metavar="NAME|FILE",
-        help="two models, URDF or MJCF; FILE@ENGINE is what an engine makes of one",
-    )
-    group.add_argument(
-        "--backends", nargs=2, metavar="ENGINE", help="what two engines make of --models"
+        help="two models, URDF or MJCF, before anything moves; FILE@ENGINE, or --backends and one "
+        "model: what an engine makes of it",
     )
     group.add_argument(
         "--frame", action="append", default=[], metavar="A=B", help="a frame of A that is B's"
@@ -40,6 +38,8 @@ def run(options: argparse.Namespace) -> int:
     from ..report.progress import progress
 
     given = [split(text) for text in options.models]
+    if options.what:
+        raise BadInputError(f"--models compares descriptions, and {options.what[0]} is a run of one")
     if options.backends:
         if any(engine for _, engine in given):
             raise BadInputError("--backends and FILE@ENGINE say the same: give one of them")
@@ -55,9 +55,8 @@ def run(options: argparse.Namespace) -> int:
         raise BadInputError(f"--models wants {hint}; got {len(options.models)}")
     if not 1 <= options.digits <= 17:
         raise BadInputError(f"--digits wants a number from 1 to 17; got {options.digits}")
-    seed = getattr(options, "seed", 0) or 0
-    if seed < 0:
-        raise BadInputError(f"--seed must not be negative; got {seed}")
+    if options.seed < 0:
+        raise BadInputError(f"--seed must not be negative; got {options.seed}")
     with progress("compare"):
         result = compare(
             given[0][0],
@@ -66,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
             frames=_pairs(options.frame, "--frame"),
             rename=_pairs(options.rename, "--rename"),
             digits=options.digits,
-            seed=seed,
+            seed=options.seed,
             menagerie=options.menagerie,
         )
     return show(model_diff.page(result, options.all), result, options.json)
