@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
 
     given = [split(text) for text in options.models]
     if options.what:
-        raise BadInputError(f"--models compares descriptions, and {options.what[0]} is a run of one")
+        raise BadInputError(f"--models compares descriptions; {options.what[0]} is a run")
     if options.backends:
         if any(engine for _, engine in given):
             raise BadInputError("--backends and FILE@ENGINE say the same: give one of them")

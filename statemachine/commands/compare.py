@@ -71,16 +71,17 @@ def add_run(parser: argparse.ArgumentParser) -> None:
     add_menagerie(parser)
     parser.add_argument("--seconds", type=float, default=None, metavar="S", help="simulated time")
     parser.add_argument("--timestep", type=float, default=None, metavar="S", help="on both sides")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of what is drawn (default 0)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of what is drawn (0)")
 
 
 def request_of(options: argparse.Namespace) -> Any:
     """What was asked for, as a Request."""
     from ..compare import Request
 
+    one, two = options.backends or ("mujoco", "pybullet")
     return Request(
         what=tuple(options.what),
-        backends=tuple(options.backends or ("mujoco", "pybullet")),
+        backends=(one, two),
         defaults=options.defaults,
         model=options.model,
         menagerie=options.menagerie if options.model else None,

@@ -12,14 +12,15 @@ from ..page import Block, Page, Table, Text, Verdict
 
 _ROWS = 8  # of a table, unless all are asked for
 # Units as a reader has them, of differences; a result has SI.
+_MOMENT = "of a part"  # kg m², which are of another size than those of a joint
 _APART = {
     "rad": (180 / math.pi, "°"),
     "m": (1e3, "mm"),
     "m³": (1e6, "cm³"),
-    "kg m²": (1e6, "kg mm²"),
+    _MOMENT: (1e6, "kg mm²"),
 }
 # ... and of the figures themselves.
-_SHOWN = {unit: _APART[unit] for unit in ("m", "m³", "kg m²")}
+_SHOWN = {unit: _APART[unit] for unit in ("m", "m³", _MOMENT)}
 _LAST = {
     "places": "moves the rest by",
     "armature": "share",
@@ -69,9 +70,11 @@ def page(result: Compared, everything: bool = False) -> Page:
     ]
     blocks += [Text(f"{note[0].upper()}{note[1:]}.") for note in notes]
     origin = ", ".join(f"{name} {version}" for name, version in result.versions.items())
-    return Page(
-        f"Before anything moves: {result.one.file} against {result.two.file}", origin, blocks
-    )
+    names = [
+        f"{side.file} on {side.reader.split()[0]}" if side.format == "engine" else side.file
+        for side in (result.one, result.two)
+    ]
+    return Page(f"Before anything moves: {names[0]} against {names[1]}", origin, blocks)
 
 
 def _sides(result: Compared) -> Text:
@@ -96,9 +99,9 @@ def _verdict(result: Compared) -> Verdict:
     matter = [each for each in result.found.differences if each.matters]
     if not matter:
         return Verdict(f"nothing differs that matters, to {result.digits} digits", True)
-    subjects = dict.fromkeys(SUBJECTS[each.subject].partition(":")[0] for each in matter)
+    subjects = ", ".join(dict.fromkeys(each.subject for each in matter))
     count = f"{len(matter)} figures differ" if len(matter) > 1 else "1 figure differs"
-    return Verdict(f"{count}. Most first: {'; '.join(subjects)}", False)
+    return Verdict(f"{count}, the weightiest first: {subjects}", False)
 
 
 def _subject(subject: str, found: list[Difference], everything: bool) -> Iterator[Block]:
@@ -118,7 +121,7 @@ def _subject(subject: str, found: list[Difference], everything: bool) -> Iterato
         frozenset(range(len(keep))),
     )
     if len(rows) > len(shown):
-        yield Text(f"… and {len(rows) - len(shown)} smaller ones: --all shows them.")
+        yield Text(f"… and {len(rows) - len(shown)} more, no weightier: --all shows every one.")
     if subject == "armature":
         yield from _faster(found)
     if subject in _WHY:
@@ -151,16 +154,17 @@ def _together(subject: str, found: Sequence[Difference]) -> Iterator[list[str]]:
 
 def _row(subject: str, group: Sequence[Difference]) -> list[str]:
     first, last = group[0], group[-1]
-    where = first.where if len(group) == 1 else f"{first.where} … ({len(group)})"
+    where = first.where if len(group) == 1 else f"{first.where} + {len(group) - 1} more:"
+    unit = _MOMENT if subject == "inertia" and first.unit == "kg m²" else first.unit
     effect = first.effect
     if len(group) > 1 and last.effect != effect:
         effect = f"{effect} … {last.effect}"
-    label = first.figure if not where else f"{where} {first.figure}".strip()
+    label = f"{where} {first.figure}".strip().removesuffix(":")
     shows = first.size is not None and first.one is not None and first.two is not None
     turned = first.size is not None and first.one is None and first.two is None
     # What one of them does not say is no distance.
-    apart = _number(first.size or 0.0, first.unit, _APART) if shows or turned else ""
-    values = ["", ""] if turned else [_value(each, first.unit) for each in (first.one, first.two)]
+    apart = _number(first.size or 0.0, unit, _APART) if shows or turned else ""
+    values = ["", ""] if turned else [_value(each, unit) for each in (first.one, first.two)]
     return [label, *values, apart, effect]
 
 
@@ -208,7 +212,8 @@ def _tiny(value: float) -> str:
 
 
 def _agreement(each: Agreement) -> list[str]:
-    factor, unit = _APART.get(each.unit, (1.0, each.unit))
+    of = _MOMENT if each.subject == "inertia" else each.unit
+    factor, unit = _APART.get(of, (1.0, of))
     name = SUBJECTS[each.subject].partition(":")[0]
     worst = f"{each.worst * factor:.2g} {unit}".replace(" °", "°").strip() if each.worst else "0"
     return [name, str(each.count), worst, "all" if each.digits == 17 else str(each.digits)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from .description import Actuator, Joint, Robot
-from .ledger import Ledger, Value
+from .ledger import Ledger
 from .match import Pair
 from .tree import Tree
 
@@ -65,7 +65,7 @@ def _armature(book: Ledger, a: Joint, b: Joint, unit: str, whole: list[float]) -
     apart = abs((a.armature or 0.0) - (b.armature or 0.0))
     most = max(whole)
     share = apart / most if most > 0 else 1.0
-    effect = f"{share:.{0 if share > 0.1 else 2}%} of M_ii" if most > 0 else ""
+    effect = f"{share:.1%} of M_ii" if most > 0 else ""
     if not _unsaid(book, "armature", a.name, "", a.armature, b.armature, unit, share, effect):
         size = book.same("armature", a.name, a.armature or 0.0, b.armature or 0.0, unit)
         if size is not None:
@@ -93,7 +93,7 @@ def _friction(book: Ledger, a: Joint, b: Joint, unit: str, effort: float | None)
     values = a.friction or 0.0, b.friction or 0.0
     apart = abs(values[0] - values[1])
     share = apart / effort if effort else 1.0
-    effect = f"{share:.2g} of the effort" if effort else ""
+    effect = f"{share:.2%} of the effort" if effort else ""
     if not _unsaid(book, "dry friction", a.name, "", a.friction, b.friction, unit, share, effect):
         size = book.same("dry friction", a.name, *values, unit)
         if size is not None:
@@ -200,15 +200,11 @@ def _drives(
         return
     if not ours or not theirs:
         (drive, *_), there = (theirs, 1) if theirs else (ours or [], 0)
-        sides: list[Value] = [
-            None if ours is None else "nothing",
-            None if theirs is None else "nothing",
-        ]
-        sides[there] = drive.kind
         gains: list[tuple[str, float | None]] = [("kp", drive.kp), ("kv", drive.kv)]
+        lacking = None if (theirs if there == 0 else ours) is None else "nothing"
+        x, y = (drive.kind, lacking) if there == 0 else (lacking, drive.kind)
         silent = "B" if there == 0 else "A"
-        effect = f"{silent} names none"
-        book.differ("drive", a.name, "drive", *sides, "", None, 1.0, effect)
+        book.differ("drive", a.name, "drive", x, y, "", None, 1.0, f"{silent} names none")
         for name, value in gains:
             if value:
                 pair = (value, None) if there == 0 else (None, value)

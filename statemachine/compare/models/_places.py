@@ -8,6 +8,7 @@ import numpy as np
 
 from ...records import Array
 from ...rotations import angle_between
+from .description import Joint
 from .ledger import Ledger
 from .match import Pair
 from .tree import Tree
@@ -46,14 +47,20 @@ def compare(book: Ledger, pair: Pair, above: Pair, tree: Tree, reach: float) -> 
     distance = float(np.linalg.norm(shift))
     told = [place.pos for place in (above.align @ pair.one.place, pair.two.place)]
     if distance > 2 * book.tolerance * reach:
-        values = (tuple(map(float, each)) for each in told)
-        book.differ("places", where, "origin", *values, "m", distance, share, effect)
+        ours, theirs = (tuple(map(float, each)) for each in told)
+        book.differ("places", where, "origin", ours, theirs, "m", distance, share, effect)
     else:
         book.agree("places", where, distance, distance / reach, "m")
     if angle > 4 * book.tolerance * math.pi:
         book.differ("places", where, "frame turned", None, None, "rad", angle, share, effect)
     else:
         book.agree("places", where, angle, angle / math.pi, "rad")
+    _axes(book, pair, a, b, reach)
+
+
+def _axes(book: Ledger, pair: Pair, a: Joint, b: Joint, reach: float) -> None:
+    """The axis itself, in the frame of the second one's link."""
+    where, anchor, axis = a.name, b.anchor, b.axis
     mine = pair.align.mat @ a.axis
     tilt = math.atan2(float(np.linalg.norm(np.cross(mine, axis))), float(mine @ axis))
     if tilt > 4 * book.tolerance * math.pi:

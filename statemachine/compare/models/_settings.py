@@ -26,8 +26,8 @@ def compare(book: Ledger, one: Tree, two: Tree, notes: list[str]) -> None:
                 book.differ("settings", "", name, *pair, _unit(name), None, share, effect)
         which = one.robot if ours is None else two.robot
         notes.append(
-            f"a {which.format} says nothing of timestep, gravity and solver: the engine that loads it "
-            "decides (--backends shows what it takes)"
+            f"a {which.format} says nothing of timestep, gravity and solver: the engine that loads "
+            "it decides (--backends shows what it takes)"
         )
         return
     for name in ours.keys() & theirs.keys():

@@ -28,15 +28,22 @@ def compare(book: Ledger, pair: Pair, one: Tree, two: Tree, reach: float) -> Non
     theirs = list(pair.two.shapes)
     if not ours and not theirs:
         return
-    counts = [_count(each) for each in (ours, theirs)]
+    counts = _count(ours), _count(theirs)
     if counts[0] != counts[1]:
         book.differ(
-            "shapes", where, "shapes", *counts, "", None, 1.0 if not (ours and theirs) else 0.5
+            "shapes",
+            where,
+            "shapes",
+            counts[0],
+            counts[1],
+            "",
+            None,
+            1.0 if not (ours and theirs) else 0.5,
         )
-    planes = [[s for s in each if s.kind != "plane"] for each in (ours, theirs)]
-    if all(planes):
-        _boxes(book, where, *planes, reach)
-        volumes = [_volume(each) for each in planes]
+    solid = [[s for s in each if s.kind != "plane"] for each in (ours, theirs)]
+    if all(solid):
+        _boxes(book, where, solid[0], solid[1], reach)
+        volumes = [_volume(each) for each in solid]
         if None not in volumes:
             a, b = float(volumes[0] or 0), float(volumes[1] or 0)
             size = book.same("shapes", where, a, b, "m³", slack=16)

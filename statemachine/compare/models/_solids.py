@@ -10,14 +10,16 @@ from ...records import Array
 from .description import Inertial, Placement
 from .ledger import Ledger
 from .match import Pair
-from .tree import Tree
+from .tree import Group, Tree
+
+_STILL = "stands still"
 
 
 def compare(book: Ledger, pair: Pair, one: Tree, two: Tree, reach: float, notes: list[str]) -> None:
     """Mass, centre of mass and inertia, each as the rigid part's composite."""
     mine, theirs = _seen(pair.one.inertial, pair.align), pair.two.inertial
     worlds = (
-        not body.mass and tree.robot.rooted and group.parent < 0
+        not body.mass and _stands(tree, group)
         for body, tree, group in ((mine, one, pair.one), (theirs, two, pair.two))
     )
     if any(worlds):
@@ -39,13 +41,15 @@ def _inertials(
     book: Ledger, pair: Pair, one: Tree, two: Tree, mine: Inertial, theirs: Inertial, reach: float
 ) -> None:
     where = pair.one.name
+    still = _stands(one, pair.one) and _stands(two, pair.two)
     load = max(_most(one.load(pair.one.number)), _most(two.load(pair.two.number)))
     hinge = pair.two.joint is not None and pair.two.joint.kind == "hinge"
     size = book.same("mass", where, mine.mass, theirs.mass, "kg", slack=2)
     if size is not None:
         heavy = max(mine.mass, theirs.mass)
-        text = f"{size / heavy:.3g} of it"
-        book.differ("mass", where, "", mine.mass, theirs.mass, "kg", size, size / heavy, text)
+        text = _STILL if still else f"{size / heavy:.1%} of it"
+        share = 0.0 if still else size / heavy
+        book.differ("mass", where, "", mine.mass, theirs.mass, "kg", size, share, text, not still)
     if not mine.mass and not theirs.mass and not mine.tensor.any() and not theirs.tensor.any():
         return
     apart = float(np.linalg.norm(mine.com - theirs.com))
@@ -53,11 +57,17 @@ def _inertials(
         weight = max(mine.mass, theirs.mass) * 9.81 * apart
         share = weight / max(load, weight) if load and hinge else apart / reach
         values = tuple(map(float, mine.com)), tuple(map(float, theirs.com))
-        effect = f"up to {weight:.2g} N·m of load" if hinge else ""
-        book.differ("centre of mass", where, "", *values, "m", apart, share, effect)
+        effect = f"up to {weight:.2g} N·m" if hinge else _STILL if still else ""
+        share = 0.0 if still else share
+        book.differ("centre of mass", where, "", *values, "m", apart, share, effect, not still)
     else:
         book.agree("centre of mass", where, apart, apart / reach, "m")
-    _tensors(book, pair, one, two, mine, theirs)
+    _tensors(book, pair, one, two, mine, theirs, not still)
+
+
+def _stands(tree: Tree, group: Group) -> bool:
+    """Whether a part is fixed to the world, so that its mass moves nothing."""
+    return tree.robot.rooted and group.parent < 0
 
 
 def _most(value: float) -> float:
@@ -65,7 +75,13 @@ def _most(value: float) -> float:
 
 
 def _tensors(
-    book: Ledger, pair: Pair, one: Tree, two: Tree, mine: Inertial, theirs: Inertial
+    book: Ledger,
+    pair: Pair,
+    one: Tree,
+    two: Tree,
+    mine: Inertial,
+    theirs: Inertial,
+    matters: bool,
 ) -> None:
     """Their share is that of M_ii, about the axis of the joint that carries them."""
     where, apart = pair.one.name, mine.tensor - theirs.tensor
@@ -75,18 +91,18 @@ def _tensors(
     if not most or size <= 8 * book.tolerance * most:
         book.agree("inertia", where, size, size / most if most else 0.0, "kg m²")
         return
-    effect, share = "", size / most
+    effect, share = ("", size / most) if matters else (_STILL, 0.0)
     joint = pair.two.joint
     if joint is not None and joint.kind == "hinge":
         whole = max(one.inertia(pair.one.number), two.inertia(pair.two.number))
         if whole > 0:
             share = abs(float(joint.axis @ apart @ joint.axis)) / whole
             effect = f"{share:.2%} of M_ii"
-    values = [tuple(map(float, each)) for each in moments]
-    book.differ("inertia", where, "moments", *values, "kg m²", size, share, effect)
+    ours, others = (tuple(map(float, each)) for each in moments)
+    book.differ("inertia", where, "moments", ours, others, "kg m²", size, share, effect, matters)
     turned = _between_axes(mine.tensor, theirs.tensor)
     if turned is not None and turned > 8 * book.tolerance * math.pi:
-        book.differ("inertia", where, "axes", None, None, "rad", turned, share)
+        book.differ("inertia", where, "axes", None, None, "rad", turned, share, "", matters)
 
 
 def _between_axes(one: Array, two: Array) -> float | None:

@@ -125,9 +125,9 @@ def _structure(book: Ledger, one: Tree, two: Tree, found: Matching, notes: list[
             joint = group.joint
             kind = f"{joint.kind} joint" if joint else "fixed"
             mass = f"carries {tree.carried(group.number).mass:.3g} kg"
-            sides: list[str | None] = [None, None]
-            sides[k] = joint.name if joint else group.name
-            book.differ("structure", group.name, kind, *sides, effect=mass)
+            name = joint.name if joint else group.name
+            sides = (name, "nothing") if k == 0 else ("nothing", name)
+            book.differ("structure", group.name, kind, sides[0], sides[1], effect=mass)
     for pair in found.pairs:
         a, b = pair.one, pair.two
         if pair.moved:
@@ -150,7 +150,8 @@ def _structure(book: Ledger, one: Tree, two: Tree, found: Matching, notes: list[
             far, turn = pair.align.distance(HERE), math.degrees(pair.align.angle(HERE))
             notes.append(
                 f"the frame of link {a.name!r} is put elsewhere on the same solid, "
-                f"{far * 1e3:.3g} mm and {turn:.3g}° off: it moves alike, and its pose reads otherwise"
+                f"{far * 1e3:.3g} mm and {turn:.3g}° off: it moves alike, and its pose reads "
+                "otherwise"
             )
     names = [
         (p.one.name, p.two.name) for p in found.pairs if p.one.name != p.two.name and p.by != "root"

@@ -73,7 +73,7 @@ def read(client: int, bodies: Sequence[int], name: str) -> Robot:
         links=tuple(links),
         frames=(),
         actuators=None,
-        settings=_settings(pb, client),
+        settings=_settings(pb),
         rooted=True,
     )
 
@@ -178,8 +178,15 @@ def _size(kind: str, told: Sequence[float]) -> tuple[float, ...]:
     return (told[1], told[0] / 2) if kind in ("cylinder", "capsule") else ()
 
 
-def _settings(pb: Any, client: int) -> dict[str, Setting]:
-    told = pb.getPhysicsEngineParameters(client)
+def _settings(pb: Any) -> dict[str, Setting]:
+    """Of a world that nobody has set anything in."""
+    fresh = pb.connect(pb.DIRECT)
+    if fresh < 0:
+        raise EngineError("PyBullet has no room for another world in this process")
+    try:
+        told = pb.getPhysicsEngineParameters(fresh)
+    finally:
+        pb.disconnect(fresh)
     return {
         "timestep": told["fixedTimeStep"],
         "gravity": tuple(told[f"gravityAcceleration{axis}"] for axis in "XYZ"),

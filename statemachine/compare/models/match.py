@@ -213,11 +213,9 @@ def _errors(
             yield _apart(align.of(a.joint.anchor), b.joint.anchor, b.joint.axis)
     for child in one.children(a.number):
         other = two.by_joint.get(child.joint.name) if child.joint else None
-        if (
-            other is not None
-            and other.parent == b.number
-            and other.joint.kind in ("hinge", "slide")
-        ):
+        if other is None or other.joint is None or other.parent != b.number:
+            continue
+        if other.joint.kind in ("hinge", "slide"):
             (at, axis), (there, along) = _line(child, align), _line(other, HERE)
             yield _apart(at, there, along)
             yield float(np.linalg.norm(np.cross(axis, along))) / 10
