@@ -488,6 +488,21 @@ def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, said: str)
     assert str(caught.value).startswith("bad.urdf: ")
 
 
+def test_an_mjcf_goes_on_without_its_meshes(pair: Pair) -> None:
+    one, two = pair()
+    mesh = '<asset><mesh name="gone" file="gone.stl"/></asset><worldbody>'
+    text = two.read_text().replace("<worldbody>", mesh)
+    text = text.replace('<geom name="ball"', '<geom type="mesh" mesh="gone"/><geom name="ball"')
+    two.write_text(text)
+    result = compare(one, two)
+    (found,) = _differ(result)
+    assert (found.where, found.one, found.two) == ("hand", "1 sphere", "1 mesh, 1 sphere")
+    assert any("gone.stl are not there" in note for note in result.two.notes)
+    two.write_text(text.replace("<worldbody>", "<worldbody><nonsense/>"))
+    with pytest.raises(ModelError, match="nonsense"):
+        compare(one, two)
+
+
 def test_deep_and_large_files_end_soon(tmp_path: Path) -> None:
     links = "".join(f'<link name="l{k}"/>' for k in range(1500))
     joints = "".join(
@@ -496,7 +511,8 @@ def test_deep_and_large_files_end_soon(tmp_path: Path) -> None:
         for k in range(1499)
     )
     path = tmp_path / "long.urdf"
-    path.write_text(f'<robot name="r">{links}{joints}</robot>')
+    nested = "<x>" * 100_000 + "</x>" * 100_000
+    path.write_text(f'<robot name="r">{links}{joints}{nested}</robot>')
     assert len(Tree(read(path)).groups) == 1500
     many = "".join(f'<link name="l{k}"/>' for k in range(3000))
     path.write_text(f'<robot name="r">{many}</robot>')
@@ -561,6 +577,8 @@ def test_the_command(cli: Cli, tmp_path: Path) -> None:
         (("--models", "so101", "so101", "--frame", "x=y"), "no frame in so101/so101.xml named 'x'"),
         (("--models", "so101", "so101", "--digits", "0"), "--digits wants a number from 1 to 17"),
         (("hold", "--models", "so101", "so101"), "hold is a run"),
+        (("--models", "so101", "so101", "--seconds", "1"), "--seconds is of a run"),
+        (("hold", "--all"), "--all goes with --models"),
     ):
         done = cli("compare", *arguments)
         assert done.returncode == 2, (arguments, done.stderr)

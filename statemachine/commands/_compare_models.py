@@ -40,6 +40,9 @@ def run(options: argparse.Namespace) -> int:
     given = [split(text) for text in options.models]
     if options.what:
         raise BadInputError(f"--models compares descriptions; {options.what[0]} is a run")
+    for name, other in (("model", None), ("seconds", None), ("timestep", None), ("tolerance", [])):
+        if getattr(options, name) != other:
+            raise BadInputError(f"--{name} is of a run, and --models runs nothing")
     if options.backends:
         if any(engine for _, engine in given):
             raise BadInputError("--backends and FILE@ENGINE say the same: give one of them")
@@ -69,6 +72,13 @@ def run(options: argparse.Namespace) -> int:
             menagerie=options.menagerie,
         )
     return show(model_diff.page(result, options.all), result, options.json)
+
+
+def refuse_alone(options: argparse.Namespace) -> None:
+    """Raise BadInputError for an option of --models without it."""
+    for name in ("frame", "rename", "all"):
+        if getattr(options, name):
+            raise BadInputError(f"--{name} goes with --models")
 
 
 def _pairs(given: list[str], option: str) -> dict[str, str]:

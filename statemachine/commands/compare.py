@@ -95,6 +95,7 @@ def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
     if options.models:
         return _compare_models.run(options)
+    _compare_models.refuse_alone(options)
     if not options.what:
         raise BadInputError(
             f"compare what? An experiment ({', '.join(_EXPERIMENTS)}) or traces: "

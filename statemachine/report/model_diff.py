@@ -22,7 +22,7 @@ _APART = {
 # ... and of the figures themselves.
 _SHOWN = {unit: _APART[unit] for unit in ("m", "m³", _MOMENT)}
 _LAST = {
-    "places": "moves the rest by",
+    "places": "so",
     "armature": "share",
     "drive": "holds",
     "effort": "ratio",
@@ -45,7 +45,7 @@ _WHY = {
     "damping": "slows in: the time M_ii / damping in which a joint that nothing drives comes to "
     "1/e of its speed.",
     "centre of mass": "load: weight times distance, what the shift adds to the joint at most.",
-    "inertia": "Principal moments of the rigid part, about its centre of mass. M_ii as above: of "
+    "inertia": "Principal moments of the rigid part, about its centre of mass. M_ii is that of "
     "the joint that carries it, at zero, armature included.",
     "mass": "Of rigid parts: links without a joint between them are weighed together.",
     "shapes": "In the frame of B's link; sizes are half edges, radius, or radius and half length.",
@@ -134,9 +134,8 @@ def _faster(found: list[Difference]) -> Iterator[Block]:
     if 0 < worst.share < 1 and not (worst.one and worst.two):
         side = "B" if worst.two is None or not worst.two else "A"
         times = 1 / (1 - worst.share)
-        yield Text(
-            f"The same torque accelerates {worst.where} {times:.3g} times as fast in {side}."
-        )
+        shown = f"{times:,.0f}" if times >= 100 else f"{times:.3g}"
+        yield Text(f"The same torque accelerates {worst.where} {shown} times as fast in {side}.")
 
 
 def _together(subject: str, found: Sequence[Difference]) -> Iterator[list[str]]:
@@ -174,7 +173,7 @@ def _value(value: Value, unit: str) -> str:
     if isinstance(value, str):
         return value
     if isinstance(value, tuple):
-        factor, shown = _SHOWN.get(unit, (1.0, unit))
+        factor, shown = _SHOWN.get(unit, (1.0, "" if len(value) == 3 else unit))
         words = " ".join(_digits(each * factor) for each in value)
         return f"{words} {shown}".strip()
     return _number(value, unit, _SHOWN)
@@ -193,7 +192,10 @@ def _digits(value: float) -> str:
 def _equal(result: Compared) -> Iterator[Block]:
     found = result.found
     if found.agreements:
-        rows = [_agreement(each) for each in found.agreements]
+        rows = [
+            _agreement(list(group))
+            for _, group in groupby(found.agreements, key=lambda each: each.subject)
+        ]
         yield Table(
             ("", "figures", "apart, at most", "to digits"), rows, "What is equal", frozenset({0})
         )
@@ -208,12 +210,17 @@ def _equal(result: Compared) -> Iterator[Block]:
 
 
 def _tiny(value: float) -> str:
-    return f"{value:.2g}"
+    return f"{value:.4g}" if value > 1e-2 else f"{value:.1g}"
 
 
-def _agreement(each: Agreement) -> list[str]:
-    of = _MOMENT if each.subject == "inertia" else each.unit
-    factor, unit = _APART.get(of, (1.0, of))
-    name = SUBJECTS[each.subject].partition(":")[0]
-    worst = f"{each.worst * factor:.2g} {unit}".replace(" °", "°").strip() if each.worst else "0"
-    return [name, str(each.count), worst, "all" if each.digits == 17 else str(each.digits)]
+def _agreement(group: Sequence[Agreement]) -> list[str]:
+    """A row for a subject: the worst in each of its units."""
+    subject, worst = group[0].subject, []
+    for each in group:
+        of = _MOMENT if subject == "inertia" else each.unit
+        factor, unit = _APART.get(of, (1.0, of))
+        if each.worst:
+            worst.append(f"{each.worst * factor:.1e} {unit}".replace(" °", "°").strip())
+    count, digits = sum(each.count for each in group), min(each.digits for each in group)
+    name = SUBJECTS[subject].partition(":")[0]
+    return [name, str(count), ", ".join(worst) or "0", "all" if digits == 17 else str(digits)]

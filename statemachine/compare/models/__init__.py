@@ -21,10 +21,10 @@ import numpy as np
 from ... import __version__
 from ...backends import backend_engine, backend_names, load
 from ...engines import require
-from ...errors import UnsupportedError
+from ...errors import ModelError, UnsupportedError
 from ...models import resolve
 from ...verbs import make_data
-from . import from_bullet, from_mjcf, from_urdf
+from . import _meshless, from_bullet, from_mjcf, from_urdf
 from .description import Robot
 from .diff import Found, diff
 from .engines import own_ways
@@ -134,7 +134,13 @@ def read(
         with make_data(load(path, backend="pybullet", defaults="engine")) as data:
             bodies = [tree.body for tree in data.raw.trees]
             return from_bullet.read(data.raw.client, bodies, name)
-    loaded = load(path, backend="mujoco", defaults="engine")
+    try:
+        loaded = load(path, backend="mujoco", defaults="engine")
+    except ModelError:
+        robot = _meshless.read(path, name) if path.suffix.lower() == ".xml" else None
+        if engine is not None or robot is None:
+            raise
+        return robot
     form = "engine" if engine else {".mjb": "MJB", ".urdf": "URDF"}.get(path.suffix.lower(), "MJCF")
     return from_mjcf.read(loaded.raw, name, f"mujoco {loaded.engine_version}", form)
 

@@ -23,7 +23,7 @@ def compare(book: Ledger, pair: Pair, above: Pair, tree: Tree, reach: float) -> 
     if a.kind != b.kind:
         book.differ("places", where, "kind", a.kind, b.kind)
         return
-    if a.kind in ("free", "ball"):
+    if a.kind not in ("hinge", "slide"):
         return
     # The first one's frame as the second one would have it, in the second one's own.
     off = pair.two.place.inverse @ above.align @ pair.one.place @ pair.align.inverse

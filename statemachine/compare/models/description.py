@@ -90,7 +90,7 @@ class Joint:
 
     Attributes:
         name: As in the file.
-        kind: hinge, slide, ball or free.
+        kind: hinge, slide, ball, planar or free.
         axis, anchor: (3,) unit direction, and a point of it [m], in the link's frame.
         limits: Lowest and highest position [rad or m]; None where it has none.
         velocity: Highest speed [rad/s or m/s].

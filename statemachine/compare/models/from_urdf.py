@@ -22,7 +22,13 @@ from .meshes import read_mesh, volume_of
 Element = ElementTree.Element
 _LARGEST = 64 * 2**20  # bytes; a description is text, its meshes are elsewhere
 _MOST = 2_000  # links
-_KINDS = {"revolute": "hinge", "continuous": "hinge", "prismatic": "slide", "floating": "free"}
+_KINDS = {
+    "revolute": "hinge",
+    "continuous": "hinge",
+    "prismatic": "slide",
+    "floating": "free",
+    "planar": "planar",
+}
 _LABEL = "a URDF"
 
 

@@ -142,7 +142,7 @@ def _placed(one: Tree, two: Tree, group: Group, above: Pair, taken: set[int]) ->
             continue
         if hers.name in one.by_joint:
             continue
-        if joint.kind in ("free", "ball"):
+        if joint.kind not in ("hinge", "slide"):
             if group.name == other.name:
                 return other
             continue
