@@ -21,8 +21,10 @@ from statemachine.compare import (
     parse_tolerances,
     series,
     sides_of,
+    witness,
 )
 from statemachine.compare.tolerances import COUNT
+from statemachine.engines import available
 from statemachine.errors import BadInputError, MissingEngineError, TraceError, UnknownNameError
 from statemachine.experiments.scenarios import SCENARIOS
 from statemachine.report import compare as report
@@ -267,6 +269,24 @@ def test_one_trace_is_played_on_the_other_engine(tmp_path: Any) -> None:
     assert "was played on pybullet" in said[0]
 
 
+def test_a_third_party_is_asked_about_both(hold: Trace, box: Trace) -> None:
+    need_engine("pinocchio")
+    for trace in (hold, box):  # its scene includes the arm, which is what Pinocchio can read
+        tip = trace.header.sites.index("gripperframe")
+        position = trace["site_xpos"].copy()
+        position[30, tip, 0] += 0.001
+        found = witness(trace, changed(trace, site_xpos=position))
+        assert found is not None
+        assert found.one < 1e-12
+        assert found.two == pytest.approx(0.001, rel=1e-9)
+        assert found.rows == 2 * len(trace)
+    unknown = dataclasses.replace(
+        hold.header,
+        provenance=dataclasses.replace(hold.header.provenance, model_file="no/such.xml"),
+    )
+    assert witness(Trace(unknown, hold.columns), hold) is None
+
+
 # Where an engine is missing.
 
 
@@ -319,12 +339,21 @@ def test_the_command(cli: Cli) -> None:
     assert max(map(len, done.stdout.splitlines())) <= 80
     for text in ("wrist_flex", "2.6", "DIFFERS", "one count of the servos' encoders", "✗"):
         assert text in done.stdout
+    if has_witness():
+        assert "a third party was asked where gripperframe is" in " ".join(done.stdout.split())
     good = cli("compare", "droop", "--json")
     assert good.returncode == 0
     result = json.loads(good.stdout)
-    assert result["agrees"] is True
-    assert result["two"]["provenance"]["versions"]["pybullet"]
-    assert {each["verdict"] for each in result["agreements"]} == {"agrees"}
+    found = result["comparison"]
+    assert found["agrees"] is True
+    assert found["two"]["provenance"]["versions"]["pybullet"]
+    assert {each["verdict"] for each in found["agreements"]} == {"agrees"}
+    if result["witness"] is not None:
+        assert result["witness"]["by"].startswith("pinocchio ")
+
+
+def has_witness() -> bool:
+    return "pinocchio" in available()[0]
 
 
 def test_it_compares_an_engine_with_itself(cli: Cli) -> None:

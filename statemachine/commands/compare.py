@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
             f"compare what? An experiment ({', '.join(EXPERIMENTS)}) or traces: "
             f"{PROGRAM} compare hold"
         )
-    from ..compare import compare, parse_tolerances, sides_of
+    from ..compare import compare, parse_tolerances, sides_of, witness
     from ..report import compare as report
     from ..report.progress import progress
 
@@ -107,4 +107,6 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         for line in said:
             complain(line, 0)
-    return show(report.page(found, one.header.says, said), found, options.json)
+    asked = witness(one, two)
+    page = report.page(found, one.header.says, said, asked)
+    return show(page, {"comparison": found, "witness": asked}, options.json)
