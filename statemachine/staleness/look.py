@@ -15,7 +15,7 @@ from ..interface import Data, Model
 from ..records import DERIVED, INPUTS, POSES, Array, Contacts, JointType, State
 from ..rotations import times
 from ..verbs import forward, get_state, make_data, set_state
-from .gaps import gaps, same
+from .gaps import Gap, gaps, same
 from .result import Freshness, Row
 
 if TYPE_CHECKING:
@@ -144,6 +144,13 @@ def row(
     """What is to be told of one array."""
     if same(held, now):
         return Row(name, True, 0, 0, "now", ())
+    return stale_row(model, name, moment, gaps(model, name, held, now))
+
+
+def stale_row(model: Model, name: str, moment: Moment, found: tuple[Gap, ...]) -> Row:
+    """What is to be told of an array that is not of now, and off by `found`."""
+    if moment.never:
+        return Row(name, False, None, None, "never computed", found)
     writes = None
     if moment.writes is not None:
         writes = sum(moment.writes[each] for each in DEPEND[name])
@@ -153,9 +160,7 @@ def row(
     if writes:
         words.append(_count(writes, "write"))
     of = " and ".join(words) + " ago" if words else "an earlier state"
-    if moment.never:
-        of, writes = "never computed", None
-    return Row(name, False, moment.steps, writes, of, gaps(model, name, held, now))
+    return Row(name, False, moment.steps, writes, of, found)
 
 
 def find(model: Model, state: State, held: Readings, now: Readings, scratch: Scratch) -> Moment:

@@ -19,7 +19,7 @@ from ..interface import Data, Model
 from ..records import INPUTS, Array, Contacts, State
 from ..verbs import get_state
 from .gaps import Gap, told
-from .look import DEPEND, Moment, Readings, Scratch, find, readings, row
+from .look import DEPEND, Moment, Readings, Scratch, find, readings, row, stale_row
 from .result import Row, StaleRead, table
 
 _PACKAGE = str(Path(__file__).resolve().parent.parent)
@@ -156,7 +156,7 @@ class Watch:
         moment = self.moment()
         state = self._state()
         if state is None:
-            return Row(name, False, moment.steps, None, "an earlier state", ())
+            return stale_row(self._model, name, moment, ())
         if self._fresh is not None and self._fresh == state.blob:
             return None
         return row(self._model, name, held, self.now(state)[name], moment)
