@@ -777,3 +777,26 @@ def test_rotations_are_compared_as_rotations() -> None:
     mats = matrix_from_quat(two)[: model.nsite].reshape(-1, 9)
     (gap,) = gaps(model, "site_xmat", np.tile(np.eye(3).ravel(), (model.nsite, 1)), -mats + 0)
     assert gap.size != 0
+
+
+def test_a_model_without_names_sites_or_motors(tmp_path: Path) -> None:
+    """A ball and a slide, and nothing that could be named."""
+    path = tmp_path / "plain.xml"
+    path.write_text(
+        '<mujoco><worldbody><body><joint type="ball" damping="1e-3"/>'
+        '<geom size=".1" pos=".2 0 0" mass="1"/>'
+        '<body pos=".4 0 0"><joint type="slide" axis="0 1 0"/><geom size=".05" mass="1"/>'
+        "</body></body></worldbody></mujoco>"
+    )
+    model = sm.load(path)
+    with sm.make_data(model) as data:
+        assert "never computed" in str(sm.freshness(model, data))
+        data.qvel[:] = (1, 2, 3, 0.5)
+        sm.step(model, data, 30)
+        found = sm.freshness(model, data)
+        assert found["xpos"].of == "1 step ago"
+        assert "the poses of body 1, body 2" in " ".join(str(found).split())
+        assert set(sizes(found["qacc"].gaps)) == {"m/s²", "rad/s²"}
+        assert found["site_xpos"].now  # there are none
+        sm.forward(model, data)
+        assert sm.freshness(model, data)

@@ -33,7 +33,8 @@ def watch_freshness(model: Model, data: Data, raise_on_stale: bool = False) -> W
         print(watch)  # which line read what, how often, of which moment, how far off
 
     Every name for the Data is watched, in whatever object. Not seen are reads through
-    `data.raw`, and through an array that was kept from an earlier read.
+    `data.raw` and through an array that was kept from an earlier read; steps of `data.raw`
+    count as writes. Two writes through an array that was kept may count as one.
 
     Args:
         model: The Model that made `data`.
