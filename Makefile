@@ -13,7 +13,7 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13 python3.14; 
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null \
 	&& { echo $$p; break; }; done)
 
-.PHONY: help lesson test test-fast test-newest check format hooks bench picture urdf docs notebook clean
+.PHONY: help lesson test test-fast test-newest check format hooks bench picture urdf traces docs notebook clean
 
 help:
 	@sed -n 's/^# make /  make /p' Makefile
@@ -71,6 +71,10 @@ picture: $(VENV)/test.stamp
 # make urdf         write models/so101/so101.urdf anew from so101.xml
 urdf: $(VENV)/run.stamp
 	@$(BIN)/python models/so101/make_urdf.py
+
+# make traces       record on PyBullet anew what the package brings for where it has no wheel
+traces: $(VENV)/run.stamp
+	@$(BIN)/python models/so101/make_traces.py
 
 # make docs         the path as pages, made from runs: docs/_build/html/index.html
 docs: $(VENV)/test.stamp

@@ -57,7 +57,10 @@ _HOMES = {
     "freshness": "staleness",
     "watch_freshness": "staleness",
 }
-_MODULES = ("backends", "conformance", "errors", "experiments", "kinematics", "models", "rotations")
+_MODULES = (
+    "backends", "compare", "conformance", "errors", "experiments", "kinematics", "models",
+    "rotations", "traces",
+)  # fmt: skip
 
 __all__ = [
     "Data",

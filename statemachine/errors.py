@@ -82,6 +82,10 @@ class UnsupportedError(StateMachineError, NotImplementedError):
     reason: str
 
 
+class TraceError(StateMachineError, ValueError):
+    """A file is no trace, or a trace does not fit what is asked of it."""
+
+
 class ReadOnlyError(StateMachineError, AttributeError):
     """Something derived or constant was assigned to."""
 

@@ -1,0 +1,30 @@
+"""Traces: what a run did, recorded on any engine, opened again on none.
+
+    trace = record(model, controller, seconds=2.0)
+    write(trace, "hold.npz")
+    again = read("hold.npz")
+
+A recorder stands on the public face of the core; a file is npz, or parquet with the extra.
+"""
+
+from __future__ import annotations
+
+from .files import export_csv, read, write
+from .recorder import play, record, record_scenario
+from .shipped import shipped, shipped_names
+from .trace import COLUMNS, CONTACTS, Header, Trace
+
+__all__ = [
+    "COLUMNS",
+    "CONTACTS",
+    "Header",
+    "Trace",
+    "export_csv",
+    "play",
+    "read",
+    "record",
+    "record_scenario",
+    "shipped",
+    "shipped_names",
+    "write",
+]

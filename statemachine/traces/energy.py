@@ -1,0 +1,58 @@
+"""Energies of the states of a run, by one yardstick for all engines."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from ..backends import load
+from ..engines import require
+from ..errors import MissingEngineError, StateMachineError
+from ..interface import Model
+from ..records import Array
+from ..verbs import make_data
+
+
+def energies(
+    model: Model, defaults: Literal["model", "engine"], qpos: Array, qvel: Array
+) -> tuple[Array, str]:
+    """Kinetic and potential energy of states.
+
+    They are those of the model's masses, rotors (armature) and gravity, computed by MuJoCo
+    whatever engine the states come from: so two runs are measured by one yardstick. An
+    engine that leaves something out (PyBullet as it comes has no rotors, and no gravity
+    until it is set) is measured by the file's.
+
+    Args:
+        model: What the states are of.
+        defaults: What `load` was given for it.
+        qpos: (n, nq) positions [rad or m]; qvel: (n, nv) velocities.
+        qvel: See qpos.
+
+    Returns:
+        (n, 2) kinetic and potential energy [J], and the engine and version that gave them;
+        NaN and "" where MuJoCo is missing or cannot read the model.
+    """
+    unknown = np.full((len(qpos), 2), np.nan), ""
+    try:
+        mujoco = require("mujoco")
+        yardstick = model
+        if model.backend != "mujoco":
+            yardstick = load(model.path, backend="mujoco")
+            if (yardstick.nq, yardstick.nv) != (qpos.shape[1], qvel.shape[1]):
+                return unknown
+            if defaults == "model":
+                yardstick = yardstick.replace(gravity=model.gravity, armature=model.dof_armature)
+    except (MissingEngineError, StateMachineError):
+        return unknown
+    found = np.empty((len(qpos), 2))
+    with make_data(yardstick) as data:
+        raw_model, raw = yardstick.raw, data.raw
+        for k in range(len(qpos)):
+            data.qpos[:], data.qvel[:] = qpos[k], qvel[k]
+            mujoco.mj_fwdPosition(raw_model, raw)
+            mujoco.mj_energyPos(raw_model, raw)
+            mujoco.mj_energyVel(raw_model, raw)
+            found[k] = raw.energy[1], raw.energy[0]
+    return found, f"mujoco {yardstick.engine_version}"

@@ -1,0 +1,304 @@
+"""Traces in files: npz, which NumPy reads, or parquet, which tables read; and CSV out."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import importlib
+import itertools
+import os
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from ..errors import BadInputError, MissingEngineError, TraceError
+from ..records import JointType
+from .trace import COLUMNS, CONTACTS, INPUTS, WHOLE, Header, Trace
+
+SUFFIXES = (".npz", ".parquet")
+_MOST = 4 * 2**30  # bytes that a trace may unfold into
+_KEY = b"statemachine.trace"  # of the header in a parquet file
+
+
+def write(trace: Trace, path: str | os.PathLike[str]) -> Path:
+    """Write a trace; the suffix, .npz or .parquet (zstd), says how.
+
+    The file is written beside and then renamed: it is there whole or not at all. The same
+    trace gives the same bytes.
+
+    Returns:
+        The path.
+
+    Raises:
+        BadInputError: Another suffix.
+        MissingEngineError: Parquet, and pyarrow is not installed.
+        OSError: It cannot be written.
+    """
+    target = _known(path)
+    if target.suffix.lower() == ".parquet":
+        table = _table(trace, _pyarrow())
+        replace_file(target, lambda out: _write_parquet(table, out))
+    else:
+        replace_file(target, lambda out: _write_npz(trace, out))
+    return target
+
+
+def read(path: str | os.PathLike[str]) -> Trace:
+    """Open a trace. No engine is needed; nothing in the file is run.
+
+    Raises:
+        TraceError: The file is no trace.
+        MissingEngineError: Parquet, and pyarrow is not installed.
+        OSError: It is not there, or cannot be read.
+    """
+    source = _known(path)
+    with open(source, "rb"):  # what is not there is said in the system's words
+        pass
+    reader = _read_parquet if source.suffix.lower() == ".parquet" else _read_npz
+    try:
+        text, columns = reader(source)
+        header = dataclasses.replace(Header.from_json(text), recorded=True)
+        return Trace(header, columns)
+    except TraceError as error:
+        raise TraceError(f"{source.name}: {error}") from None
+
+
+def export_csv(trace: Trace, path: str | os.PathLike[str]) -> list[Path]:
+    """Write the columns as CSV, one row for each moment, units SI.
+
+    Columns are named after joints, bodies, sites and actuators: "qpos.elbow_flex",
+    "site_xpos.gripperframe.x". Contacts, which are many to a moment, go into a second
+    file beside it, NAME.contacts.csv.
+
+    Returns:
+        The files that were written.
+    """
+    target = Path(path)
+    names = [name for name in COLUMNS if name in trace]
+    labels = list(itertools.chain.from_iterable(column_labels(trace.header, n) for n in names))
+    flat = np.hstack([np.asarray(trace[n]).reshape(len(trace), -1) for n in names])
+    replace_file(target, lambda out: _write_rows(out, labels, flat.tolist()))
+    if "contact_row" not in trace:
+        return [target]
+    beside = target.with_name(f"{target.stem}.contacts.csv")
+    geoms, header = trace["contact_geom"].tolist(), trace.header
+    labels = ["time", "geom_1", "geom_2", "body_1", "body_2", "dist"]
+    labels += [f"pos.{axis}" for axis in "xyz"]
+    labels += ["force.normal", "force.tangent_1", "force.tangent_2"]
+
+    def rows() -> Iterator[list[Any]]:
+        for k, row in enumerate(trace["contact_row"].tolist()):
+            one, two = geoms[k]
+            yield [
+                float(trace.time[row]),
+                header.geoms[one] or f"geom {one}",
+                header.geoms[two] or f"geom {two}",
+                header.bodies[header.geom_bodyid[one]],
+                header.bodies[header.geom_bodyid[two]],
+                float(trace["contact_dist"][k]),
+                *trace["contact_pos"][k].tolist(),
+                *trace["contact_force"][k].tolist(),
+            ]
+
+    replace_file(beside, lambda out: _write_rows(out, labels, rows()))
+    return [target, beside]
+
+
+def column_labels(header: Header, column: str) -> list[str]:
+    """A name for each number of a row of a column: "qpos.box.qw"."""
+    if column == "time":
+        return ["time"]
+    if column == "energy":
+        return ["energy.kinetic", "energy.potential"]
+    if column == "ctrl":
+        return [f"ctrl.{name or k}" for k, name in enumerate(header.actuators)]
+    if column in ("qpos", "qvel") or column.startswith("qfrc"):
+        return [f"{column}.{label}" for label in coordinate_labels(header, column == "qpos")]
+    names = header.bodies if column in ("xpos", "xquat") else header.sites
+    parts = {
+        "xpos": "xyz",
+        "site_xpos": "xyz",
+        "xquat": ("qw", "qx", "qy", "qz"),
+        "site_xmat": [f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)],
+    }[column]
+    return [f"{column}.{name or k}.{part}" for k, name in enumerate(names) for part in parts]
+
+
+def coordinate_labels(header: Header, positions: bool) -> list[str]:
+    """A name for each coordinate: the joint's, with parts where it has several."""
+    found = []
+    ball = ("qw", "qx", "qy", "qz") if positions else ("wx", "wy", "wz")
+    parts = {
+        int(JointType.FREE): (*"xyz", *ball) if positions else ("vx", "vy", "vz", *ball),
+        int(JointType.BALL): ball,
+    }
+    for k, (name, kind) in enumerate(zip(header.joints, header.jnt_type, strict=True)):
+        label = name or f"joint {k}"
+        found += [f"{label}.{part}" for part in parts.get(kind, ())] or [label]
+    return found
+
+
+def replace_file(target: Path, fill: Callable[[BinaryIO], None]) -> None:
+    """Write a file beside its place and rename it: whole or not at all."""
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    try:
+        with os.fdopen(handle, "wb") as out:
+            fill(out)
+        # mkstemp gives a file that its owner alone may read.
+        mask = os.umask(0)
+        os.umask(mask)
+        os.chmod(name, 0o666 & ~mask)
+        os.replace(name, target)
+    except BaseException:
+        with suppress(OSError):
+            os.unlink(name)
+        raise
+
+
+def _known(path: str | os.PathLike[str]) -> Path:
+    found = Path(path)
+    if found.suffix.lower() not in SUFFIXES:
+        raise BadInputError(f"a trace is a file {' or '.join(SUFFIXES)}; got {found.name!r}")
+    return found
+
+
+def _write_rows(out: BinaryIO, labels: list[str], rows: Iterable[list[Any]]) -> None:
+    lines = _Lines(out)
+    writer = csv.writer(lines, lineterminator="\n")
+    writer.writerow(labels)
+    writer.writerows(rows)
+
+
+class _Lines:
+    """What csv writes its text into."""
+
+    def __init__(self, out: BinaryIO) -> None:
+        self._out = out
+
+    def write(self, text: str) -> None:
+        self._out.write(text.encode())
+
+
+def _write_npz(trace: Trace, out: BinaryIO) -> None:
+    columns: dict[str, Any] = dict(trace.columns)
+    if trace.header.single:
+        columns = {
+            name: array if name in (*INPUTS, *WHOLE) else array.astype(np.float32)
+            for name, array in columns.items()
+        }
+    header = np.frombuffer(trace.header.as_json().encode(), dtype=np.uint8)
+    np.savez_compressed(out, header=header, **columns)
+
+
+def _read_npz(path: Path) -> tuple[str, dict[str, Any]]:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+        if size > _MOST:
+            raise TraceError(f"unfolds into {size / 2**30:.1f} GB; at most {_MOST >> 30}")
+        with np.load(path, allow_pickle=False) as file:
+            if "header" not in file:
+                raise TraceError("has no header: it is no trace")
+            text = file["header"].astype(np.uint8).tobytes().decode()
+            columns = {
+                name: _as_column(name, file[name]) for name in file.files if name != "header"
+            }
+    except TraceError:
+        raise
+    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+        raise TraceError(f"is no trace: {error or type(error).__name__}") from None
+    return text, columns
+
+
+def _as_column(name: str, array: Any) -> Any:
+    if array.dtype.kind not in "fiu":
+        raise TraceError(f"column {name!r} holds {array.dtype}, not numbers")
+    return array.astype(np.int64 if name in WHOLE else np.float64)
+
+
+def _pyarrow() -> Any:
+    try:
+        importlib.import_module("pyarrow.parquet")
+    except ImportError as error:
+        raise MissingEngineError(
+            "parquet needs pyarrow: pip install 'statemachine-sim[parquet]'; "
+            "npz needs nothing more",
+            engine="pyarrow",
+        ) from error
+    return importlib.import_module("pyarrow")
+
+
+def _table(trace: Trace, arrow: Any) -> Any:
+    """Columns of one number, or of a list of as many as a row has; contacts as lists of rows."""
+    columns = {}
+    for name in COLUMNS:
+        if name in trace:
+            width = int(np.prod(trace.header.shape(name), dtype=int))
+            if width:  # a column of empty lists cannot be written
+                columns[name] = _fixed(arrow, trace[name], width, name == "time")
+    if "contact_row" in trace:
+        counts = np.bincount(trace["contact_row"], minlength=len(trace))
+        offsets = arrow.array(np.concatenate([[0], np.cumsum(counts)]).astype(np.int32))
+        for name, shape in CONTACTS.items():
+            if name != "contact_row":
+                width = int(np.prod(shape, dtype=int))
+                values = _fixed(arrow, trace[name], width, not shape)
+                columns[name] = arrow.ListArray.from_arrays(offsets, values)
+    table = arrow.table(columns)
+    return table.replace_schema_metadata({_KEY: trace.header.as_json().encode()})
+
+
+def _fixed(arrow: Any, values: Any, width: int, alone: bool) -> Any:
+    flat = arrow.array(np.ascontiguousarray(values).reshape(-1))
+    return flat if alone else arrow.FixedSizeListArray.from_arrays(flat, width)
+
+
+def _write_parquet(table: Any, out: BinaryIO) -> None:
+    parquet = importlib.import_module("pyarrow.parquet")
+    parquet.write_table(table, out, compression="zstd")
+
+
+def _read_parquet(path: Path) -> tuple[str, dict[str, Any]]:
+    arrow = _pyarrow()
+    parquet = importlib.import_module("pyarrow.parquet")
+    try:
+        table = parquet.read_table(path)
+        text = (table.schema.metadata or {}).get(_KEY, b"").decode()
+        if not text:
+            raise TraceError("has no header: it is no trace")
+        header = Header.from_json(text)
+        columns: dict[str, Any] = {}
+        for name in table.column_names:
+            if name in CONTACTS:
+                _contacts(name, table[name].combine_chunks(), columns)
+            elif name in COLUMNS:
+                array = table[name].combine_chunks()
+                flat = array if name == "time" else array.flatten()
+                values = np.asarray(flat.to_numpy(zero_copy_only=False), dtype=np.float64)
+                columns[name] = values.reshape(table.num_rows, *header.shape(name))
+        for name in ("qpos", "qvel", "ctrl", "xpos", "xquat", "site_xpos", "site_xmat"):
+            if name not in columns and 0 in header.shape(name):
+                columns[name] = np.empty((table.num_rows, *header.shape(name)))
+    except TraceError:
+        raise
+    except (OSError, ValueError, TypeError, AttributeError, arrow.ArrowException) as error:
+        raise TraceError(f"is no trace: {str(error).splitlines()[0]}") from None
+    return text, columns
+
+
+def _contacts(name: str, array: Any, columns: dict[str, Any]) -> None:
+    counts = np.diff(array.offsets.to_numpy())
+    columns["contact_row"] = np.repeat(np.arange(len(array)), counts)
+    values = array.flatten()
+    if CONTACTS[name]:
+        values = values.flatten()
+    kind = np.int64 if name in WHOLE else np.float64
+    columns[name] = np.asarray(values.to_numpy(zero_copy_only=False), dtype=kind).reshape(
+        -1, *CONTACTS[name]
+    )

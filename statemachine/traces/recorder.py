@@ -1,0 +1,347 @@
+"""Record a run, on any backend.
+
+The run itself is watched as little as possible: each step keeps the bytes of its inputs, and
+nothing else. What the engine derives from them is read while the run is *repeated* from its
+beginning with the recorded commands. The repetition must end in the same bits, row by row,
+which is checked: a trace is a proof that the run can be replayed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+
+from ..errors import (
+    BadInputError,
+    DivergedError,
+    EngineError,
+    TraceError,
+    UnsupportedError,
+)
+from ..experiments._common import Progress, part_of, provenance, silent, steps_in
+from ..experiments.scenarios import Controller, Scenario
+from ..interface import Data, Model
+from ..records import DERIVED, Array, State
+from ..verbs import forward, make_data, reset, set_state, step
+from .energy import energies
+from .trace import COLUMNS, CONTACTS, Header, Trace
+
+_TOLD = tuple(name for name in DERIVED if name in COLUMNS)
+Start = Callable[[Model, Data], None]
+
+
+def record(
+    model: Model,
+    controller: Controller | None = None,
+    seconds: float = 2.0,
+    *,
+    keyframe: int | str | None = None,
+    state: State | None = None,
+    qpos: Any = None,
+    qvel: Any = None,
+    derive: bool = True,
+    experiment: str = "",
+    says: str = "",
+    command: str = "",
+    defaults: Literal["model", "engine"] = "model",
+    options: dict[str, Any] | None = None,
+    seed: int | None = None,
+    progress: Progress = silent,
+) -> Trace:
+    """Run a controller from a start, and keep everything.
+
+    Args:
+        model: On any backend.
+        controller: Called before each step as f(time, data); what it returns is the ctrl
+            (nu,) of that step, None leaves ctrl alone. Without one nobody writes ctrl.
+        seconds: Simulated time.
+        keyframe: Where to start, by number or name; None for the default state.
+        state: A State to start from instead.
+        qpos: (nq,) and qvel (nv,), written over that start.
+        qvel: See qpos.
+        derive: Whether to repeat the run and record what the engine derives, too.
+        experiment: Its name for the header; says: what happens; command: what makes it again.
+        says: See experiment.
+        command: See experiment.
+        defaults: What `load` was given, for the header; options: what `replace` was.
+        options: See defaults.
+        seed: What the controller was drawn from, for the header.
+        progress: Told the fraction that is done.
+
+    Returns:
+        A trace with a row for each step and one for the end. If the engine diverges it has
+        the rows until then, and `header.ended` says why.
+
+    Raises:
+        BadInputError: The controller gave something that is no ctrl, or `seconds` is no time.
+        EngineError: The repetition did not end in the same bits.
+    """
+    if state is not None and keyframe is not None:
+        raise BadInputError("a run starts from a keyframe or from a State, not from both")
+    total = steps_in(model, seconds)
+
+    def begin(model: Model, data: Data) -> None:
+        if state is not None:
+            set_state(model, data, state)
+        else:
+            reset(model, data, keyframe)
+        if qpos is not None:
+            data.qpos = qpos
+        if qvel is not None:
+            data.qvel = qvel
+
+    share = 0.3 if derive else 1.0
+    with make_data(model) as data:
+        begin(model, data)
+        inputs, ended = _run(model, data, controller, total, part_of(progress, 0.0, share))
+    columns: dict[str, Any] = dict(inputs)
+    rewritten, energy_by = 0, ""
+    if derive:
+        told, rewritten = _derive(model, begin, inputs, part_of(progress, share, 1.0 - share))
+        if rewritten and controller is None:
+            raise EngineError(f"the run could not be repeated: {rewritten} rows differ")
+        columns |= told
+        columns["energy"], energy_by = energies(model, defaults, inputs["qpos"], inputs["qvel"])
+    header = Header(
+        experiment=experiment or getattr(controller, "__name__", "") or "run",
+        says=says,
+        command=command,
+        provenance=provenance(model, seed),
+        defaults=defaults,
+        options={name: _plain(value) for name, value in (options or {}).items()},
+        keyframe=None if keyframe is None else model.keyframes[model.key_id(keyframe)].name,
+        timestep=model.timestep,
+        substeps=model.substeps,
+        gravity=tuple(model.gravity.tolist()),
+        nq=model.nq,
+        nv=model.nv,
+        nu=model.nu,
+        joints=model.joint_names,
+        sites=model.site_names,
+        bodies=model.body_names,
+        geoms=model.geom_names,
+        actuators=model.actuator_names,
+        jnt_type=tuple(int(kind) for kind in model.jnt_type),
+        jnt_qposadr=tuple(model.jnt_qposadr.tolist()),
+        jnt_dofadr=tuple(model.jnt_dofadr.tolist()),
+        geom_bodyid=tuple(model.geom_bodyid.tolist()),
+        body_parentid=tuple(model.body_parentid.tolist()),
+        actuator_jntid=tuple(model.actuator_jntid.tolist()),
+        ctrlrange=tuple(tuple(row) for row in model.actuator_ctrlrange.tolist()),
+        energy_by=energy_by,
+        rewritten=rewritten,
+        ended=ended,
+    )
+    return Trace(header, columns)
+
+
+def record_scenario(
+    scenario: Scenario,
+    model: Model,
+    *,
+    seconds: float | None = None,
+    seed: int = 0,
+    command: str = "",
+    defaults: Literal["model", "engine"] = "model",
+    options: dict[str, Any] | None = None,
+    progress: Progress = silent,
+) -> Trace:
+    """Record a scenario on a model, which is given as loaded.
+
+    Args:
+        scenario: What to do; its options are put into the model.
+        model: Of any backend.
+        seconds: Simulated time; None for the scenario's own.
+        seed: Of what the scenario draws.
+        command: What makes this trace again.
+        defaults: What `load` was given.
+        options: Further options for `Model.replace`, which win over the scenario's.
+        progress: Told the fraction that is done.
+
+    Raises:
+        UnsupportedError: The backend lacks one of the options.
+        UnknownNameError: The model lacks the keyframe.
+    """
+    chosen = {**scenario.options, **(options or {})}
+    replaced = model.replace(**chosen) if chosen else model
+    return record(
+        replaced,
+        scenario.controller(replaced, seed),
+        scenario.seconds if seconds is None else seconds,
+        keyframe=scenario.keyframe,
+        experiment=scenario.name,
+        says=scenario.says,
+        command=command,
+        defaults=defaults,
+        options=chosen,
+        seed=seed if scenario.seeded else None,
+        progress=progress,
+    )
+
+
+def play(
+    trace: Trace,
+    model: Model,
+    *,
+    command: str = "",
+    defaults: Literal["model", "engine"] = "model",
+    options: dict[str, Any] | None = None,
+    progress: Progress = silent,
+) -> Trace:
+    """The ctrl of a trace, from the state it starts in, on another model or engine.
+
+    Where the timesteps differ, a command holds until the time of the next one.
+
+    Raises:
+        TraceError: The model has other joints or actuators, in name or in order.
+    """
+    header = trace.header
+    for what, ours, theirs in (
+        ("joints", model.joint_names, header.joints),
+        ("actuators", model.actuator_names, header.actuators),
+    ):
+        if tuple(ours) != tuple(theirs):
+            raise TraceError(
+                f"the trace has other {what} than {model.path.name}: "
+                f"{', '.join(theirs)} and {', '.join(ours)}"
+            )
+    if (header.nq, header.nv) != (model.nq, model.nv):
+        raise TraceError("the trace's joints are of other kinds than the model's")
+    commands, start = trace.ctrl, float(trace.time[0])
+    # A hair early, so that a sum of timesteps does not miss the row that it means.
+    times = trace.time - start - 1e-6 * header.timestep
+    began: list[float] = []
+
+    def controller(time: float, _data: Data) -> Array:
+        if not began:
+            began.append(time)
+        row = int(np.searchsorted(times, time - began[0], side="right")) - 1
+        return commands[max(0, min(row, len(commands) - 1))]
+
+    return record(
+        model,
+        controller,
+        float(trace.time[-1]) - start,
+        qpos=trace.qpos[0],
+        qvel=trace.qvel[0],
+        experiment=header.experiment,
+        says=header.says,
+        command=command,
+        defaults=defaults,
+        options=options,
+        seed=header.provenance.seed,
+        progress=progress,
+    )
+
+
+def _run(
+    model: Model, data: Data, controller: Controller | None, total: int, progress: Progress
+) -> tuple[dict[str, Array], str]:
+    """The inputs of each row, as they are when the step begins, and why it ended early."""
+    qpos, qvel, ctrl = data.qpos, data.qvel, data.ctrl
+    shape, times = ctrl.shape, [0.0] * 0
+    kept: tuple[list[bytes], ...] = ([], [], [])
+    keep_qpos, keep_qvel, keep_ctrl = (rows.append for rows in kept)
+    keep_time = times.append
+    qpos_bytes, qvel_bytes, ctrl_bytes = qpos.tobytes, qvel.tobytes, ctrl.tobytes
+    ended = ""
+    for k in range(total + 1):
+        now = data.time
+        if controller is not None:
+            wanted = controller(now, data)
+            if wanted is not None:
+                # The fast way for what is an array already; the other one checks.
+                if wanted.__class__ is np.ndarray and wanted.shape == shape:
+                    ctrl[:] = wanted
+                else:
+                    data.ctrl = wanted
+        keep_time(now)
+        keep_qpos(qpos_bytes())
+        keep_qvel(qvel_bytes())
+        keep_ctrl(ctrl_bytes())
+        if k == total:
+            break
+        try:
+            step(model, data)
+        except DivergedError as error:
+            ended = str(error)
+            break
+        if k % 256 == 0:
+            progress(k / total)
+    found = {"time": np.array(times)}
+    for name, rows, width in zip(
+        ("qpos", "qvel", "ctrl"), kept, (model.nq, model.nv, model.nu), strict=True
+    ):
+        array = np.frombuffer(b"".join(rows), dtype=np.float64).reshape(len(times), width)
+        found[name] = array
+        # A step finds what is not finite itself, but the last row has no step.
+        if not np.isfinite(array[-1]).all():
+            raise BadInputError(f"the controller left {name} with an entry that is no number")
+    progress(1.0)
+    return found, ended
+
+
+def _derive(
+    model: Model, begin: Start, inputs: dict[str, Array], progress: Progress
+) -> tuple[dict[str, Any], int]:
+    """Repeat a run and read what is derived; how many rows began otherwise than repeated."""
+    rows = len(inputs["time"])
+    kept: dict[str, list[Array]] = {name: [] for name in _TOLD}
+    contacts: dict[str, list[Any]] = {name: [] for name in CONTACTS}
+    # After a step, derived values are of the state before its last engine step: with one of
+    # those they are of the row that began it. With more, they must be asked for before.
+    after = model.substeps == 1
+    rewritten = 0
+    with make_data(model) as data:
+        begin(model, data)
+        for k in range(rows):
+            differs = False
+            for name in ("qpos", "qvel"):
+                if getattr(data, name).tobytes() != inputs[name][k].tobytes():
+                    getattr(data, name)[:] = inputs[name][k]
+                    differs = True
+            rewritten += differs
+            data.ctrl[:] = inputs["ctrl"][k]
+            if data.time != inputs["time"][k]:
+                data.time = float(inputs["time"][k])
+            last = k == rows - 1
+            if last or not after:
+                forward(model, data)
+                _read(data, k, kept, contacts)
+            if not last:
+                step(model, data)
+                if after:
+                    _read(data, k, kept, contacts)
+            if k % 32 == 0:
+                progress(k / rows)
+    progress(1.0)
+    columns: dict[str, Any] = {name: np.array(values) for name, values in kept.items()}
+    for name, width in CONTACTS.items():
+        kind = np.int64 if name in ("contact_row", "contact_geom") else np.float64
+        columns[name] = np.array(contacts[name], dtype=kind).reshape(-1, *width)
+    return columns, rewritten
+
+
+def _read(
+    data: Data, row: int, kept: dict[str, list[Array]], contacts: dict[str, list[Any]]
+) -> None:
+    for name, values in kept.items():
+        try:
+            values.append(np.array(getattr(data, name)))  # it may be the engine's memory
+        except UnsupportedError:
+            shape = np.shape(data.qvel)
+            values.append(np.full(shape, np.nan))
+    found = data.contacts
+    if len(found):
+        contacts["contact_row"] += [row] * len(found)
+        contacts["contact_geom"] += found.geom.tolist()
+        contacts["contact_dist"] += found.dist.tolist()
+        contacts["contact_pos"] += found.pos.tolist()
+        contacts["contact_frame"] += found.frame.reshape(-1, 9).tolist()
+        contacts["contact_force"] += found.force.tolist()
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
