@@ -670,6 +670,20 @@ def test_a_watch_names_the_lines_that_read(box: Model) -> None:
     assert max(map(len, text.splitlines())) <= 80
 
 
+def test_a_watch_that_does_not_raise_never_does(backend: str) -> None:
+    """What is written is no number, which the program may still mend: no size, no error."""
+    model = sm.load("so101", backend=backend)
+    with sm.make_data(model) as data, sm.watch_freshness(model, data) as watch:
+        sm.forward(model, data)
+        data.qpos[1] = np.nan
+        _ = data.site_xpos
+        data.qpos[1] = 0.0
+        _ = data.site_xpos
+    (read,) = watch.stale_reads
+    assert (read.of, read.gaps) == ("1 write ago", ())
+    assert str(watch).splitlines()[-1].endswith("not to be told")
+
+
 def test_the_worst_of_many_reads_is_told(backend: str) -> None:
     model = sm.load("so101", backend=backend)
     with sm.make_data(model) as data, sm.watch_freshness(model, data) as watch:

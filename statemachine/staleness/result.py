@@ -117,7 +117,7 @@ def table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
         parts = [
             part.replace(" ", _TIGHT) if len(part) < room else part for part in row[-1].split("; ")
         ]
-        for line in textwrap.wrap("; ".join(parts), room, break_long_words=False):
+        for line in textwrap.wrap("; ".join(parts), room, break_long_words=False) or [""]:
             lines.append(start + line.replace(_TIGHT, " "))
             start = " " * indent
     lines.insert(1, "─" * max(map(len, lines)))

@@ -6,6 +6,7 @@ watched, and nothing is left in the way of who does not watch.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -22,7 +23,7 @@ from .gaps import Gap, told
 from .look import DEPEND, Moment, Readings, Scratch, find, readings, row, stale_row
 from .result import Row, StaleRead, table
 
-_PACKAGE = str(Path(__file__).resolve().parent.parent)
+_PACKAGE = str(Path(os.path.abspath(__file__)).parent.parent) + os.sep
 
 
 def watch_freshness(model: Model, data: Data, raise_on_stale: bool = False) -> Watch:
@@ -73,7 +74,10 @@ class Watch:
     def __str__(self) -> str:
         stale = sum(read.count for read in self.stale_reads)
         head = f"{stale} of {self.reads} reads were stale"
-        cells = [(r.name, r.place, str(r.count), r.of, told(r.gaps)) for r in self.stale_reads]
+        cells = [
+            (r.name, r.place, str(r.count), r.of, told(r.gaps) or "not to be told")
+            for r in self.stale_reads
+        ]
         headers = ("array", "read at", "times", "of", "worst")
         return "\n".join([head, *(table(headers, cells) if cells else ())])
 
@@ -285,7 +289,7 @@ def _worst(one: tuple[Gap, ...], two: tuple[Gap, ...]) -> tuple[Gap, ...]:
 def _place() -> str:
     """File and line of the program that reads."""
     frame: Any = sys._getframe(1)
-    while frame is not None and frame.f_code.co_filename.startswith(_PACKAGE):
+    while frame is not None and os.path.abspath(frame.f_code.co_filename).startswith(_PACKAGE):
         frame = frame.f_back
     if frame is None:
         return "?"
