@@ -15,6 +15,8 @@ import numpy as np
 import statemachine as sm
 from benchmarks.interleave import Ratio, interleaved
 from statemachine import __version__
+from statemachine.experiments._common import silent
+from statemachine.traces import recorder
 
 STEPS = 500
 
@@ -98,6 +100,27 @@ def kinematics(name: str, rounds: int) -> list[Ratio]:
     return interleaved(
         raw,
         {f"batch of poses by Pinocchio, {name}": lambda: witness.poses(poses, "gripperframe")},
+        rounds,
+    )
+
+
+def recording(name: str, rounds: int) -> list[Ratio]:
+    """A recorded run against a bare loop with the same controller."""
+    model = sm.load(name)
+    bare, watched = sm.make_data(model), sm.make_data(model)
+    target = np.array(_FLOOR)
+
+    def controller(_time: float, _data: sm.Data) -> np.ndarray:
+        return target
+
+    def loop() -> None:
+        for _ in range(STEPS):
+            bare.ctrl[:] = controller(bare.time, bare)
+            sm.step(model, bare)
+
+    return interleaved(
+        loop,
+        {f"recorded, {name}": lambda: recorder._run(model, watched, controller, STEPS, silent)},
         rounds,
     )
 
@@ -224,6 +247,7 @@ BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None]] = [
     (emulation, "so101/scene", 1.8),
     (freshness, "so101", 1.02),
     (reading, "so101", None),
+    (recording, "so101", 1.10),
 ]
 
 
