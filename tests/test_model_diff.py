@@ -607,3 +607,88 @@ def test_frames_that_were_given(pair: Pair) -> None:
 def test_an_engine_that_nothing_reads() -> None:
     with pytest.raises(UnknownNameError, match="no backend named 'newton'"):
         read("so101", "newton")
+
+
+PENDULUM = """<mujoco><compiler angle="radian" autolimits="true"/><option {option}/><worldbody>
+  <body name="a"><joint name="j" type="{kind}" axis="0 1 0" {joint}/>
+  <inertial pos="0.5 0 0" mass="2" diaginertia="{inertia}"/>
+  <geom name="g" size="0.1" mass="0" {geom}/></body></worldbody>
+  <actuator><{drive} joint="j" {gains}/></actuator></mujoco>"""
+PLAIN = {
+    "option": "",
+    "kind": "hinge",
+    "joint": "",
+    "inertia": "0.1 0.1 0.1",
+    "geom": "",
+    "drive": "position",
+    "gains": 'kp="50" kv="1"',
+}
+
+
+def _pendula(folder: Path, **changes: str) -> list[Difference]:
+    for name, each in (("one", {}), ("two", changes)):
+        (folder / f"{name}.xml").write_text(PENDULUM.format(**{**PLAIN, **each}))
+    return _differ(compare(folder / "one.xml", folder / "two.xml"))
+
+
+@pytest.mark.parametrize(
+    ("change", "subject", "figure", "one", "two", "size"),
+    [
+        ({"option": 'timestep="0.004"'}, "settings", "timestep", 0.002, 0.004, 0.002),
+        ({"option": 'cone="elliptic"'}, "settings", "cone", "pyramidal", "elliptic", None),
+        ({"option": 'gravity="0 0 -1"'}, "settings", "gravity", (0, 0, -9.81), (0, 0, -1), 8.81),
+        ({"joint": 'armature="0.02"'}, "armature", "", 0, 0.02, 0.02),
+        ({"joint": 'stiffness="3"'}, "spring", "stiffness", 0, 3, 3),
+        ({"joint": 'range="-1 1"'}, "limits", "range", "none", (-1, 1), None),
+        ({"geom": 'friction="0.5"'}, "contact", "friction", (1, 0.005, 0.0001), None, 0.5),
+        ({"geom": 'condim="6"'}, "contact", "condim", (3,), (6,), 3),
+        ({"gains": 'kp="60" kv="1"'}, "drive", "kp", 50, 60, 10),
+        ({"gains": 'kp="50" kv="3"'}, "drive", "kv", 1, 3, 2),
+        ({"gains": 'kp="50" kv="1" ctrlrange="-1 1"'}, "drive", "ctrlrange", "none", (-1, 1), None),
+        ({"drive": "motor", "gains": ""}, "drive", "drive", "position", "motor", None),
+        ({"kind": "slide"}, "places", "kind", "hinge", "slide", None),
+    ],
+)
+def test_each_difference_between_two_mjcf(
+    tmp_path: Path,
+    change: dict[str, str],
+    subject: str,
+    figure: str,
+    one: object,
+    two: object,
+    size: float | None,
+) -> None:
+    (found,) = _pendula(tmp_path, **change)
+    assert (found.subject, found.figure) == (subject, figure)
+    assert found.one == pytest.approx(one) if not isinstance(one, str) else found.one == one
+    if two is not None:
+        assert found.two == pytest.approx(two) if not isinstance(two, str) else found.two == two
+    assert found.size == (None if size is None else pytest.approx(size))
+
+
+def test_what_a_difference_does_is_a_closed_form(tmp_path: Path) -> None:
+    """A mass of 2 kg at 0.5 m, 0.1 kg m² about itself: M = 0.6 kg m², load 9.81 N·m."""
+    (found,) = _pendula(tmp_path, joint='armature="0.4"')
+    assert found.share == pytest.approx(0.4 / 1.0)
+    assert found.effect == "40.0% of M_ii"
+    (found,) = _pendula(tmp_path, joint='damping="3"')
+    assert found.effect == "never / 200 ms"
+    (found,) = _pendula(tmp_path, gains='kp="100" kv="1"')
+    sags = [math.degrees(9.81 / kp) for kp in (50, 100)]
+    assert found.effect == f"sags {sags[0]:.2g}° / sags {sags[1]:.2g}°"
+    (found,) = _pendula(tmp_path, gains='kp="50" kv="5"')
+    ratios = [kv / (2 * math.sqrt(50 * 0.6)) for kv in (1, 5)]
+    assert found.effect == f"damping ratio {ratios[0]:.2g} / damping ratio {ratios[1]:.2g}"
+    (found,) = _pendula(tmp_path, inertia="0.1 0.16 0.1")  # about the axis of the joint
+    assert found.share == pytest.approx(0.06 / 0.66)
+    assert found.effect == "9.09% of M_ii"
+    (found,) = _pendula(tmp_path, inertia="0.16 0.1 0.1")  # about another: the joint feels nothing
+    assert found.share == pytest.approx(0.0, abs=1e-12)
+
+
+def test_an_effort_of_a_servo_is_what_it_can_exert(tmp_path: Path) -> None:
+    limited = 'kp="50" kv="1" forcerange="-4 4" gear="2"'
+    found = {d.figure: d for d in _pendula(tmp_path, gains=limited)}
+    assert (found[""].one, found[""].two) == ("unlimited", 8.0)
+    assert found["forcerange"].two == (-4.0, 4.0)
+    assert found["gear"].size == 1.0
