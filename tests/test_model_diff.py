@@ -355,6 +355,26 @@ def test_joints_of_other_names(pair: Pair, tmp_path: Path) -> None:
         compare(two, one, rename={"hnad": "h"})
 
 
+def test_joints_that_may_be_one_are_suggested(pair: Pair) -> None:
+    one, two = pair({"roll_axis": "0 1 0"})
+    text = one.read_text().replace('"wrist_roll"', '"roll"').replace('"hand"', '"palm"')
+    one.write_text(text)
+    result = compare(one, two)
+    assert any("--rename roll=wrist_roll takes them for one" in note for note in result.found.notes)
+    assert {d.subject for d in _differ(result)} >= {"structure"}
+    (found,) = _differ(compare(one, two, rename={"roll": "wrist_roll"}))
+    assert (found.subject, found.figure) == ("places", "axis")
+    assert found.size == pytest.approx(math.pi / 2)
+
+
+def test_the_order_of_the_two_is_only_an_order(pair: Pair) -> None:
+    one, two = pair({"roll_high": 2.841, "effort": 10.0}, {"armature": 0.028, "kp": 50.0})
+    there, back = _differ(compare(one, two)), _differ(compare(two, one))
+    assert sorted((d.subject, d.where, d.figure, str(d.one), str(d.two)) for d in there) == sorted(
+        (d.subject, d.where, d.figure, str(d.two), str(d.one)) for d in back
+    )
+
+
 def test_parts_of_one_only(tmp_path: Path) -> None:
     result = compare("so101/scene_box", "so101")
     said = {(d.subject, d.where): (d.one, d.two) for d in _differ(result)}

@@ -5,8 +5,10 @@
 - `description`: a robot as frozen records, in one set of conventions
 - `from_urdf`, `from_mjcf`, `from_bullet`: one reader each
 - `tree`: rigid groups, composite inertia, M_ii, poses
-- `match`: which joint is which
-- `diff` (`_joints`, `_solids`) with `ledger`: every difference with its size
+- `match`: which joint is which, and how the frames of links lie
+- `diff`: every difference with its size, entered into a `ledger`; by subject in `_places`,
+  `_joints`, `_solids`, `_shapes`, `_settings`
+- `engines`: what engines do of themselves
 """
 
 from __future__ import annotations

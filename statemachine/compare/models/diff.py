@@ -128,6 +128,7 @@ def _structure(book: Ledger, one: Tree, two: Tree, found: Matching, notes: list[
             name = joint.name if joint else group.name
             sides = (name, "nothing") if k == 0 else ("nothing", name)
             book.differ("structure", group.name, kind, sides[0], sides[1], effect=mass)
+    _suggest(found, notes)
     for pair in found.pairs:
         a, b = pair.one, pair.two
         if pair.moved:
@@ -158,6 +159,21 @@ def _structure(book: Ledger, one: Tree, two: Tree, found: Matching, notes: list[
     ]
     if names:
         notes.append("links go by other names: " + ", ".join(f"{a} is {b}" for a, b in names))
+
+
+def _suggest(found: Matching, notes: list[str]) -> None:
+    """Joints that may be one: of one kind, each the only one left on the same part."""
+    for a in found.only_one:
+        above = found.of(a.parent)
+        ours = [g for g in found.only_one if g.parent == a.parent]
+        theirs = [b for b in found.only_two if above and b.parent == above.two.number]
+        if len(ours) == len(theirs) == 1 and a.joint and theirs[0].joint:
+            one, two = a.joint, theirs[0].joint
+            if one.kind == two.kind:
+                notes.append(
+                    f"joints {one.name!r} of A and {two.name!r} of B hang on the same part, by "
+                    f"other axes: --rename {one.name}={two.name} takes them for one"
+                )
 
 
 def _is_world(tree: Tree, name: str) -> bool:

@@ -6,7 +6,6 @@ MuJoCo can be described from here too, to see what the import kept.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -14,14 +13,13 @@ import numpy as np
 from ...engines import require
 from ...records import Array
 from ...rotations import matrix_from_quat
+from . import _mjcf_drives as drives
 from .description import (
-    Actuator,
     Frame,
     Inertial,
     Joint,
     Link,
     Placement,
-    Range,
     Robot,
     Setting,
     Shape,
@@ -64,7 +62,7 @@ def read(raw: Any, name: str, reader: str, form: str) -> Robot:
     for body in range(raw.nbody):
         links += _links(mujoco, raw, body, names[body], bottom)
         bottom[body] = names[body]
-    actuators = tuple(_actuator(mujoco, raw, i) for i in range(raw.nu))
+    actuators = tuple(drives.actuator(mujoco, raw, i) for i in range(raw.nu))
     empty = _empty(mujoco)
     return Robot(
         name=name,
@@ -139,10 +137,6 @@ def _inertial(raw: Any, body: int) -> Inertial | None:
     return Inertial(float(raw.body_mass[body]), np.array(raw.body_ipos[body]), tensor)
 
 
-def _range(values: Array, limited: Any) -> Range | None:
-    return (float(values[0]), float(values[1])) if limited else None
-
-
 def _joint(raw: Any, joint: int, body: str) -> Joint:
     dof, kind = int(raw.jnt_dofadr[joint]), _JOINTS[int(raw.jnt_type[joint])]
     spring = int(raw.jnt_qposadr[joint])
@@ -152,9 +146,9 @@ def _joint(raw: Any, joint: int, body: str) -> Joint:
         kind=kind,
         axis=np.array(raw.jnt_axis[joint]),
         anchor=np.array(raw.jnt_pos[joint]),
-        limits=_range(raw.jnt_range[joint], raw.jnt_limited[joint]),
+        limits=drives.limited(raw.jnt_range[joint], raw.jnt_limited[joint]),
         velocity=None,
-        effort=_effort(raw, joint) if scalar else None,
+        effort=drives.effort(raw, joint) if scalar else None,
         armature=float(raw.dof_armature[dof]),
         damping=float(raw.dof_damping[dof]),
         friction=float(raw.dof_frictionloss[dof]),
@@ -162,32 +156,6 @@ def _joint(raw: Any, joint: int, body: str) -> Joint:
         rest=float(raw.qpos_spring[spring]) if scalar else None,
         follows=_follows(raw, joint),
     )
-
-
-def _effort(raw: Any, joint: int) -> float | None:
-    """The largest force of what drives a joint; None where nothing does."""
-    drives = [
-        i
-        for i in range(raw.nu)
-        if raw.actuator_trntype[i] in (0, 1) and raw.actuator_trnid[i, 0] == joint
-    ]
-    most = sum(_most(raw, i) * abs(float(raw.actuator_gear[i, 0])) for i in drives)
-    if raw.jnt_actfrclimited[joint]:
-        bound = float(np.abs(raw.jnt_actfrcrange[joint]).max())
-        return min(most, bound) if drives else bound
-    return most if drives else None
-
-
-def _most(raw: Any, i: int) -> float:
-    """The largest force of an actuator itself."""
-    if raw.actuator_forcelimited[i]:
-        return float(np.abs(raw.actuator_forcerange[i]).max())
-    constant = not raw.actuator_biastype[i] and not raw.actuator_gaintype[i]
-    if constant and raw.actuator_ctrllimited[i]:
-        return abs(float(raw.actuator_gainprm[i, 0])) * float(
-            np.abs(raw.actuator_ctrlrange[i]).max()
-        )
-    return math.inf
 
 
 def _follows(raw: Any, joint: int) -> tuple[str, float, float] | None:
@@ -198,34 +166,6 @@ def _follows(raw: Any, joint: int) -> tuple[str, float, float] | None:
             if raw.eq_active0[i] and not any(rest):
                 return raw.joint(int(raw.eq_obj2id[i])).name, factor, offset
     return None
-
-
-def _actuator(mujoco: Any, raw: Any, i: int) -> Actuator:
-    gain, bias = raw.actuator_gainprm[i], raw.actuator_biasprm[i]
-    fixed = raw.actuator_gaintype[i] == int(mujoco.mjtGain.mjGAIN_FIXED)
-    affine = raw.actuator_biastype[i] == int(mujoco.mjtBias.mjBIAS_AFFINE)
-    plain = raw.actuator_dyntype[i] == int(mujoco.mjtDyn.mjDYN_NONE) and fixed
-    kind = "general"
-    if plain and not raw.actuator_biastype[i]:
-        kind = "motor"
-    elif plain and affine and not bias[0]:
-        if bias[1] == -gain[0]:
-            kind = "position"
-        elif not bias[1] and bias[2] == -gain[0]:
-            kind = "velocity"
-    on_joint = raw.actuator_trntype[i] in (0, 1)
-    position = kind == "position"
-    return Actuator(
-        name=raw.actuator(i).name or f"actuator {i}",
-        joint=raw.joint(int(raw.actuator_trnid[i, 0])).name if on_joint else "",
-        kind=kind,
-        kp=float(gain[0]) if position else None,
-        kv=float(-bias[2]) if position else None,
-        gain=None if position else float(gain[0]),
-        gear=float(raw.actuator_gear[i, 0]),
-        forces=_range(raw.actuator_forcerange[i], raw.actuator_forcelimited[i]),
-        controls=_range(raw.actuator_ctrlrange[i], raw.actuator_ctrllimited[i]),
-    )
 
 
 def _shapes(mujoco: Any, raw: Any, body: int) -> tuple[Shape, ...]:
@@ -306,29 +246,10 @@ def _notes(raw: Any) -> list[str]:
     for name in ("dof_dampingpoly", "jnt_stiffnesspoly"):
         if np.any(getattr(raw, name, 0)):
             notes.append("it has damping or springs that are not linear, which are not compared")
-    notes += [text for i in range(raw.nu) if (text := _beyond(raw, i))]
+    notes += [text for i in range(raw.nu) if (text := drives.beyond(raw, i))]
     if np.any(raw.body_gravcomp):
         notes.append(
             f"it frees {np.count_nonzero(raw.body_gravcomp)} bodies of their weight (gravcomp), "
             "which is not compared"
         )
     return notes
-
-
-def _beyond(raw: Any, i: int) -> str:
-    """A servo that may be commanded to where its joint cannot go."""
-    joint = int(raw.actuator_trnid[i, 0])
-    servo = (
-        raw.actuator_trntype[i] == 0 and raw.actuator_biasprm[i, 1] == -raw.actuator_gainprm[i, 0]
-    )
-    turns = servo and raw.actuator_biasprm[i, 1] and _JOINTS[raw.jnt_type[joint]] == "hinge"
-    if not turns or not raw.jnt_limited[joint] or not raw.actuator_ctrllimited[i]:
-        return ""
-    (low, high), (least, most) = raw.jnt_range[joint], raw.actuator_ctrlrange[i]
-    passed = max(low - least, most - high)
-    if raw.actuator_gear[i, 0] != 1 or passed <= 1e-5 * (high - low):
-        return ""
-    return (
-        f"the ctrlrange of {raw.actuator(i).name!r} passes the range of its joint by "
-        f"{math.degrees(passed):.3g}°"
-    )

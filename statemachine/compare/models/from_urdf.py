@@ -7,7 +7,6 @@ on Windows; both refuse a file for one missing mesh. The format is small, so its
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -16,6 +15,7 @@ import numpy as np
 
 from ...errors import ModelError
 from ...records import Array
+from ._urdf_numbers import number, numbers, origin
 from .description import HERE, Inertial, Joint, Link, Placement, Robot, Shape
 from .meshes import read_mesh, volume_of
 
@@ -124,7 +124,7 @@ class _Reader:
     def _link(self, name: str, element: Element, parent: str, joint: Element | None) -> Link:
         place, moves = HERE, None
         if joint is not None:
-            place, moves = _origin(joint, f"joint {_name(joint)!r}"), _joint(joint)
+            place, moves = origin(joint, f"joint {_name(joint)!r}"), _joint(joint)
         shapes = [self._shape(each, name) for each in element.findall("collision")]
         friction = self._friction(element, name)
         if friction is not None:
@@ -141,7 +141,7 @@ class _Reader:
         if found[0] is None:
             return None
         return tuple(
-            0.0 if each is None else _number(each, "value", f"link {name!r}") for each in found
+            0.0 if each is None else number(each, "value", f"link {name!r}") for each in found
         )
 
     def _shape(self, element: Element, link: str) -> Shape:
@@ -150,15 +150,15 @@ class _Reader:
         solid = None if geometry is None else next(iter(geometry), None)
         if solid is None:
             raise ModelError(f"{where} has no geometry")
-        place, name = _origin(element, where), element.get("name", "")
+        place, name = origin(element, where), element.get("name", "")
         if solid.tag == "mesh":
             return self._mesh(solid, place, name, link, where)
         if solid.tag == "box":
-            size = tuple(edge / 2 for edge in _numbers(solid, "size", 3, where))
+            size = tuple(edge / 2 for edge in numbers(solid, "size", 3, where))
         elif solid.tag == "sphere":
-            size = (_number(solid, "radius", where),)
+            size = (number(solid, "radius", where),)
         elif solid.tag in ("cylinder", "capsule"):
-            size = (_number(solid, "radius", where), _number(solid, "length", where) / 2)
+            size = (number(solid, "radius", where), number(solid, "length", where) / 2)
         else:
             self.notes.append(f"{where} is a <{solid.tag}>, which is not known here")
             return Shape(solid.tag, place, name=name)
@@ -168,7 +168,7 @@ class _Reader:
 
     def _mesh(self, solid: Element, place: Placement, name: str, link: str, where: str) -> Shape:
         file = solid.get("filename", "")
-        scale = tuple(_numbers(solid, "scale", 3, where, (1.0, 1.0, 1.0)))
+        scale = tuple(numbers(solid, "scale", 3, where, (1.0, 1.0, 1.0)))
         if (file, scale) not in self._scaled:
             self._scaled[file, scale] = read_mesh(file, self.path.parent)
         points, trouble = self._scaled[file, scale]
@@ -229,7 +229,7 @@ def _joint(element: Element) -> Joint | None:
     axis_element = element.find("axis")
     axis = np.array([1.0, 0.0, 0.0])  # what the format takes where none is given
     if axis_element is not None:
-        axis = _numbers(axis_element, "xyz", 3, where, (1.0, 0.0, 0.0))
+        axis = numbers(axis_element, "xyz", 3, where, (1.0, 0.0, 0.0))
     length = float(np.linalg.norm(axis))
     if length < 1e-9 and kind != "floating":
         raise ModelError(f"the axis of {where} is zero")
@@ -238,7 +238,7 @@ def _joint(element: Element) -> Joint | None:
     def of(part: Element | None, attribute: str, default: float | None = None) -> float | None:
         if part is None or part.get(attribute) is None:
             return default if part is not None else None
-        return _number(part, attribute, where)
+        return number(part, attribute, where)
 
     limits = None
     if kind in ("revolute", "prismatic"):
@@ -274,7 +274,7 @@ def _inertial(link: Element, name: str) -> Inertial | None:
     mass_element, inertia = element.find("mass"), element.find("inertia")
     if mass_element is None:
         raise ModelError(f"{where} has no <mass>")
-    mass = _number(mass_element, "value", where)
+    mass = number(mass_element, "value", where)
     if mass < 0:
         raise ModelError(f"{where} gives a mass of {mass} kg")
     tensor = np.zeros((3, 3))
@@ -287,57 +287,6 @@ def _inertial(link: Element, name: str) -> Inertial | None:
             (1, 2, "yz"),
             (2, 2, "zz"),
         ):
-            tensor[i, j] = tensor[j, i] = _number(inertia, f"i{word}", where)
-    place = _origin(element, where)
+            tensor[i, j] = tensor[j, i] = number(inertia, f"i{word}", where)
+    place = origin(element, where)
     return Inertial(mass, place.pos, place.mat @ tensor @ place.mat.T)
-
-
-def _origin(element: Element, where: str) -> Placement:
-    origin = element.find("origin")
-    if origin is None:
-        return HERE
-    pos = _numbers(origin, "xyz", 3, where, (0.0, 0.0, 0.0))
-    roll, pitch, yaw = _numbers(origin, "rpy", 3, where, (0.0, 0.0, 0.0))
-    return Placement(pos, matrix_from_rpy(roll, pitch, yaw))
-
-
-def matrix_from_rpy(roll: float, pitch: float, yaw: float) -> Array:
-    """Rz(yaw)·Ry(pitch)·Rx(roll), as the format defines its rpy."""
-    (sr, sp, sy), (cr, cp, cy) = (
-        [f(angle) for angle in (roll, pitch, yaw)] for f in (math.sin, math.cos)
-    )
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
-
-
-def _number(element: Element, attribute: str, where: str) -> float:
-    return float(_numbers(element, attribute, 1, where)[0])
-
-
-def _numbers(
-    element: Element,
-    attribute: str,
-    count: int,
-    where: str,
-    default: tuple[float, ...] | None = None,
-) -> Array:
-    text = element.get(attribute)
-    if text is None:
-        if default is not None:
-            return np.array(default)
-        raise ModelError(f"{where}: <{element.tag}> has no {attribute}")
-    shown = text if len(text) <= 40 else f"{text[:37]}..."
-    try:
-        values = [float(word) for word in text.split()]
-    except ValueError:
-        raise ModelError(f"{where}: {attribute}={shown!r} is no number") from None
-    if len(values) != count:
-        raise ModelError(f"{where}: {attribute}={shown!r} should be {count} numbers")
-    if not all(map(math.isfinite, values)):
-        raise ModelError(f"{where}: {attribute}={shown!r} is not finite")
-    return np.array(values)

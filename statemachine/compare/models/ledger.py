@@ -44,7 +44,7 @@ class Difference:
         one, two: The values, SI units; None where a file does not say.
         unit: Theirs.
         size: How far they are apart, in `unit`; None where that is no number.
-        share: How much it matters, from 0 to 1: of what, `diff` says with each subject.
+        share: How much it matters, from 0 to 1; of what, each comparing function says.
         effect: What it does, as far as that was computed.
         matters: Whether it makes the two descriptions differ; else it is said for the record.
     """
