@@ -43,7 +43,7 @@ def _shared(path: Path) -> Path:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    unknown = REQUIRED - set(ENGINES) - {"render", "shared"}
+    unknown = REQUIRED - set(ENGINES) - {"render", "shared", "browser"}
     if unknown:
         raise pytest.UsageError(f"STATEMACHINE_REQUIRE names no engine: {sorted(unknown)}")
 

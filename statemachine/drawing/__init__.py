@@ -1,0 +1,12 @@
+"""What a model looks like, as triangles in the frames of its bodies.
+
+Whoever draws (a viewer, a page, a picture) puts each part where its body is, with `xpos` and
+`xquat` of any backend: ids of bodies are the same on all.
+"""
+
+from __future__ import annotations
+
+from ._drawing import Drawing, Part, drawing_of
+from ._shapes import Shape
+
+__all__ = ["Drawing", "Part", "Shape", "drawing_of"]

@@ -1,0 +1,142 @@
+"""A real browser without a screen, for what is made to be looked at in one.
+
+with browser() as page:
+    page.goto(path.as_uri())
+    ...
+    page.nothing_wrong()
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+
+from .conftest import REQUIRED
+
+_NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
+_QUIET = (
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-default-apps",
+    # WebGL without a graphics card.
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+)
+# What a browser has against drawing without a graphics card is no fault of a page.
+_SLOW_CARD = ("GPU stall", "GL Driver Message", "software WebGL", "swiftshader")
+_LOCAL = ("127.0.0.1", "localhost", "::1")
+
+
+class Tab:
+    """A page, and what went on while it was open.
+
+    Attributes:
+        page: Playwright's own.
+        requests: Every address that it asked for, in order, web sockets among them; those
+            that were refused too.
+        errors: What the console called an error or a warning, what was raised and not
+            caught, and what did not load.
+    """
+
+    def __init__(self, page: Any) -> None:
+        self.page = page
+        self.requests: list[str] = []
+        self.errors: list[str] = []
+        page.on("request", lambda request: self.requests.append(request.url))
+        page.on("websocket", lambda socket: self.requests.append(socket.url))
+        page.on("pageerror", lambda error: self.errors.append(f"raised: {error}"))
+        page.on(
+            "requestfailed",
+            lambda request: self.errors.append(f"failed: {request.url} {request.failure}"),
+        )
+        page.on("console", self._note)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.page, name)
+
+    def _note(self, message: Any) -> None:
+        kind, text = message.type, message.text
+        if kind in ("error", "warning") and not any(word in text for word in _SLOW_CARD):
+            self.errors.append(f"{kind}: {text}")
+
+    @property
+    def outside(self) -> list[str]:
+        """Addresses asked for that are neither this machine's nor in the page itself."""
+        found = []
+        for url in self.requests:
+            parts = urlsplit(url)
+            inside = parts.scheme in ("data", "blob", "file", "about")
+            if not inside and parts.hostname not in _LOCAL:
+                found.append(url)
+        return found
+
+    def nothing_wrong(self) -> None:
+        """Fail if anything was asked of the network, or the console has an error."""
+        assert self.outside == []
+        assert self.errors == []
+
+
+def _absent(reason: str) -> None:
+    if "browser" in REQUIRED:
+        pytest.fail(f"STATEMACHINE_REQUIRE names browser: {reason}")
+    pytest.skip(reason)
+
+
+def _executable() -> str:
+    asked = os.environ.get("CHROMIUM")
+    found = [asked] if asked else [path for name in _NAMES if (path := shutil.which(name))]
+    if not found or not Path(found[0]).is_file():
+        _absent("no chromium here: on Debian, apt-get install chromium")
+    return found[0]
+
+
+@contextmanager
+def tabs(
+    width: int = 1280, height: int = 800, offline: bool = False, **context: Any
+) -> Iterator[Callable[[], Tab]]:
+    """A browser with a new profile; call what it gives for a new, empty tab.
+
+    Args:
+        width: Of a tab [px].
+        height: Of a tab [px].
+        offline: Whether the browser has no network at all; files still open.
+        **context: Options of Playwright's `new_context`, as `color_scheme="dark"`,
+            `java_script_enabled=False`, `reduced_motion="reduce"`.
+    """
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError as error:
+        _absent(f"{error}: pip install playwright")
+        raise
+    path = _executable()
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(
+            executable_path=path, headless=True, args=list(_QUIET)
+        )
+        try:
+            size: Any = {"width": width, "height": height}
+            one = chromium.new_context(viewport=size, offline=offline, **context)
+            yield lambda: Tab(one.new_page())
+        finally:
+            chromium.close()
+
+
+@contextmanager
+def browser(
+    width: int = 1280, height: int = 800, offline: bool = False, **context: Any
+) -> Iterator[Tab]:
+    """A browser with one tab; the arguments are those of `tabs`."""
+    with tabs(width, height, offline, **context) as new:
+        yield new()

@@ -1,0 +1,241 @@
+"""What a model looks like: closed forms for the shapes, the engine's own figures for the rest."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine import rotations
+from statemachine.drawing import Drawing, Part, Shape, _shapes, drawing_of
+
+from .conftest import need_engine
+
+ALL = """
+<mujoco>
+  <asset>
+    <mesh name="wedge" vertex="0 0 0  1 0 0  0 1 0  0 0 1  0 0 0"/>
+    <hfield name="hill" nrow="3" ncol="4" size="1 2 0.5 0.1"
+            elevation="0 0 0 0  0 1 0.5 0  0 0 0 0"/>
+    <texture name="t" type="2d" builtin="flat" rgb1="0.2 0.4 0.6" width="8" height="8"/>
+    <material name="m" texture="t" rgba="1 0.5 1 0.7"/>
+  </asset>
+  <worldbody>
+    <geom name="ground" type="plane" size="0 0 1"/>
+    <geom name="table" type="plane" size="2 3 1" pos="0 0 1"/>
+    <geom name="hill" type="hfield" hfield="hill"/>
+    <geom name="hidden" type="box" size="1 1 1" group="3"/>
+    <geom name="glass" type="box" size="1 1 1" rgba="1 1 1 0"/>
+    <body name="all" pos="1 2 3" quat="1 1 0 0">
+      <freejoint/>
+      <geom name="ball" type="sphere" size="0.3" pos="1 0 0" rgba="0.1 0.2 0.3 0.4"/>
+      <geom name="egg" type="ellipsoid" size="0.1 0.2 0.3" material="m"/>
+      <geom name="pill" type="capsule" size="0.1" fromto="0 0 0 0 1 0"/>
+      <geom name="can" type="cylinder" size="0.1 0.4" euler="0 90 0"/>
+      <geom name="brick" type="box" size="0.1 0.2 0.3" euler="0 0 90"/>
+      <geom name="wedge" type="mesh" mesh="wedge" pos="0.5 0 0"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def _volume(shape: Shape | Part) -> float:
+    """By the divergence theorem: positive if every normal points outward."""
+    a, b, c = (shape.vertices[shape.faces[:, k]].astype(float) for k in range(3))
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
+
+
+def _area(shape: Shape | Part) -> float:
+    a, b, c = (shape.vertices[shape.faces[:, k]].astype(float) for k in range(3))
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+def _is_closed(shape: Shape | Part) -> bool:
+    """Every edge is walked once each way: no hole, and all faces wound alike."""
+    f = shape.faces
+    edges = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
+    there, back = {tuple(e) for e in edges.tolist()}, {tuple(e[::-1]) for e in edges.tolist()}
+    return there == back and len(there) == len(edges)
+
+
+@pytest.mark.parametrize(
+    ("make", "volume", "area", "half"),
+    [
+        (
+            lambda n: _shapes.ellipsoid([0.3] * 3, n),
+            4 / 3 * math.pi * 0.3**3,
+            4 * math.pi * 0.3**2,
+            (0.3, 0.3, 0.3),
+        ),
+        (
+            lambda n: _shapes.ellipsoid([0.1, 0.2, 0.3], n),
+            4 / 3 * math.pi * 0.1 * 0.2 * 0.3,
+            None,
+            (0.1, 0.2, 0.3),
+        ),
+        (
+            lambda n: _shapes.cylinder(0.2, 0.5, n),
+            math.pi * 0.2**2,
+            2 * math.pi * 0.2 * (1 + 0.2),
+            (0.2, 0.2, 0.5),
+        ),
+        (
+            lambda n: _shapes.capsule(0.2, 0.5, n),
+            math.pi * 0.2**2 + 4 / 3 * math.pi * 0.2**3,
+            2 * math.pi * 0.2 + 4 * math.pi * 0.2**2,
+            (0.2, 0.2, 0.7),
+        ),
+    ],
+    ids=["sphere", "ellipsoid", "cylinder", "capsule"],
+)
+def test_round_shapes_approach_their_closed_forms(make, volume, area, half) -> None:
+    """Inscribed, so too small, and with twice the corners by a quarter as much."""
+    coarse, fine = make(32), make(64)
+    errors = [volume - _volume(shape) for shape in (coarse, fine)]
+    assert 0 < errors[0] < 0.03 * volume
+    assert errors[0] / errors[1] == pytest.approx(4, rel=0.03)
+    if area is not None:
+        missing = [area - _area(shape) for shape in (coarse, fine)]
+        assert 0 < missing[0] < 0.02 * area
+        assert missing[0] / missing[1] == pytest.approx(4, rel=0.03)
+    for shape in (coarse, fine):
+        assert _is_closed(shape)
+        np.testing.assert_allclose(shape.vertices.max(axis=0), half, rtol=1e-6)
+        np.testing.assert_allclose(shape.vertices.min(axis=0), -np.array(half), rtol=1e-6)
+
+
+def test_flat_shapes_are_exact() -> None:
+    box = _shapes.box([0.1, 0.2, 0.3])
+    assert _is_closed(box)
+    assert _volume(box) == pytest.approx(8 * 0.1 * 0.2 * 0.3)
+    assert _area(box) == pytest.approx(8 * (0.1 * 0.2 + 0.2 * 0.3 + 0.3 * 0.1))
+    rectangle = _shapes.rectangle(2, 3)
+    assert _area(rectangle) == pytest.approx(24)
+    a, b, c = rectangle.vertices[rectangle.faces[0]]
+    assert np.cross(b - a, c - a)[2] > 0
+    tilted = _shapes.terrain([[0, 1, 2], [0, 1, 2]], 1, 1)  # a plane that rises 1 m a metre
+    assert _area(tilted) == pytest.approx(4 * math.sqrt(2))
+    a, b, c = tilted.vertices[tilted.faces[-1]]
+    assert np.cross(b - a, c - a)[2] > 0
+
+
+def test_welding_keeps_the_surface_and_drops_what_is_there_twice() -> None:
+    sphere = _shapes.ellipsoid([1, 1, 1])
+    soup = sphere.vertices[sphere.faces].reshape(-1, 3)
+    loose = np.arange(len(soup)).reshape(-1, 3)
+    sliver = [(0, 0, 0)]  # of no area
+    welded = _shapes.welded(np.concatenate([soup, [(9, 9, 9)]]), np.concatenate([loose, sliver]))
+    assert len(welded.vertices) == len(sphere.vertices)
+    assert len(welded.faces) == len(sphere.faces)
+    assert _volume(welded) == pytest.approx(_volume(sphere))
+    assert _is_closed(welded)
+    with pytest.raises(ValueError):
+        welded.vertices[0] = 0
+
+
+@pytest.fixture(scope="module")
+def everything(tmp_path_factory: pytest.TempPathFactory) -> tuple[sm.Model, Drawing]:
+    file = tmp_path_factory.mktemp("all") / "all.xml"
+    file.write_text(ALL)
+    model = sm.load(file)
+    return model, drawing_of(model)
+
+
+def test_every_kind_of_geom_is_drawn_and_the_hidden_are_not(everything) -> None:
+    model, drawing = everything
+    kinds = {part.name: part.kind for part in drawing.parts}
+    assert kinds == {
+        "ground": "plane",
+        "table": "plane",
+        "hill": "hfield",
+        "ball": "sphere",
+        "egg": "ellipsoid",
+        "pill": "capsule",
+        "can": "cylinder",
+        "brick": "box",
+        "wedge": "mesh",
+    }
+    parts = {part.name: part for part in drawing.parts}
+    assert parts["ground"].endless
+    assert not parts["table"].endless
+    assert np.ptp(parts["table"].vertices[:, :2], axis=0).tolist() == [4, 6]
+    assert parts["hill"].vertices[:, 2].max() == pytest.approx(0.5)
+    assert parts["ball"].rgba == pytest.approx((0.1, 0.2, 0.3, 0.4))
+    assert parts["egg"].rgba == pytest.approx((0.2, 0.2, 0.6, 0.7), abs=0.002)  # texture × rgba
+    assert drawing.left_out == ()
+    assert all(part.geom == model.geom_id(part.name) for part in drawing.parts)
+    assert {part.body for part in drawing.parts} == set(drawing.bodies) == {0, 1}
+    assert drawing.vertices == sum(len(part.vertices) for part in drawing.parts)
+    assert drawing.triangles == sum(len(part.faces) for part in drawing.parts)
+
+
+def test_parts_are_where_the_engine_has_them(everything) -> None:
+    """MuJoCo's own boxes around its geoms, against ours, in the frame of the world."""
+    model, drawing = everything
+    data = mujoco.MjData(model.raw)
+    mujoco.mj_forward(model.raw, data)
+    compared = 0
+    for part in drawing.parts:
+        if part.body == 0:
+            continue
+        turn = rotations.matrix_from_quat(data.xquat[part.body])
+        points = part.vertices @ turn.T + data.xpos[part.body]
+        own = (points - data.geom_xpos[part.geom]) @ data.geom_xmat[part.geom].reshape(3, 3)
+        centre, half = model.raw.geom_aabb[part.geom, :3], model.raw.geom_aabb[part.geom, 3:]
+        np.testing.assert_allclose(own.max(axis=0), centre + half, atol=2e-6)
+        np.testing.assert_allclose(own.min(axis=0), centre - half, atol=2e-6)
+        compared += 1
+    assert compared == 6
+    wedge = next(part for part in drawing.parts if part.kind == "mesh")
+    assert _volume(wedge) == pytest.approx(1 / 6, rel=1e-5)
+    np.testing.assert_allclose(wedge.vertices.min(axis=0), (0.5, 0, 0), atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["so101", "so101/scene_box"])
+def test_the_whole_arm_is_there(name: str) -> None:
+    model = sm.load(name)
+    drawing = drawing_of(model)
+    raw = model.raw
+    expected = {g for g in range(raw.ngeom) if raw.geom_group[g] < 3}
+    assert {part.geom for part in drawing.parts} == expected
+    assert sum(part.kind == "mesh" for part in drawing.parts) == raw.nmesh == 22
+    assert set(range(1, 9)) <= set(drawing.bodies)
+    # Closed, outward: its parts overlap, so the sum is above the solid's volume.
+    assert all(_volume(part) > 0 and _is_closed(part) for part in drawing.parts if part.body)
+    assert {part.rgba for part in drawing.parts} >= {(1, 0.77, 0.12, 1), (0.08, 0.08, 0.09, 1)}
+    assert drawing.triangles < 10_000  # a page carries it
+
+
+def test_a_model_of_another_engine_has_the_same_drawing() -> None:
+    need_engine("pybullet")
+    one = drawing_of(sm.load("so101/scene_box"))
+    two = drawing_of(sm.load("so101/scene_box", backend="pybullet"))
+    assert len(one.parts) == len(two.parts)
+    for a, b in zip(one.parts, two.parts, strict=True):
+        assert (a.name, a.body, a.geom, a.rgba) == (b.name, b.body, b.geom, b.rgba)
+        np.testing.assert_array_equal(a.vertices, b.vertices)
+
+
+def test_what_only_touches_is_drawn_where_nothing_else_is(tmp_path: Path) -> None:
+    file = tmp_path / "m.xml"
+    file.write_text(
+        "<mujoco><worldbody><geom type='plane' size='1 1 1'/><body><freejoint/>"
+        "<geom type='box' size='1 1 1' group='3'/></body></worldbody></mujoco>"
+    )
+    assert [part.kind for part in drawing_of(sm.load(file)).parts] == ["plane", "box"]
+
+
+def test_what_is_not_drawn_is_said(tmp_path: Path) -> None:
+    file = tmp_path / "m.xml"
+    file.write_text(
+        "<mujoco><worldbody><geom type='sphere' size='1'/>"
+        "<flexcomp name='f' type='grid' count='3 3 1' spacing='1 1 1' dim='2' "
+        "mass='1' radius='.1' rigid='true'/>"
+        "</worldbody></mujoco>"
+    )
+    assert drawing_of(sm.load(file)).left_out == ("flex: 1",)
