@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-import numpy as np
-
-from ...errors import BadInputError, DivergedError, EngineError, StateMachineError, unknown_name
+from ...errors import BadInputError, DivergedError, EngineError, unknown_name
 from ...experiments._common import (
     Progress,
     Provenance,
@@ -29,6 +27,8 @@ _NOTHING = 1e-6  # of the first gap: what is less is left alone
 # it stays in the ladder only if it takes away this part of what was left, and if one still
 # moves by this part of what it moves as it comes.
 _MOST, _MOVES = 0.5, 0.1
+# Rounding, after it has grown for some seconds: less than this is no gap to be explained.
+_ROUNDING = {"rad": 1e-8, "m": 1e-9}
 Way = Literal["parity", "off", "one side", "alike", "none"]
 
 
@@ -93,7 +93,7 @@ class Attribution:
         one, two: The sides; two is brought to one.
         quantity: What the gap is measured in; unit: of it.
         first: The gap in each quantity, as they come.
-        alone: Each factor by itself.
+        alone: Each factor by itself; empty where the gap is rounding.
         ladder: All of them, one on top of the other; what is left telescopes to `left`.
         left: What stays unexplained; None if nothing could be run.
         touch: The first contact of the robot; None without one, or with one from the start.
@@ -125,6 +125,13 @@ class Attribution:
     def gap(self) -> float:
         """The gap as they come, in `unit`."""
         return self.first[self.quantity].worst
+
+    @property
+    def settings_same(self) -> float:
+        """The gap where all settings are the same and nothing is left out."""
+        rungs = [trial for trial in self.ladder if trial.way == "parity"]
+        known = [trial.worst for trial in rungs if trial.worst is not None]
+        return known[-1] if known else self.gap
 
     @property
     def unexplained(self) -> float:
@@ -180,8 +187,9 @@ def attribute(
     first = runs.gaps({}, {})
     if not first:
         raise BadInputError(f"as they come, a side does not reach the end: {runs.ended}")
-    ladder, parity = _ladder(runs)
-    alone = _alone(runs, *parity)
+    nothing = first[runs.quantity].worst <= _ROUNDING[names[runs.quantity]]
+    ladder, parity = ((), ({}, {})) if nothing else _ladder(runs)
+    alone = () if nothing else _alone(runs, *parity)
     steps = [trial.worst for trial in ladder if trial.explains is not None]
     runs.done()
     return Attribution(
@@ -209,7 +217,7 @@ def attribute(
 
 
 def _short(label: str) -> str:
-    return label.split(" ")[0]
+    return label.split(" ", maxsplit=1)[0]
 
 
 @dataclass(frozen=True)
@@ -292,7 +300,7 @@ class _Runs:
     def moved(self, changes: Changes) -> float:
         """How far one's own motion is from what it is as it comes."""
         before, after = self._curves[0, ()], self.curves(0, changes)
-        assert before and after  # they have gaps
+        assert before is not None and after is not None  # noqa: PT018  (they have gaps)
         return self.ruler.gap(self.quantity, before, after).worst
 
     def extent(self, changes: Changes) -> float:
@@ -358,7 +366,7 @@ class _Watch:
 
 def _first(text: str) -> str:
     """The first sentence of a text."""
-    return text.split(". ")[0]
+    return text.split(". ", maxsplit=1)[0]
 
 
 def _move(runs: _Runs, factor: Factor, one: Changes, two: Changes) -> _Move:

@@ -30,7 +30,7 @@ _ALL = (
     Factor("gravity", "gravity", "none", facts=("gravity",), options=("gravity",)),
     Factor(
         "timestep",
-        "timestep, substeps",
+        "timestep",
         "4 times finer",
         facts=("timestep", "substeps"),
         options=("timestep", "substeps"),

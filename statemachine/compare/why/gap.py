@@ -21,7 +21,7 @@ class Gap:
     """How far apart two runs are in one quantity.
 
     Attributes:
-        unit: Of the distances: "°" or "mm".
+        unit: Of the distances: "rad" or "m".
         worst: The largest distance at any moment; at: when [s].
         rms: Root of the mean square over the moments.
         end: At the last moment.
@@ -75,15 +75,15 @@ class Ruler:
         self._tip = next(iter(tips), None)
         self.units = {}
         if len(self._hinges):
-            self.units["joints"] = "°"
+            self.units["joints"] = "rad"
         if len(self._slides):
-            self.units["slides"] = "mm"
+            self.units["slides"] = "m"
         if self._tip is not None:
-            self.units[self._tip_name] = "mm"
+            self.units[self._tip_name] = "m"
         for body in self._free:
-            self.units[model.body_names[body]] = "mm"
+            self.units[model.body_names[body]] = "m"
             if self._tip is not None:
-                self.units[self._in_hand(body)] = "mm"
+                self.units[self._in_hand(body)] = "m"
 
     @property
     def _tip_name(self) -> str:
@@ -101,9 +101,9 @@ class Ruler:
         qpos = _rows(time, trace.qpos, self.time, trace.header.timestep)
         found: dict[str, Array] = {}
         if len(self._hinges):
-            found["joints"] = np.degrees(qpos[:, self._hinges])
+            found["joints"] = qpos[:, self._hinges]
         if len(self._slides):
-            found["slides"] = 1e3 * qpos[:, self._slides]
+            found["slides"] = qpos[:, self._slides]
         if self._tip is None and not len(self._free):
             return Curves(found)
         try:
@@ -126,12 +126,12 @@ class Ruler:
         where = np.array(bodies)
         found = {}
         if tip is not None:
-            found[self._tip_name] = 1e3 * np.array(sites)
+            found[self._tip_name] = np.array(sites)
         for k, body in enumerate(self._free):
-            found[model.body_names[body]] = 1e3 * where[:, k]
+            found[model.body_names[body]] = where[:, k]
             if tip is not None:  # along the axes of the hand
                 apart = where[:, k] - np.array(sites)
-                found[self._in_hand(body)] = 1e3 * np.einsum("nij,ni->nj", np.array(turns), apart)
+                found[self._in_hand(body)] = np.einsum("nij,ni->nj", np.array(turns), apart)
         return found
 
     def held(self, trace: Trace, touching: frozenset[str]) -> str:

@@ -94,6 +94,8 @@ class ModelSide:
         return found
 
     def words(self, factor: Factor) -> str:
+        if self._options.get(factor.options[0] if factor.options else "", True) is False:
+            return "off"
         return _in_words(factor, self.values(factor, {}) or {})
 
     def refuses(self, factor: Factor, how: How, values: Values, changes: Changes) -> str:
@@ -158,8 +160,8 @@ class EngineSide:
 
     fresh = True
     _WORDS: Mapping[str, str] = {
-        "inertia": "of the shapes",
-        "damping": "explicit, 0.04 more",
+        "inertia": "of shapes",
+        "damping": "explicit, +0.04",
         "armature": "none",
         "frictionloss": "none",
         "limits": "hard",
@@ -189,7 +191,7 @@ class EngineSide:
             return _in_words(factor, self.values(factor, {}) or {})
         if factor.name == "servo":
             on = self._options.get("actuation", True)
-            return "position motors" if on else "motors hold still"
+            return "its motors" if on else "motors hold"
         return self._WORDS[factor.name]
 
     def refuses(self, factor: Factor, how: How, values: Values, changes: Changes) -> str:
@@ -273,7 +275,7 @@ def _in_words(factor: Factor, values: Values) -> str:
         return f"of {int(np.sum(values['jnt_limited']))} joints"
     if factor.name == "surfaces" and "geom_friction" in values:
         return f"friction {_span(np.asarray(values['geom_friction'])[:, 0])}"
-    return "as in the file"
+    return "of the file"
 
 
 def _span(values: Any) -> str:
