@@ -43,7 +43,8 @@ def page(result: Attribution, said: Sequence[str] = ()) -> Page:
 
 
 def _title(result: Attribution) -> str:
-    return f"{result.experiment}: why {_name(result.two)} is not {_name(result.one)}"
+    one, two = result.names
+    return f"{result.experiment}: why {two} is not {one}"
 
 
 def _origin(result: Attribution) -> str:
@@ -51,11 +52,6 @@ def _origin(result: Attribution) -> str:
         f"{result.one} and {result.two}, {result.seconds:g} s, "
         f"{result.runs} runs compared at {result.moments} moments"
     )
-
-
-def _name(label: str) -> str:
-    """A side's engine, without its version."""
-    return label.split(" ", maxsplit=1)[0]
 
 
 def amount(result: Attribution, value: float | None) -> str:
@@ -110,12 +106,12 @@ def _alone(result: Attribution) -> Table:
     set_back = any(trial.put_back is not None for trial in result.alone)
     rows = []
     for trial in result.alone:
-        last = amount(result, trial.put_back if set_back else trial.moved)
+        last = _figure(result, trial.put_back) if set_back else amount(result, trial.moved)
         rows.append(
             (
                 FACTORS[trial.factor].title,
                 _brought(result, trial),
-                amount(result, trial.worst),
+                _figure(result, trial.worst),
                 percent(trial.explains) + ("*" if _another(trial) else ""),
                 last,
             )
@@ -125,16 +121,25 @@ def _alone(result: Attribution) -> Table:
         "brought to",
         "gap",
         "explains",
-        "put back" if set_back else f"{_name(result.one)} moves",
+        "put back" if set_back else f"{result.names[0]} moves",
     )
     return Table(headers, rows, "One at a time: what happens to the gap", frozenset({0, 1}))
 
 
 def _brought(result: Attribution, trial: Trial) -> str:
     if trial.way == "parity":
-        had = trial.had if trial.did == f"as {_name(result.one)}" else trial.had[::-1]
+        had = trial.had if trial.did == f"as {result.names[0]}" else trial.had[::-1]
         return f"{had[1]} → {had[0]}"
     return trial.did or "–"
+
+
+def _figure(result: Attribution, value: float | None) -> str:
+    """A gap, marked where it is wider than all that the experiment moves."""
+    return amount(result, value) + ("!" if _astray(result, value) else "")
+
+
+def _astray(result: Attribution, value: float | None) -> bool:
+    return value is not None and value > result.extent
 
 
 def _another(trial: Trial) -> bool:
@@ -143,7 +148,7 @@ def _another(trial: Trial) -> bool:
 
 
 def _notes(result: Attribution) -> list[str]:
-    one, two = _name(result.one), _name(result.two)
+    one, two = result.names[0], result.names[1]
     found = []
     if any(trial.put_back is not None for trial in result.alone):
         found.append(
@@ -155,6 +160,11 @@ def _notes(result: Attribution) -> list[str]:
         found.append(
             f"* This moves {one} itself, so the gap is that of another motion. A smaller gap "
             "there is a hint, not a proof."
+        )
+    if any(_astray(result, gap) for t in result.alone for gap in (t.worst, t.put_back)):
+        found.append(
+            f"! Wider apart than {one} moves at all ({amount(result, result.extent)}): with this, "
+            f"{two} shakes itself, flies off, or lets go."
         )
     for trial in result.alone:
         if trial.note:
@@ -198,7 +208,7 @@ def _bar(value: float, longest: float) -> str:
 
 def conclusion(result: Attribution) -> list[str]:
     """What the figures say, in sentences."""
-    one, two = _name(result.one), _name(result.two)
+    one, two = result.names[0], result.names[1]
     gap, left = amount(result, result.gap), amount(result, result.left)
     counted = [trial for trial in result.ladder if trial.explains is not None]
     found = []
@@ -228,7 +238,7 @@ def conclusion(result: Attribution) -> list[str]:
         key=lambda t: -(t.put_back or 0.0),
     )
     if opened:
-        parts = [f"{FACTORS[t.factor].title} {amount(result, t.put_back)}" for t in opened]
+        parts = [f"{FACTORS[t.factor].title} {_figure(result, t.put_back)}" for t in opened]
         found.append(
             f"With all settings the same, {amount(result, same)}. As it came, alone, each of these "
             f"opens more again: {', '.join(parts)}."

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from ...errors import BadInputError, DivergedError, EngineError, unknown_name
+from ...errors import BadInputError, DivergedError, EngineError, UnsupportedError, unknown_name
 from ...experiments._common import (
     Progress,
     Provenance,
@@ -90,12 +90,13 @@ class Attribution:
 
     Attributes:
         experiment, says, seconds: What was run.
-        one, two: The sides; two is brought to one.
+        one, two: The sides; two is brought to one. names: what they are called for short.
         quantity: What the gap is measured in; unit: of it.
         first: The gap in each quantity, as they come.
         alone: Each factor by itself; empty where the gap is rounding.
         ladder: All of them, one on top of the other; what is left telescopes to `left`.
         left: What stays unexplained; None if nothing could be run.
+        extent: How far one moves from where it starts, in `unit`.
         touch: The first contact of the robot; None without one, or with one from the start.
         moments: How many moments the runs are compared at; between: whether rows had to be
             interpolated there.
@@ -108,12 +109,14 @@ class Attribution:
     seconds: float
     one: str
     two: str
+    names: tuple[str, str]
     quantity: str
     unit: str
     first: dict[str, Gap]
     alone: tuple[Trial, ...]
     ladder: tuple[Trial, ...]
     left: float
+    extent: float
     touch: Touch | None
     moments: int
     between: bool
@@ -198,26 +201,27 @@ def attribute(
         seconds=runs.seconds,
         one=sides[0].label,
         two=sides[1].label,
+        names=runs.names,
         quantity=runs.quantity,
         unit=names[runs.quantity],
         first=first,
         alone=alone,
         ladder=ladder,
         left=next((worst for worst in reversed(steps) if worst is not None), runs.first),
+        extent=runs.extent({}),
         touch=runs.touch,
         moments=len(runs.ruler.time),
         between=runs.ruler.between,
-        order=(
-            ORDER[0].format(one=_short(sides[0].label), two=_short(sides[1].label)),
-            ORDER[1],
-        ),
+        order=(ORDER[0].format(one=runs.names[0], two=runs.names[1]), ORDER[1]),
         runs=runs.count,
         provenance=runs.provenance,
     )
 
 
-def _short(label: str) -> str:
-    return label.split(" ", maxsplit=1)[0]
+def _names(one: str, two: str) -> tuple[str, str]:
+    """The engines, or which is which where they are the same."""
+    short = one.split(" ", maxsplit=1)[0], two.split(" ", maxsplit=1)[0]
+    return short if short[0] != short[1] else ("the first", "the second")
 
 
 @dataclass(frozen=True)
@@ -243,6 +247,7 @@ class _Runs:
         progress: Progress,
     ) -> None:
         self.one, self.two = sides
+        self.names = _names(self.one.label, self.two.label)
         self.seconds, self.count, self.ended = seconds, 0, ""
         self._scenario, self._seed, self._progress = scenario, seed, progress
         self._expected = 4 * len(FACTORS)
@@ -286,10 +291,10 @@ class _Runs:
                 trace = self._record(side.build(changes))
                 self._curves[key] = self.ruler.curves(trace)
                 self._why = trace.header.ended or "it left every bound"
-            except (DivergedError, EngineError) as error:
+            except (DivergedError, EngineError, UnsupportedError) as error:
                 self._curves[key], self._why = None, str(error)
             if self._curves[key] is None:
-                self.ended = f"{_short(side.label)} does not stand: {_first(self._why)}"
+                self.ended = f"{self.names[place]} does not stand: {_first(self._why)}"
         return self._curves[key]
 
     def gaps(self, one: Changes, two: Changes) -> dict[str, Gap]:
@@ -397,10 +402,10 @@ def _bring(
     shared = {name: ours[name] for name in ours if name in theirs or "as it comes" in theirs}
     refusal = runs.two.refuses(factor, "parity", shared, two)
     if not refusal:
-        return _Move("parity", two=Change("parity", shared), did=f"as {_short(runs.one.label)}")
+        return _Move("parity", two=Change("parity", shared), did=f"as {runs.names[0]}")
     shared = {name: theirs[name] for name in theirs if name in ours}
     if shared and not runs.one.refuses(factor, "parity", shared, one):
-        return _Move("parity", one=Change("parity", shared), did=f"as {_short(runs.two.label)}")
+        return _Move("parity", one=Change("parity", shared), did=f"as {runs.names[1]}")
     left_out = _leave_out(runs, factor, False)
     return left_out if left_out.way == "off" else _Move("none", note=refusal)
 
@@ -412,7 +417,7 @@ def _leave_out(runs: _Runs, factor: Factor, two_has_none: bool) -> _Move:
         refusal = runs.two.refuses(factor, "off", {}, {})
     if refusal:
         return _Move("none", note=refusal)
-    did = f"{factor.off}, {'as ' + _short(runs.two.label) if two_has_none else 'both'}"
+    did = f"{factor.off}, {'as ' + runs.names[1] if two_has_none else 'both'}"
     return _Move("off", one=off, two=None if two_has_none else off, did=did)
 
 
@@ -448,7 +453,7 @@ def _one_sided(runs: _Runs, factor: Factor) -> _Move | None:
     if "euler" not in known:
         return None
     change = Change("parity", {"integrator": "euler"})
-    return _Move("one side", one=change, did=f"Euler, {_short(runs.one.label)} only")
+    return _Move("one side", one=change, did=f"Euler, {runs.names[0]} only")
 
 
 def _with(changes: Changes, factor: Factor, change: Change | None) -> dict[str, Change]:

@@ -16,6 +16,7 @@ from .factors import FACTORS, Factor
 How = Literal["parity", "off"]
 Values = Mapping[str, Any]
 FINER = 4
+_SWITCHED = ("servo", "limits", "contact")  # `replace` can only switch these
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +92,8 @@ class ModelSide:
             value = _raw(model, name)
             if value is not None:
                 found[name] = np.array(value)
-        return found
+        on = _switched_on(model, factor)
+        return found if on is None else {**found, "on": on}
 
     def words(self, factor: Factor) -> str:
         if self._options.get(factor.options[0] if factor.options else "", True) is False:
@@ -110,15 +112,18 @@ class ModelSide:
                 return "this experiment says what it is"
             return ""
         own = self.values(factor, changes) or {}
-        raw = [name for name in values if name in factor.raw and name in own]
-        if any(np.shape(own[name]) != np.shape(values[name]) for name in (*raw, *factor.facts)):
+        shared = [name for name in values if name in own]
+        if any(np.shape(own[name]) != np.shape(values[name]) for name in shared):
             return "the two models have other numbers of it"
-        written = set(raw) if factor.raw else set()
-        replaced = set(factor.facts) if factor.options and factor.facts else set()
-        if factor.name in ("servo", "limits"):
-            replaced = set()  # replace can only switch these
-        differing = {name for name in values if name in own and not same(own[name], values[name])}
-        if differing - written - (replaced if not missing else set()):
+        settable = {name for name in factor.raw if name in own}
+        if not missing:
+            settable |= {"on"} if factor.name in _SWITCHED else set(factor.facts)
+        if factor.raw and settable >= set(
+            factor.raw
+        ):  # what a Model tells of them follows from them
+            settable |= set(factor.facts)
+        differing = {name for name in shared if not same(own[name], values[name])}
+        if not differing <= settable:
             return f"{self._base.backend} takes it from the model's file"
         return ""
 
@@ -137,9 +142,11 @@ class ModelSide:
             written = {key: value for key, value in change.values.items() if key in factor.raw}
             if any(_raw(model, key) is not None for key in written):
                 model = _written(model, written)
-            if factor.facts and name not in ("servo", "limits"):
-                own = self.values(factor, {}) or {}
-                for fact, option in zip(factor.facts, factor.options, strict=True):
+            own = self.values(factor, {}) or {}
+            if not same(own.get("on"), change.values.get("on", own.get("on"))):
+                options[factor.options[0]] = change.values["on"]
+            if name not in _SWITCHED:
+                for fact, option in zip(factor.facts, factor.options, strict=False):
                     if not same(own[fact], change.values[fact]):
                         options[option] = change.values[fact]
         options = {**self._options, **options}
@@ -230,6 +237,14 @@ def same(one: Any, two: Any) -> bool:
     if one.shape != two.shape:
         return False
     return bool(np.array_equal(one, two, equal_nan=one.dtype.kind == "f"))
+
+
+def _switched_on(model: Model, factor: Factor) -> bool | None:
+    """Whether something that can be switched is on; None where a Model does not tell."""
+    if factor.name not in _SWITCHED or _raw(model, "opt.disableflags") is None:
+        return None
+    on = model.replace(**{factor.options[0]: True})
+    return bool(_raw(on, "opt.disableflags") == _raw(model, "opt.disableflags"))
 
 
 def _raw(model: Model, name: str) -> Any:
