@@ -9,7 +9,7 @@ import json
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -177,14 +177,14 @@ def load_stubborn(path: str, defaults: str = "model") -> Model:
     """An engine that takes its armature from the file, which has another one."""
     from statemachine.records import Capabilities
 
-    from .hidden_world import load
+    from .hidden_world import HiddenModel, load
 
     model = load(path).replace(armature=0.04)
     known = model.capabilities
     options = tuple(name for name in known.options if name != "armature")
     fewer = Capabilities(options, known.integrators, known.behaviours, False, True)
     object.__setattr__(model, "capabilities", fewer)
-    object.__setattr__(model.inner, "capabilities", fewer)
+    object.__setattr__(cast("HiddenModel", model).inner, "capabilities", fewer)
     return model
 
 
