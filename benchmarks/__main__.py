@@ -15,6 +15,8 @@ import numpy as np
 import statemachine as sm
 from benchmarks.interleave import Ratio, interleaved
 from statemachine import __version__
+from statemachine.experiments._common import silent
+from statemachine.traces import recorder
 
 STEPS = 500
 
@@ -102,6 +104,27 @@ def kinematics(name: str, rounds: int) -> list[Ratio]:
     )
 
 
+def recording(name: str, rounds: int) -> list[Ratio]:
+    """A recorded run against a bare loop with the same controller."""
+    model = sm.load(name)
+    bare, watched = sm.make_data(model), sm.make_data(model)
+    target = np.array(_FLOOR)
+
+    def controller(_time: float, _data: sm.Data) -> np.ndarray:
+        return target
+
+    def loop() -> None:
+        for _ in range(STEPS):
+            bare.ctrl[:] = controller(bare.time, bare)
+            sm.step(model, bare)
+
+    return interleaved(
+        loop,
+        {f"recorded, {name}": lambda: recorder._run(model, watched, controller, STEPS, silent)},
+        rounds,
+    )
+
+
 _AIR = [0.0, -0.3, 0.6, 0.3, 0.0, 0.6]
 _FLOOR = [0.0, -0.6, 1.2, 0.5, 0.0, 0.6]  # of `lesson hold`, where the finger meets the floor
 
@@ -158,6 +181,7 @@ BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None]] = [
     (control_loop, "so101", 1.0),
     (kinematics, "so101", 0.8),
     (emulation, "so101/scene", 1.8),
+    (recording, "so101", 1.10),
 ]
 
 

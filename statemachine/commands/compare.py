@@ -19,7 +19,7 @@ def add(commands: Any) -> None:
             "quantity with its tolerance and a verdict. One trace: its ctrl is played on the "
             "other engine."
         ),
-        epilog=f"Experiments: {', '.join(_EXPERIMENTS)}. Exit code 1: something differs.",
+        epilog=f"Experiments: {', '.join(EXPERIMENTS)}. Exit code 1: something differs.",
     )
     parser.add_argument(
         "what",
@@ -48,7 +48,7 @@ def add(commands: Any) -> None:
 
 
 # As `experiments.scenarios.SCENARIOS`, which needs NumPy; a test compares them.
-_EXPERIMENTS = ("hold", "gravity", "droop", "fall", "box", "waves")
+EXPERIMENTS = ("hold", "gravity", "droop", "fall", "box", "waves")
 
 
 def add_defaults(parser: argparse.ArgumentParser) -> None:
@@ -92,10 +92,10 @@ def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
     if not options.what:
         raise BadInputError(
-            f"compare what? An experiment ({', '.join(_EXPERIMENTS)}) or traces: "
+            f"compare what? An experiment ({', '.join(EXPERIMENTS)}) or traces: "
             f"{PROGRAM} compare hold"
         )
-    from ..compare import compare, parse_tolerances, sides_of
+    from ..compare import compare, parse_tolerances, sides_of, witness
     from ..report import compare as report
     from ..report.progress import progress
 
@@ -107,4 +107,6 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         for line in said:
             complain(line, 0)
-    return show(report.page(found, one.header.says, said), found, options.json)
+    asked = witness(one, two)
+    page = report.page(found, one.header.says, said, asked)
+    return show(page, {"comparison": found, "witness": asked}, options.json)
