@@ -408,6 +408,106 @@ def test_with_everything_dialled_off_the_engines_agree() -> None:
 
 
 @pytest.mark.usefixtures("bullet")
+@pytest.mark.parametrize("dial", ["damping", "limits"])
+def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
+    """A limp arm without joint damping, which reaches its limits and the floor."""
+    from statemachine.probes import pybullet_dials as module
+
+    fresh = quietly("so101/scene", defaults="engine")
+    fresh = fresh.replace(gravity=[0, 0, -9.81], actuation=False)
+    raw = fresh._shared.raw  # pyright: ignore[reportAttributeAccessIssue]
+
+    def limp(world: Any) -> None:
+        for tree in world.trees:
+            for joint in tree.joints:
+                module._change(world, tree.body, joint, jointDamping=0.05)
+                module.pb.setJointMotorControl2(
+                    tree.body,
+                    joint,
+                    module.pb.VELOCITY_CONTROL,
+                    force=0,
+                    physicsClientId=world.client,
+                )
+
+    own = {
+        "damping": lambda w: module._set_damping(w, module.BODY_DAMPING, np.full(raw.nv, 0.05)),
+        "limits": lambda w: module._set_limits(w, module._ranges(fresh)),
+    }
+    # Of another kind: so it would have been seen.
+    other = {
+        "damping": lambda w: module._set_damping(w, 0.05, np.full(raw.nv, 0.05)),
+        "limits": lambda w: module._set_limits(w, dict.fromkeys(range(raw.nv), (-0.1, 0.3))),
+    }
+    experiment = replace(scenario("gravity"), seconds=1.0)
+    plain = path_of(module._dialled(fresh, [limp]), experiment)
+    assert np.abs(plain).max() > 0.35
+    np.testing.assert_array_equal(
+        path_of(module._dialled(fresh, [limp, own[dial]]), experiment), plain
+    )
+    assert (path_of(module._dialled(fresh, [limp, other[dial]]), experiment) != plain).any()
+
+
+@pytest.mark.usefixtures("bullet")
+def test_links_of_one_robot_meet_where_the_setting_says_so(arm: Model) -> None:
+    """In a pose in which the arm is in its own way, by MuJoCo."""
+    from statemachine.probes.pybullet_dials import dials
+
+    def own_ways(model: Model, qpos: np.ndarray, run: Any) -> int:
+        with sm.make_data(model) as data:
+            data.qpos = qpos
+            run(model, data)
+            bodies = model.geom_bodyid[data.contacts.geom]
+            return int((bodies > 0).all(axis=1).sum())
+
+    random = np.random.default_rng(3)
+    poses = (random.uniform(*arm.jnt_range.T) for _ in range(200))
+    pose = next(pose for pose in poses if own_ways(arm, pose, sm.forward) > 2)
+    fresh = quietly("so101/scene", defaults="engine")
+    found = dials(fresh, {})
+    assert found
+    rest = {name: "model" for name in SETTINGS if name != "surfaces"}
+    values = values_of(arm)
+    own: Any = found.build(rest, values)  # pyright: ignore[reportArgumentType]
+    same: Any = found.build({**rest, "surfaces": "model"}, values)  # pyright: ignore[reportArgumentType]
+    assert own_ways(fresh, pose, sm.step) == own_ways(own, pose, sm.step) == 0
+    assert own_ways(same, pose, sm.step) > 0
+
+
+@pytest.mark.usefixtures("bullet")
+def test_as_it_comes_has_the_engines_figures_in_the_emulated_world() -> None:
+    """Read back from the engine: friction, masses, inertias, timestep and gravity."""
+    import pybullet as pb
+
+    from statemachine.probes.pybullet_dials import dials
+
+    fresh = quietly("so101/scene", defaults="engine")
+    found = dials(fresh, {})
+    assert found
+    model: Any = found.build({"servo": "model"}, {})
+
+    def figures(world: Any) -> dict[int, tuple[Any, ...]]:
+        return {
+            b: pb.getDynamicsInfo(tree.body, link, world.client)
+            for tree in world.trees
+            for b, link in tree.links.items()
+        }
+
+    with sm.make_data(fresh) as one, sm.make_data(model) as two:
+        told = [pb.getPhysicsEngineParameters(data.raw.client) for data in (one, two)]
+        assert told[0] == told[1]
+        theirs, ours, true = figures(one.raw), figures(two.raw), figures(model._shared.ghost)
+        for body, info in theirs.items():
+            assert ours[body][1] == info[1] == 0.5
+            assert ours[body][5:8] == info[5:8]
+            if body in true:  # the law reckons with the inertias of the shapes, in the same axes
+                np.testing.assert_allclose(true[body][2], info[2], rtol=1e-12)
+                for place in (3, 4):  # where the centre of mass is, and its axes
+                    np.testing.assert_allclose(true[body][place], info[place], atol=1e-12)
+    np.testing.assert_array_equal(model.dof_armature, 0)
+    np.testing.assert_array_equal(model.dof_frictionloss, 0)
+
+
+@pytest.mark.usefixtures("bullet")
 @pytest.mark.parametrize("name", SETTINGS)
 def test_each_dial_acts_on_the_emulated_side(name: str) -> None:
     """All settings the model's, one as the engine comes: the run is another one."""

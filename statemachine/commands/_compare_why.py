@@ -25,8 +25,8 @@ def run(request: Any, quantity: str | None, as_json: bool) -> int:
 
     if request.is_traces or len(request.what) != 1:
         raise BadInputError(
-            f"--why runs an experiment again and again, it takes no trace: {PROGRAM} compare "
-            "hold --why"
+            "--why takes one experiment, which it runs again and again: "
+            f"{PROGRAM} compare hold --why"
         )
     asked = scenario(request.what[0])
     asked = replace(asked, options={**asked.options, **request.options})

@@ -110,3 +110,9 @@ def dials_of(model: Model, options: Mapping[str, Any]) -> Dials | None:
     if not name:
         return None
     return cast("Dials | None", importlib.import_module(f".{name}", __name__).dials(model, options))
+
+
+def frictionless(model: Model) -> Model | None:
+    """A Model whose surfaces have no friction, turned in the engine; None if we cannot."""
+    name = _DIALS.get(model.backend)
+    return importlib.import_module(f".{name}", __name__).frictionless(model) if name else None

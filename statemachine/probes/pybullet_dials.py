@@ -107,7 +107,7 @@ class Dials:
         if "limits" not in dials:
             acts.append(partial(_set_limits, ranges=_ranges(self.model)))
         if "surfaces" not in dials:
-            acts.append(_fresh_surfaces)
+            acts.append(partial(_fresh_surfaces, plan=own._shared.plan))
         if "contact" in dials:
             options["contacts"] = False
         # An option that changes nothing may still change the last bit of what follows from it.
@@ -136,6 +136,11 @@ def dials(model: Model, options: Mapping[str, Any]) -> Dials | None:
     """The dials of a Model of PyBullet as it comes; None of any other."""
     kind = getattr(getattr(model, "_shared", None), "kind", None)
     return Dials(model, options) if model.backend == "pybullet" and kind == "engine" else None
+
+
+def frictionless(model: Model) -> Model:
+    """The same Model with surfaces that have no friction."""
+    return _dialled(model, [_smooth])
 
 
 class DialledModel(PybulletModel):
@@ -266,6 +271,11 @@ def _set_frictions(world: World, surfaces: Surfaces) -> None:
         _rub(world, body, link, wanted)
 
 
+def _smooth(world: World) -> None:
+    for body, link, _ in world.solids():
+        _rub(world, body, link, [0.0, 0.0, 0.0])
+
+
 def _rub(world: World, body: int, link: int, wanted: list[float]) -> None:
     slide, roll, spin = wanted
     _change(world, body, link, lateralFriction=slide, rollingFriction=roll, spinningFriction=spin)
@@ -273,15 +283,19 @@ def _rub(world: World, body: int, link: int, wanted: list[float]) -> None:
     _verify("a friction", wanted, [told[1], told[6], told[7]])
 
 
-def _fresh_surfaces(world: World) -> None:
+def _fresh_surfaces(world: World, plan: Plan) -> None:
     """Friction of what was loaded, and links of one robot that do not meet."""
-    solids = [(body, link) for body, link, _ in world.solids()]
-    for k, (body, link) in enumerate(solids):
+    solids = list(world.solids())
+    for body, link, _ in solids:
         _rub(world, body, link, [FRICTION, 0.0, 0.0])
-        for other, other_link in solids[:k]:
-            meet = int(body != other)
+    for (i, j), meet in plan.surfaces.pairs.items():
+        (body, link, one), (other, other_link, two) = solids[i], solids[j]
+        # What never moves does not meet what never moves; of the rest, all that are two bodies.
+        moves = any(plan.raw.body_weldid[solid.body] for solid in (one, two))
+        wanted = moves and body != other
+        if wanted != meet:
             pb.setCollisionFilterPair(
-                body, other, link, other_link, meet, physicsClientId=world.client
+                body, other, link, other_link, int(wanted), physicsClientId=world.client
             )
 
 

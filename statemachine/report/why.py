@@ -27,7 +27,12 @@ def page(result: Attribution, said: Sequence[str] = ()) -> Page:
     blocks: list[Any] = [Text(line) for line in (*said, result.says) if line]
     blocks.append(Text(_gap_sentence(result)))
     if not result.alone:
-        blocks.append(Text("That is rounding: there is nothing to explain."))
+        blocks.append(
+            Text(
+                f"What is below {amount(result, result.negligible)} is taken for rounding: "
+                "there is nothing to explain."
+            )
+        )
         return Page(_title(result), _origin(result), blocks)
     blocks += [_alone(result), *(Text(line) for line in _notes(result))]
     blocks += [_ladder(result), Text(f"The order. {' '.join(result.order)}")]
@@ -68,7 +73,9 @@ def percent(part: float | None) -> str:
     value = 100 * part
     if value == 0:
         return "0 %"
-    if 0 < abs(value) < 0.05:
+    if abs(value) < 1e-6:
+        return "< 1e-6 %"
+    if abs(value) < 0.05:
         return f"{value:.0e} %".replace("e-0", "e-")
     if 99.95 <= value < 100:
         return "> 99.9 %"
@@ -111,7 +118,7 @@ def _alone(result: Attribution) -> Table:
             (
                 FACTORS[trial.factor].title,
                 _brought(result, trial),
-                _figure(result, trial.worst),
+                _figure(result, trial.worst, trial),
                 percent(trial.explains) + ("*" if _another(trial) else ""),
                 last,
             )
@@ -133,13 +140,14 @@ def _brought(result: Attribution, trial: Trial) -> str:
     return trial.did or "–"
 
 
-def _figure(result: Attribution, value: float | None) -> str:
-    """A gap, marked where it is wider than all that the experiment moves."""
-    return amount(result, value) + ("!" if _astray(result, value) else "")
+def _figure(result: Attribution, value: float | None, trial: Trial | None = None) -> str:
+    """A gap, marked where it is out of all proportion; not of a trial that moves one too."""
+    own = trial is not None and bool(trial.moved)
+    return amount(result, value) + ("!" if not own and _astray(result, value) else "")
 
 
 def _astray(result: Attribution, value: float | None) -> bool:
-    return value is not None and value > result.extent
+    return value is not None and value > 2 * max(result.extent, result.gap)
 
 
 def _another(trial: Trial) -> bool:
@@ -161,10 +169,11 @@ def _notes(result: Attribution) -> list[str]:
             f"* This moves {one} itself, so the gap is that of another motion. A smaller gap "
             "there is a hint, not a proof."
         )
-    if any(_astray(result, gap) for t in result.alone for gap in (t.worst, t.put_back)):
+    marked = [t.put_back for t in result.alone] + [t.worst for t in result.alone if not t.moved]
+    if any(_astray(result, gap) for gap in marked):
         found.append(
-            f"! Wider apart than {one} moves at all ({amount(result, result.extent)}): with this, "
-            f"{two} shakes itself, flies off, or lets go."
+            f"! More than twice what {one} moves at all ({amount(result, result.extent)}), and "
+            f"than the gap itself: so {two} does not do the experiment any more."
         )
     for trial in result.alone:
         if trial.note:
@@ -234,7 +243,7 @@ def conclusion(result: Attribution) -> list[str]:
         )
     same = result.settings_same
     opened = sorted(
-        (t for t in result.alone if (t.put_back or 0.0) > _OPENS * same),
+        (t for t in result.alone if (t.put_back or 0.0) > max(_OPENS * same, result.negligible)),
         key=lambda t: -(t.put_back or 0.0),
     )
     if opened:

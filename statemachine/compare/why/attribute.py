@@ -96,6 +96,7 @@ class Attribution:
         alone: Each factor by itself; empty where the gap is rounding.
         ladder: All of them, one on top of the other; what is left telescopes to `left`.
         left: What stays unexplained; None if nothing could be run.
+        negligible: Gaps below this are taken for rounding, in `unit`.
         extent: How far one moves from where it starts, in `unit`.
         touch: The first contact of the robot; None without one, or with one from the start.
         moments: How many moments the runs are compared at; between: whether rows had to be
@@ -116,6 +117,7 @@ class Attribution:
     alone: tuple[Trial, ...]
     ladder: tuple[Trial, ...]
     left: float
+    negligible: float
     extent: float
     touch: Touch | None
     moments: int
@@ -208,6 +210,7 @@ def attribute(
         alone=alone,
         ladder=ladder,
         left=next((worst for worst in reversed(steps) if worst is not None), runs.first),
+        negligible=_ROUNDING[names[runs.quantity]],
         extent=runs.extent({}),
         touch=runs.touch,
         moments=len(runs.ruler.time),

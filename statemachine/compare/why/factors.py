@@ -76,7 +76,7 @@ _ALL = (
     Factor(
         "surfaces",
         "surfaces",
-        "",
+        "frictionless",
         raw=(
             "geom_friction",
             "geom_condim",

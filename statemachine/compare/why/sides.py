@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import UnsupportedError
 from ...interface import Model
-from ...probes import dials_of
+from ...probes import dials_of, frictionless
 from .factors import FACTORS, Factor
 
 How = Literal["parity", "off"]
@@ -106,6 +106,10 @@ class ModelSide:
         if how == "off":
             if not factor.off:
                 return "the other engine has nothing that corresponds"
+            if factor.name == "surfaces":
+                able = _raw(self._as_it_comes, "geom_friction") is not None
+                able = able or frictionless(self._as_it_comes) is not None
+                return "" if able else f"{self._base.backend} has no way to set friction"
             if missing:
                 return f"{self._base.backend} cannot leave it out"
             if factor.options[0] in self._options:
@@ -134,6 +138,11 @@ class ModelSide:
         model, options = self._base, dict[str, Any]()
         for name, change in changes.items():
             factor = FACTORS[name]
+            if change.how == "off" and name == "surfaces":
+                smooth = _raw(model, "geom_friction")
+                if smooth is not None:
+                    model = _written(model, {"geom_friction": np.zeros(smooth.shape)})
+                continue
             if change.how == "off":
                 options |= self._off(factor)
                 continue
@@ -150,7 +159,9 @@ class ModelSide:
                     if not same(own[fact], change.values[fact]):
                         options[option] = change.values[fact]
         options = {**self._options, **options}
-        return model.replace(**options) if options else model
+        model = model.replace(**options) if options else model
+        smoothed = "surfaces" in changes and changes["surfaces"].how == "off"
+        return (frictionless(model) or model) if smoothed else model
 
     def _off(self, factor: Factor) -> dict[str, Any]:
         if factor.name == "gravity":
