@@ -6,6 +6,7 @@ import contextlib
 import importlib
 import io
 import json
+import os
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -22,8 +23,9 @@ from statemachine.interface import Model
 from statemachine.report import terminal
 from statemachine.report import why as report
 from statemachine.report.as_json import dumps
+from statemachine.traces import record_scenario
 
-from .conftest import need_engine, registered
+from .conftest import ROOT, Cli, need_engine, registered
 
 HOLD = replace(scenario("hold"), seconds=0.6)  # long enough to touch the floor
 FALL = replace(scenario("fall"), seconds=5.0)  # and to meet a limit
@@ -145,6 +147,7 @@ def test_leaving_out_the_motion_is_no_explanation() -> None:
             alone = by_name(found.alone)
             assert alone["gravity"].way == "off"
             assert alone["gravity"].moved > found.gap
+            assert alone["timestep"].moved > 0
             assert found.unexplained == 1.0
             assert not any(trial.explains for trial in found.ladder)
 
@@ -235,6 +238,15 @@ def test_what_is_held_is_what_it_is_about() -> None:
     found = attribute(one, two, BOX)
     assert found.quantity == "box in the hand"
     assert by_name(found.alone)["surfaces"].explains == 1.0
+    traces = [record_scenario(BOX, model) for model in (one, two)]
+    seen = []
+    for trace in traces:
+        apart = trace["xpos"][:, one.body_id("box")] - trace.site("gripperframe")[0]
+        seen.append(np.einsum("nji,nj->ni", trace.site("gripperframe")[1], apart))
+    apart = np.linalg.norm(seen[0] - seen[1], axis=1)
+    assert found.gap == pytest.approx(apart.max(), rel=1e-9)
+    assert found.first["box in the hand"].rms == pytest.approx(np.sqrt((apart**2).mean()))
+    assert found.first["box in the hand"].at == traces[0].time[apart.argmax()] - traces[0].time[0]
     # The same box from the default pose lies on the floor, out of reach.
     arm = attribute(one, two, replace(BOX, keyframe=None))
     assert arm.quantity == "joints"
@@ -446,6 +458,17 @@ def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
     )
     assert (path_of(module._dialled(fresh, [limp, other[dial]]), experiment) != plain).any()
 
+    def spun(*acts: Any) -> np.ndarray:
+        """Speeds after a start that is faster than the engine lets a joint be."""
+        model = module._dialled(fresh, [limp, *acts])
+        with sm.make_data(model) as data:
+            data.qvel[5] = 150.0
+            sm.step(model, data)
+            return data.qvel.copy()
+
+    assert np.abs(spun()).max() == pytest.approx(100.0)
+    np.testing.assert_array_equal(spun(own[dial]), spun())
+
 
 @pytest.mark.usefixtures("bullet")
 def test_links_of_one_robot_meet_where_the_setting_says_so(arm: Model) -> None:
@@ -538,8 +561,9 @@ def test_dials_outlive_a_reset() -> None:
     fresh = quietly("so101/scene", defaults="engine")
     found = dials(fresh, {})
     assert found
-    model = found.build({"gravity": "model", "contact": "off"}, {"gravity": [0, 0, -9.81]})
+    model = found.build({"inertia": "model"}, {})
     first = path_of(model, HOLD)
+    assert (first != path_of(fresh, HOLD)).any()
     controller, rows = HOLD.controller(model, 0), []
     with sm.make_data(model) as data:
         sm.step(model, data, 30)
@@ -639,3 +663,77 @@ def test_two_engines_as_they_come_differ_by_what_was_set() -> None:
     found = attribute(fresh, fresh.replace(gravity=[0, 0, -9.81]), HOLD)
     assert [trial.factor for trial in found.ladder] == ["gravity"]
     assert found.left == 0.0
+
+
+# The command
+
+
+def test_the_command(cli: Cli) -> None:
+    need_engine("pybullet")
+    done = cli("compare", "hold", "--why", "--seconds", "0.5")
+    assert done.returncode == 0, done.stderr
+    assert not done.stderr
+    assert "contact" in done.stdout
+    assert all(len(line) <= 80 for line in done.stdout.splitlines())
+    told = json.loads(cli("compare", "hold", "--why", "--seconds", "0.5", "--json").stdout)
+    assert [trial["factor"] for trial in told["ladder"]] == ["contact"]
+    assert told["quantity"] == "joints"
+
+
+def test_the_command_says_no_where_the_cause_is_not_found(
+    arm: Model, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from statemachine import backends, cli
+
+    models = [arm, edited(arm, body_mass=1.3 * arm.raw.body_mass)]
+    monkeypatch.setattr(backends, "load", lambda *_a, **_k: models.pop(0))
+    assert cli.main(["compare", "hold", "--why", "--seconds", "0.5"]) == 1
+    assert "100.0 % is not" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--quantity", "box"), "known: joints"),
+        (("--tolerance", "joint=1deg"), "--tolerance"),
+        (("--backends", "mujoco", "pybulet"), "Did you mean 'pybullet'"),
+        (("--seconds", "0"), "above 0"),
+        (("gravity",), "one experiment"),
+        (("--model", "so101/scen"), "scen"),
+        (("--seconds", "0.1", "--timestep", "-1"), "timestep"),
+    ],
+)
+def test_a_mistake_is_one_line(
+    arguments: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from statemachine import cli
+
+    words = ["compare", "hold", *arguments, "--why"]
+    if "--backends" not in arguments:
+        words += ["--backends", "mujoco", "mujoco"]
+    assert cli.main(words) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert said in line
+
+
+def test_quantity_without_why_is_a_mistake(capsys: pytest.CaptureFixture[str]) -> None:
+    from statemachine import cli
+
+    assert cli.main(["compare", "hold", "--quantity", "joints"]) == 2
+    assert "--why" in capsys.readouterr().err
+
+
+def test_without_pybullet_one_line_says_so(cli: Cli, tmp_path: Path) -> None:
+    (tmp_path / "sitecustomize.py").write_text(
+        "import sys\n"
+        "class Hide:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'pybullet':\n"
+        "            raise ModuleNotFoundError(f'No module named {name!r}', name=name)\n"
+        "sys.meta_path.insert(0, Hide())\n"
+    )
+    done = cli("compare", "hold", "--why", PYTHONPATH=f"{tmp_path}{os.pathsep}{ROOT}")
+    assert done.returncode == 3
+    assert not done.stdout
+    (line,) = done.stderr.splitlines()
+    assert "pip install pybullet" in line
