@@ -201,7 +201,7 @@ def test_no_gap_is_nothing_to_explain(arm: Model) -> None:
 
 
 def test_runs_are_made_once(arm: Model, monkeypatch: pytest.MonkeyPatch) -> None:
-    module = importlib.import_module("statemachine.compare.why.attribute")
+    module = importlib.import_module("statemachine.compare.why.runs")
     made, record = [], module.record
     monkeypatch.setattr(module, "record", lambda *a, **k: made.append(1) or record(*a, **k))
     found = attribute(arm, arm.replace(armature=0.04), HOLD)

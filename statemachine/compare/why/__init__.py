@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from .attribute import Attribution, Touch, Trial, attribute
+from .attribute import attribute
 from .factors import FACTORS, Factor
 from .gap import Gap
+from .results import Attribution, Touch, Trial
 
 __all__ = ["FACTORS", "Attribution", "Factor", "Gap", "Touch", "Trial", "attribute"]

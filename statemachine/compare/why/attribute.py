@@ -4,23 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
-from ...errors import BadInputError, DivergedError, EngineError, UnsupportedError, unknown_name
-from ...experiments._common import (
-    Progress,
-    Provenance,
-    moved_by_actuators,
-    provenance,
-    silent,
-    touching,
-)
+from ...errors import BadInputError, unknown_name
+from ...experiments._common import Progress, silent
 from ...experiments.scenarios import Scenario
-from ...interface import Data, Model
-from ...traces import Trace, record
+from ...interface import Model
 from .factors import FACTORS, OFF_ORDER, PARITY_ORDER, Factor
-from .gap import Curves, Gap, Ruler
-from .sides import Change, Changes, Side, same, side_of
+from .gap import Gap
+from .results import Attribution, Trial, Way
+from .runs import Runs
+from .sides import Change, Changes, same, side_of
 
 _NOTHING = 1e-6  # of the first gap: what is less is left alone
 # What is left out on both makes another motion, whose gap may be smaller for that reason. So
@@ -29,120 +23,6 @@ _NOTHING = 1e-6  # of the first gap: what is less is left alone
 _MOST, _MOVES = 0.5, 0.1
 # Rounding, after it has grown for some seconds: less than this is no gap to be explained.
 _ROUNDING = {"rad": 1e-8, "m": 1e-9}
-Way = Literal["parity", "off", "one side", "alike", "none"]
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One factor brought to the same, alone or on top of others, and what became of the gap.
-
-    Attributes:
-        factor: Its name.
-        way: "parity": two takes one's setting, or one two's; "off": left out on both;
-            "one side": tried on one alone, since the other has nothing to set; "alike":
-            the same engine with the same setting, nothing to bring; "none": it cannot be.
-        had: What one and two had, in a few words.
-        did: What was done, in a few words.
-        gaps: The gap in each quantity after it; empty if there is none.
-        worst: Of these, that of the attribution's quantity; None if there is none.
-        explains: The part of the first gap that it took away: below zero if it made it wider;
-            None where nothing was run, or in a rung that stands only with the next.
-        moved: How far one's own motion is then from its motion as it comes; above the gap,
-            the experiment has become another.
-        put_back: The gap if all is as at the end of the settings of the ladder, and this
-            factor alone (with what cannot be without it) is as it came; None where nothing
-            was set.
-        note: Why there is no gap, or what else is to be said.
-    """
-
-    factor: str
-    way: Way
-    had: tuple[str, str]
-    did: str
-    gaps: dict[str, Gap]
-    worst: float | None
-    explains: float | None
-    moved: float | None
-    put_back: float | None = None
-    note: str = ""
-
-
-@dataclass(frozen=True)
-class Touch:
-    """The first contact of the robot, and how far apart the runs were until then.
-
-    Attributes:
-        time: Since the start [s].
-        what: What touched what.
-        before: The gap of the runs as they come, at the moments until then.
-        moments: How many these are.
-    """
-
-    time: float
-    what: str
-    before: float
-    moments: int
-
-
-@dataclass(frozen=True)
-class Attribution:
-    """How much of the gap between two simulations each of their differences explains.
-
-    Attributes:
-        experiment, says, seconds: What was run.
-        one, two: The sides; two is brought to one. names: what they are called for short.
-        quantity: What the gap is measured in; unit: of it.
-        first: The gap in each quantity, as they come.
-        alone: Each factor by itself; empty where the gap is rounding.
-        ladder: All of them, one on top of the other; what is left telescopes to `left`.
-        left: What stays unexplained; None if nothing could be run.
-        negligible: Gaps below this are taken for rounding, in `unit`.
-        extent: How far one moves from where it starts, in `unit`.
-        touch: The first contact of the robot; None without one, or with one from the start.
-        moments: How many moments the runs are compared at; between: whether rows had to be
-            interpolated there.
-        order: How the ladder was ordered, and why.
-        runs: How many runs it took.
-    """
-
-    experiment: str
-    says: str
-    seconds: float
-    one: str
-    two: str
-    names: tuple[str, str]
-    quantity: str
-    unit: str
-    first: dict[str, Gap]
-    alone: tuple[Trial, ...]
-    ladder: tuple[Trial, ...]
-    left: float
-    negligible: float
-    extent: float
-    touch: Touch | None
-    moments: int
-    between: bool
-    order: tuple[str, str]
-    runs: int
-    provenance: tuple[Provenance, Provenance]
-
-    @property
-    def gap(self) -> float:
-        """The gap as they come, in `unit`."""
-        return self.first[self.quantity].worst
-
-    @property
-    def settings_same(self) -> float:
-        """The gap where all settings are the same and nothing is left out."""
-        rungs = [trial for trial in self.ladder if trial.way == "parity"]
-        known = [trial.worst for trial in rungs if trial.worst is not None]
-        return known[-1] if known else self.gap
-
-    @property
-    def unexplained(self) -> float:
-        """The part of it that nothing took away."""
-        return self.left / self.gap if self.gap else 0.0
-
 
 ORDER = (
     "First what is set differently: {two} is brought to what {one} has, and {one} moves as "
@@ -184,7 +64,7 @@ def attribute(
     sides = [side_of(model, scenario.options) for model in (one, two)]
     if sides[0].fresh and not sides[1].fresh:
         sides.reverse()
-    runs = _Runs(sides, scenario, scenario.seconds if seconds is None else seconds, seed, progress)
+    runs = Runs(sides, scenario, scenario.seconds if seconds is None else seconds, seed, progress)
     names = runs.ruler.units
     if quantity is not None and quantity not in names:
         raise unknown_name("quantity", quantity, names)
@@ -221,12 +101,6 @@ def attribute(
     )
 
 
-def _names(one: str, two: str) -> tuple[str, str]:
-    """The engines, or which is which where they are the same."""
-    short = one.split(" ", maxsplit=1)[0], two.split(" ", maxsplit=1)[0]
-    return short if short[0] != short[1] else ("the first", "the second")
-
-
 @dataclass(frozen=True)
 class _Move:
     """What can be done with one factor: the changes of both sides, or why there are none."""
@@ -238,146 +112,7 @@ class _Move:
     note: str = ""
 
 
-class _Runs:
-    """Runs of both sides with changes, each made once."""
-
-    def __init__(
-        self,
-        sides: list[Side],
-        scenario: Scenario,
-        seconds: float,
-        seed: int,
-        progress: Progress,
-    ) -> None:
-        self.one, self.two = sides
-        self.names = _names(self.one.label, self.two.label)
-        self.seconds, self.count, self.ended = seconds, 0, ""
-        self._scenario, self._seed, self._progress = scenario, seed, progress
-        self._expected = 4 * len(FACTORS)
-        self._curves: dict[Any, Curves | None] = {}
-        self.listed = [
-            factor
-            for factor in FACTORS.values()
-            if factor.name != "inertia" or any(side.fresh for side in sides)
-        ]
-        models = [side.build({}) for side in sides]
-        watches = [_Watch(model) for model in models]
-        traces = [self._record(*pair) for pair in zip(models, watches, strict=True)]
-        self.provenance = provenance(models[0]), provenance(models[1])
-        self.ruler = Ruler(models[0], *traces)
-        for place, trace in enumerate(traces):
-            self._curves[place, ()] = self.ruler.curves(trace)
-            self.ended = self.ended or trace.header.ended
-        self.natural = self.ruler.held(traces[0], watches[0].at_start)
-        self.quantity = self.natural
-        self._watches = watches
-
-    def _record(self, model: Model, watch: _Watch | None = None) -> Trace:
-        self.count += 1
-        self._progress(min(0.99, self.count / self._expected))
-        scenario = self._scenario
-        controller = scenario.controller(model, self._seed)
-        if watch is not None:
-            controller = watch.around(controller)
-        return record(model, controller, self.seconds, keyframe=scenario.keyframe, derive=False)
-
-    def done(self) -> None:
-        """Say that all is done."""
-        self._progress(1.0)
-
-    def curves(self, place: int, changes: Changes) -> Curves | None:
-        """A run of one side, 0 or 1; None, with a reason in `ended`, if it did not end well."""
-        key = place, tuple(sorted((name, change.how) for name, change in changes.items()))
-        if key not in self._curves:
-            side = (self.one, self.two)[place]
-            try:
-                trace = self._record(side.build(changes))
-                self._curves[key] = self.ruler.curves(trace)
-                self._why = trace.header.ended or "it left every bound"
-            except (DivergedError, EngineError, UnsupportedError) as error:
-                self._curves[key], self._why = None, str(error)
-            if self._curves[key] is None:
-                self.ended = f"{self.names[place]} does not stand: {_first(self._why)}"
-        return self._curves[key]
-
-    def gaps(self, one: Changes, two: Changes) -> dict[str, Gap]:
-        """The gap with changes on both sides; nothing if one of them did not end well."""
-        first, second = self.curves(0, one), self.curves(1, two)
-        return self.ruler.gaps(first, second) if first and second else {}
-
-    def moved(self, changes: Changes) -> float:
-        """How far one's own motion is from what it is as it comes."""
-        before, after = self._curves[0, ()], self.curves(0, changes)
-        assert before is not None and after is not None  # noqa: PT018  (they have gaps)
-        return self.ruler.gap(self.quantity, before, after).worst
-
-    def extent(self, changes: Changes) -> float:
-        """How far one moves from where it starts."""
-        run = self.curves(0, changes)
-        assert run  # it has gaps
-        start = Curves({name: curve[:1] for name, curve in run.of.items()})
-        return float(self.ruler.distances(self.quantity, run, start).max())
-
-    @property
-    def first(self) -> float:
-        """The gap as they come."""
-        return self.gaps({}, {})[self.quantity].worst
-
-    @property
-    def touch(self) -> Touch | None:
-        """The first contact, where there was none from the start."""
-        found = [watch for watch in self._watches if watch.time is not None]
-        one, two = self._curves[0, ()], self._curves[1, ()]
-        if not found or any(watch.time == 0 for watch in found) or not (one and two):
-            return None
-        soonest = min(found, key=lambda watch: watch.time or 0.0)
-        assert soonest.time is not None
-        # A contact found at a moment acts from that moment on: the moment itself is before it.
-        before = self.ruler.time <= soonest.time + 1e-9
-        far = self.ruler.distances(self.quantity, one, two)[before]
-        return Touch(soonest.time, soonest.what, float(far.max()), int(before.sum()))
-
-
-class _Watch:
-    """When the robot first touches something, seen from the controller of a run."""
-
-    def __init__(self, model: Model) -> None:
-        self._model = model
-        self.time: float | None = None
-        self.what = ""
-        self.at_start: frozenset[str] = frozenset()
-
-    def around(self, controller: Any) -> Any:
-        """The controller, which looks at the contacts before each step."""
-        robot = moved_by_actuators(self._model)
-        began: list[float] = []
-        last = [0.0]
-
-        def watching(time: float, data: Data) -> Any:
-            if not began:
-                began.append(time)
-            elif self.time is None:
-                found = touching(self._model, data.contacts, robot)
-                if found:  # of the state that the last step began with
-                    self.time, self.what = last[0] - began[0], "; ".join(found)
-                    if self.time == 0:
-                        self.at_start = self._touched(data)
-            last[0] = time
-            return controller(time, data)
-
-        return watching
-
-    def _touched(self, data: Data) -> frozenset[str]:
-        bodies = self._model.geom_bodyid[data.contacts.geom.ravel()]
-        return frozenset(self._model.body_names[body] for body in bodies)
-
-
-def _first(text: str) -> str:
-    """The first sentence of a text."""
-    return text.split(". ", maxsplit=1)[0]
-
-
-def _move(runs: _Runs, factor: Factor, one: Changes, two: Changes) -> _Move:
+def _move(runs: Runs, factor: Factor, one: Changes, two: Changes) -> _Move:
     """What brings a factor to the same, on top of changes that are made already."""
     ours, theirs = runs.one.values(factor, one), runs.two.values(factor, two)
     if ours is not None and theirs is not None:
@@ -395,7 +130,7 @@ def _differ(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> bool:
 
 
 def _bring(
-    runs: _Runs,
+    runs: Runs,
     factor: Factor,
     ours: Mapping[str, Any],
     theirs: Mapping[str, Any],
@@ -413,7 +148,7 @@ def _bring(
     return left_out if left_out.way == "off" else _Move("none", note=refusal)
 
 
-def _leave_out(runs: _Runs, factor: Factor, two_has_none: bool) -> _Move:
+def _leave_out(runs: Runs, factor: Factor, two_has_none: bool) -> _Move:
     off = Change("off", {})
     refusal = runs.one.refuses(factor, "off", {}, {})
     if not refusal and not two_has_none:
@@ -424,7 +159,7 @@ def _leave_out(runs: _Runs, factor: Factor, two_has_none: bool) -> _Move:
     return _Move("off", one=off, two=None if two_has_none else off, did=did)
 
 
-def _alone(runs: _Runs, one: Changes, two: Changes) -> tuple[Trial, ...]:
+def _alone(runs: Runs, one: Changes, two: Changes) -> tuple[Trial, ...]:
     """Each factor by itself; then as it came, where all other settings are the same."""
     found = []
     for factor in runs.listed:
@@ -441,7 +176,7 @@ def _alone(runs: _Runs, one: Changes, two: Changes) -> tuple[Trial, ...]:
     return tuple(found)
 
 
-def _put_back(runs: _Runs, factor: Factor, one: Changes, two: Changes) -> float | None:
+def _put_back(runs: Runs, factor: Factor, one: Changes, two: Changes) -> float | None:
     """The gap with one factor as it came, all other settings the same."""
     if factor.name not in one and factor.name not in two:
         return None
@@ -450,7 +185,7 @@ def _put_back(runs: _Runs, factor: Factor, one: Changes, two: Changes) -> float 
     return gaps[runs.quantity].worst if gaps else None
 
 
-def _one_sided(runs: _Runs, factor: Factor) -> _Move | None:
+def _one_sided(runs: Runs, factor: Factor) -> _Move | None:
     """Another integrator on the side that has several."""
     known = runs.one.build({}).capabilities.integrators
     if "euler" not in known:
@@ -464,7 +199,7 @@ def _with(changes: Changes, factor: Factor, change: Change | None) -> dict[str, 
 
 
 def _trial(
-    runs: _Runs,
+    runs: Runs,
     factor: Factor,
     move: _Move,
     gaps: dict[str, Gap],
@@ -489,7 +224,7 @@ def _trial(
     )
 
 
-def _ladder(runs: _Runs) -> tuple[tuple[Trial, ...], tuple[Changes, Changes]]:
+def _ladder(runs: Runs) -> tuple[tuple[Trial, ...], tuple[Changes, Changes]]:
     """One factor on top of the other, and the changes with which all settings are the same."""
     found: list[Trial] = []
     one: dict[str, Change] = {}
