@@ -44,6 +44,12 @@ def add(commands: Any) -> None:
         metavar="KIND=VALUE",
         help="another tolerance, such as joint=0.5deg, tip=2mm, energy=0.1J",
     )
+    parser.add_argument(
+        "--why", action="store_true", help="which difference explains how much of the gap"
+    )
+    parser.add_argument(
+        "--quantity", default=None, metavar="NAME", help="of --why: what the gap is measured in"
+    )
     _compare_models.add_options(parser)
     add_json(parser)
     parser.set_defaults(run=run)
@@ -101,6 +107,16 @@ def run(options: argparse.Namespace) -> int:
             f"compare what? An experiment ({', '.join(EXPERIMENTS)}) or traces: "
             f"{PROGRAM} compare hold"
         )
+    if options.quantity and not options.why:
+        raise BadInputError("--quantity belongs to --why")
+    if options.why:
+        from ._compare_why import run as run_why
+
+        if options.tolerance:
+            raise BadInputError(
+                "--why takes no --tolerance: it explains the gap, whatever its size"
+            )
+        return run_why(request_of(options), options.quantity, options.json)
     from ..compare import compare, parse_tolerances, sides_of, witness
     from ..report import compare as report
     from ..report.progress import progress
