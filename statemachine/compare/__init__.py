@@ -1,1 +1,29 @@
-"""Where two runs part, by how much, and why."""
+"""Where two runs part, and by how much: traces of any two engines, quantity by quantity.
+
+    one, two = sides_of("hold")
+    comparison = compare(one, two)
+    comparison.agrees, comparison.agreements
+
+Two engines that agree prove nothing; neither side is the truth.
+"""
+
+from __future__ import annotations
+
+from .agreement import Agreement, Comparison, Side, compare
+from .series import Series, default_tip, series
+from .sides import Request, sides_of
+from .tolerances import Tolerance, parse_tolerances
+
+__all__ = [
+    "Agreement",
+    "Comparison",
+    "Request",
+    "Series",
+    "Side",
+    "Tolerance",
+    "compare",
+    "default_tip",
+    "parse_tolerances",
+    "series",
+    "sides_of",
+]

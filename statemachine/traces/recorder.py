@@ -329,7 +329,7 @@ def _read(
 ) -> None:
     for name, values in kept.items():
         try:
-            values.append(getattr(data, name))
+            values.append(np.array(getattr(data, name)))  # it may be the engine's memory
         except UnsupportedError:
             shape = np.shape(data.qvel)
             values.append(np.full(shape, np.nan))

@@ -1,0 +1,110 @@
+"""`statemachine compare`: where two engines part, by how much, and why."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from ..errors import BadInputError
+from ._common import PROGRAM, add_json, add_menagerie, complain, show
+
+
+def add(commands: Any) -> None:
+    """The subparser."""
+    parser = commands.add_parser(
+        "compare",
+        help="where two engines part, by how much, and why",
+        description=(
+            "Run an experiment on two engines, or open recorded traces, and compare: each "
+            "quantity with its tolerance and a verdict. One trace: its ctrl is played on the "
+            "other engine."
+        ),
+        epilog=f"Experiments: {', '.join(_EXPERIMENTS)}. Exit code 1: something differs.",
+    )
+    parser.add_argument(
+        "what",
+        nargs="*",
+        metavar="EXPERIMENT|TRACE",
+        help="an experiment, or one or two files .npz or .parquet",
+    )
+    parser.add_argument(
+        "--backends",
+        nargs=2,
+        default=["mujoco", "pybullet"],
+        metavar=("A", "B"),
+        help="the engines (default mujoco pybullet)",
+    )
+    add_defaults(parser)
+    add_run(parser)
+    parser.add_argument(
+        "--tolerance",
+        action="append",
+        default=[],
+        metavar="KIND=VALUE",
+        help="another tolerance, such as joint=0.5deg, tip=2mm, energy=0.1J",
+    )
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+# As `experiments.scenarios.SCENARIOS`, which needs NumPy; a test compares them.
+_EXPERIMENTS = ("hold", "gravity", "droop", "fall", "box", "waves")
+
+
+def add_defaults(parser: argparse.ArgumentParser) -> None:
+    """The option --defaults."""
+    parser.add_argument(
+        "--defaults",
+        default="model",
+        choices=("model", "engine"),
+        help="engine: each engine as its own users meet it (default model)",
+    )
+
+
+def add_run(parser: argparse.ArgumentParser) -> None:
+    """Options that change what is run."""
+    parser.add_argument(
+        "--model", default=None, metavar="NAME|FILE", help="instead of the experiment's own"
+    )
+    add_menagerie(parser)
+    parser.add_argument("--seconds", type=float, default=None, metavar="S", help="simulated time")
+    parser.add_argument("--timestep", type=float, default=None, metavar="S", help="on both sides")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of waves (default 0)")
+
+
+def request_of(options: argparse.Namespace) -> Any:
+    """What was asked for, as a Request."""
+    from ..compare import Request
+
+    return Request(
+        what=tuple(options.what),
+        backends=tuple(options.backends),
+        defaults=options.defaults,
+        model=options.model,
+        menagerie=options.menagerie if options.model else None,
+        seconds=options.seconds,
+        seed=options.seed,
+        options={} if options.timestep is None else {"timestep": options.timestep},
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compare, and show."""
+    if not options.what:
+        raise BadInputError(
+            f"compare what? An experiment ({', '.join(_EXPERIMENTS)}) or traces: "
+            f"{PROGRAM} compare hold"
+        )
+    from ..compare import compare, parse_tolerances, sides_of
+    from ..report import compare as report
+    from ..report.progress import progress
+
+    tolerances = parse_tolerances(options.tolerance)
+    request = request_of(options)
+    with progress("compare") as told:
+        (one, two), said = sides_of(request, told)
+    found = compare(one, two, tolerances=tolerances)
+    if options.json:
+        for line in said:
+            complain(line, 0)
+    return show(report.page(found, one.header.says, said), found, options.json)

@@ -1,0 +1,281 @@
+"""How far two traces agree: figures and a verdict for each quantity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import TraceError
+from ..experiments._common import Provenance
+from ..records import Array
+from ..traces import Header, Trace
+from .series import UNITS, Kind, Series, series
+from .tolerances import tolerance_for
+
+Verdict = Literal["agrees", "settles", "differs"]
+SETTLED = 0.1  # share of the common time, at its end, that "settled" is taken over
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """One quantity of two traces.
+
+    Attributes:
+        name: What is compared.
+        kind: Which sort of quantity it is; unit: its SI unit.
+        max: The largest difference; at: when [s from the start].
+        rms: Root mean square of the difference over common time.
+        settled: Mean of the difference over the last tenth of common time.
+        since: When it was first beyond the tolerance [s]; None if never.
+        tolerance: What does not matter; reason: why that much.
+        verdict: "agrees" within tolerance always; "settles" beyond it on the way, within
+            it in the end; "differs" in the end too.
+        note: What the figures do not say, as which side never touched.
+    """
+
+    name: str
+    kind: Kind
+    unit: str
+    max: float
+    at: float
+    rms: float
+    settled: float
+    since: float | None
+    tolerance: float
+    reason: str
+    verdict: Verdict
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Side:
+    """Whose trace it is.
+
+    Attributes:
+        label: Engine, version, and what is unusual.
+        experiment: What was done.
+        rows: How many rows it has; timestep: their distance [s].
+        recorded: Whether it was read from a file.
+        ended: Why it ended early, or "".
+        emulated: What of the contract the backend keeps instead of its engine.
+    """
+
+    label: str
+    backend: str
+    experiment: str
+    rows: int
+    timestep: float
+    defaults: str
+    recorded: bool
+    ended: str
+    provenance: Provenance
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two traces, compared.
+
+    Attributes:
+        one, two: The sides; every difference is between them, none is the truth.
+        moments: How many moments were compared; until: the last of them [s].
+        agreements: One for each quantity.
+        notes: What makes the comparison less than one of two engines.
+    """
+
+    one: Side
+    two: Side
+    moments: int
+    until: float
+    agreements: tuple[Agreement, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def agrees(self) -> bool:
+        """Whether every quantity agrees at every moment."""
+        return all(found.verdict == "agrees" for found in self.agreements)
+
+    @property
+    def worst(self) -> Agreement | None:
+        """The quantity that is farthest beyond its tolerance; None if nothing was compared."""
+        return max(self.agreements, key=lambda found: found.max / found.tolerance, default=None)
+
+
+def compare(
+    one: Trace,
+    two: Trace,
+    *,
+    tolerances: Mapping[str, float] | None = None,
+    tip: str | None = None,
+) -> Comparison:
+    """Compare two traces of models with the same names.
+
+    Args:
+        one: A trace.
+        two: Another, of any engine; timesteps may differ.
+        tolerances: By kind of quantity [SI], instead of ours.
+        tip: The site to compare; by default gripperframe, else the last one.
+
+    Raises:
+        TraceError: They share no joint, or too few moments.
+    """
+    curves = series(one, two, tip)
+    if not any(curve.kind in ("joint", "slide", "body", "body rotation") for curve in curves):
+        raise TraceError("the traces have no joint in common: nothing can be compared")
+    found = [_of_curve(curve, one, two, tolerances) for curve in curves]
+    found += _touches(one, two, float(curves[0].time[-1]), tolerances)
+    return Comparison(
+        one=_side(one),
+        two=_side(two),
+        moments=len(curves[0].time),
+        until=float(curves[0].time[-1]),
+        agreements=tuple(found),
+        notes=tuple(_notes(one, two)),
+    )
+
+
+def _of_curve(
+    curve: Series, one: Trace, two: Trace, given: Mapping[str, float] | None
+) -> Agreement:
+    allowed = tolerance_for(curve, one, two, given)
+    apart, time = curve.difference, curve.time
+    worst = int(np.argmax(apart))
+    tail = time >= time[-1] - SETTLED * (time[-1] - time[0])
+    # Of a force the mean counts: stiff contacts ring from step to step.
+    if curve.kind == "force":
+        settled = abs(float(curve.one[tail].mean()) - float(curve.two[tail].mean()))
+    else:
+        settled = float(apart[tail].mean())
+    beyond = np.flatnonzero(apart > allowed.value)
+    verdict: Verdict = "agrees"
+    if len(beyond):
+        verdict = "differs" if settled > allowed.value else "settles"
+    return Agreement(
+        name=curve.name,
+        kind=curve.kind,
+        unit=curve.unit,
+        max=float(apart[worst]),
+        at=float(time[worst]),
+        rms=float(np.sqrt(np.mean(apart**2))),
+        settled=settled,
+        since=float(time[beyond[0]]) if len(beyond) else None,
+        tolerance=allowed.value,
+        reason=allowed.reason,
+        verdict=verdict,
+    )
+
+
+def _touches(
+    one: Trace, two: Trace, until: float, given: Mapping[str, float] | None
+) -> list[Agreement]:
+    """When each pair of bodies first touches, on either side."""
+    found = []
+    touches = [trace.touches() for trace in (one, two)]
+    for pair in dict.fromkeys([*touches[0], *touches[1]]):
+        first = [
+            _first(touch.get(pair), trace, until)
+            for touch, trace in zip(touches, (one, two), strict=True)
+        ]
+        if first[0] is None and first[1] is None:
+            continue
+        none: Array = np.empty(0)
+        curve = Series(f"{pair}, first touch", "contact", none, none, none, none)
+        allowed = tolerance_for(curve, one, two, given)
+        note = ""
+        if first[0] is None or first[1] is None:
+            missing, seen = (one, first[1]) if first[0] is None else (two, first[0])
+            # As late as can be: it had not touched when the comparison ended.
+            gap, at = until - float(seen or 0.0), float(seen or 0.0)
+            note = f"never on {missing.header.backend}"
+            verdict: Verdict = "differs"
+        else:
+            gap, at = abs(first[0] - first[1]), min(first[0], first[1])
+            verdict = "agrees" if gap <= allowed.value else "differs"
+        found.append(
+            Agreement(
+                name=curve.name,
+                kind="contact",
+                unit=UNITS["contact"],
+                max=gap,
+                at=at,
+                rms=gap,
+                settled=gap,
+                since=at if verdict == "differs" else None,
+                tolerance=allowed.value,
+                reason=allowed.reason,
+                verdict=verdict,
+                note=note,
+            )
+        )
+    return found
+
+
+def _first(touching: NDArray[np.bool_] | None, trace: Trace, until: float) -> float | None:
+    """When a pair first touches, from the start; None if not within the common time."""
+    if touching is None or not touching.any():
+        return None
+    time = float(trace.time[int(np.argmax(touching))] - trace.time[0])
+    return time if time <= until else None
+
+
+def _side(trace: Trace) -> Side:
+    header = trace.header
+    return Side(
+        label=header.label,
+        backend=header.backend,
+        experiment=header.experiment,
+        rows=len(trace),
+        timestep=header.timestep,
+        defaults=header.defaults,
+        recorded=header.recorded,
+        ended=header.ended,
+        provenance=header.provenance,
+    )
+
+
+def _notes(one: Trace, two: Trace) -> list[str]:
+    a, b = one.header, two.header
+    notes = []
+    if a.provenance.model_sha256 != b.provenance.model_sha256:
+        notes.append(
+            f"the models are two: {a.provenance.model_file} and {b.provenance.model_file} "
+            "have other digests"
+        )
+    only = [*_lacking(a, b), *_lacking(b, a)]
+    if only:
+        notes.append(f"compared is what both have; missing on one side: {', '.join(only)}")
+    elif not np.array_equal(one.qpos[0], two.qpos[0]) or not np.array_equal(
+        one.qvel[0], two.qvel[0]
+    ):
+        notes.append("the runs do not start in the same state")
+    if a.experiment != b.experiment:
+        notes.append(f"the experiments are two: {a.experiment} and {b.experiment}")
+    if a.timestep != b.timestep:
+        notes.append(
+            f"timesteps differ, {1000 * a.timestep:.4g} and {1000 * b.timestep:.4g} ms: compared "
+            "are the moments that both have, nothing is interpolated"
+        )
+    if not np.allclose(a.gravity, b.gravity, rtol=0, atol=1e-12):
+        notes.append(f"gravity differs: {_vector(a.gravity)} and {_vector(b.gravity)} m/s²")
+    commands = [np.array(trace.ctrl[:-1] if len(trace) > 1 else trace.ctrl) for trace in (one, two)]
+    if commands[0].shape == commands[1].shape and not np.array_equal(commands[0], commands[1]):
+        notes.append("the commands differ: the controllers saw different states, or are two")
+    for header in (a, b):
+        if header.ended:
+            notes.append(f"{header.label} ended early: {header.ended}")
+        if header.single:
+            notes.append(
+                f"the recorded run of {header.backend} keeps all but its state in single precision"
+            )
+    return notes
+
+
+def _lacking(a: Header, b: Header) -> list[str]:
+    return [f"{name} ({a.label})" for name in a.joints if name not in b.joints]
+
+
+def _vector(values: tuple[float, ...]) -> str:
+    return " ".join(f"{value:g}" for value in values)

@@ -1,0 +1,155 @@
+"""What two traces are compared by: curves of both sides over common time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..records import Array, JointType
+from ..rotations import angle_between, matrix_from_quat
+from ..traces import Header, Trace
+from .align import Common, common_moments
+
+Kind = Literal[
+    "joint", "slide", "tip", "tip rotation", "body", "body rotation", "energy", "contact", "force"
+]
+UNITS: dict[str, str] = {
+    "joint": "rad",
+    "slide": "m",
+    "tip": "m",
+    "tip rotation": "rad",
+    "body": "m",
+    "body rotation": "rad",
+    "energy": "J",
+    "contact": "s",
+    "force": "N",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """One quantity on both sides.
+
+    Attributes:
+        name: As "elbow_flex" or "gripperframe, position".
+        kind: What it is; says unit and tolerance.
+        time: (n,) since the start [s].
+        one, two: (n,) or (n, k) its values, SI units; empty for a rotation, which has
+            no curve of its own.
+        difference: (n,) how far apart, never negative; of a vector its length.
+    """
+
+    name: str
+    kind: Kind
+    time: Array
+    one: Array
+    two: Array
+    difference: Array
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the values."""
+        return UNITS[self.kind]
+
+
+def series(one: Trace, two: Trace, tip: str | None = None) -> list[Series]:
+    """All curves that both traces have: joints, fingertip, free bodies, energy, forces.
+
+    Args:
+        one: A trace.
+        two: Another, of a model with the same names.
+        tip: The site to compare; by default `default_tip`.
+    """
+    common = common_moments(one, two)
+    found: list[Series] = []
+    for name in one.header.joints:
+        if name in two.header.joints:
+            found += _joint(name, one, two, common)
+    site = default_tip(one.header, two.header) if tip is None else tip
+    if site and "site_xpos" in one and "site_xpos" in two:
+        found += _site(site, one, two, common)
+    if "energy" in one and "energy" in two:
+        totals = [
+            trace["energy"].sum(axis=1)[rows]
+            for trace, rows in ((one, common.one), (two, common.two))
+        ]
+        if np.isfinite(totals).all():
+            found.append(_scalar("energy", "energy", common, totals[0], totals[1]))
+    forces = [normal_forces(trace) for trace in (one, two)]
+    for pair in dict.fromkeys([*forces[0], *forces[1]]):
+        values = [
+            force.get(pair, np.zeros(len(trace)))[rows]
+            for force, trace, rows in zip(forces, (one, two), (common.one, common.two), strict=True)
+        ]
+        found.append(_scalar(f"{pair}, force", "force", common, values[0], values[1]))
+    return found
+
+
+def default_tip(*headers: Header) -> str:
+    """The site that all have: gripperframe, else the last one; "" if they share none."""
+    shared = [s for s in headers[0].sites if s and all(s in header.sites for header in headers)]
+    return "gripperframe" if "gripperframe" in shared else (shared[-1] if shared else "")
+
+
+def normal_forces(trace: Trace) -> dict[str, Array]:
+    """Sum of the normal contact forces (n,) [N] between each pair of bodies."""
+    found: dict[str, Array] = {}
+    if "contact_row" not in trace:
+        return found
+    header = trace.header
+    for row, (one, two), force in zip(
+        trace["contact_row"].tolist(),
+        trace["contact_geom"].tolist(),
+        trace["contact_force"][:, 0].tolist(),
+        strict=True,
+    ):
+        bodies = sorted((header.geom_bodyid[one], header.geom_bodyid[two]))
+        name = " – ".join(header.bodies[body] for body in bodies)
+        found.setdefault(name, np.zeros(len(trace)))[row] += force
+    return found
+
+
+def _scalar(name: str, kind: Kind, common: Common, one: Array, two: Array) -> Series:
+    return Series(name, kind, common.time, one, two, np.abs(one - two))
+
+
+def _joint(name: str, one: Trace, two: Trace, common: Common) -> list[Series]:
+    places = [trace.header.joints.index(name) for trace in (one, two)]
+    kinds = [trace.header.jnt_type[place] for trace, place in zip((one, two), places, strict=True)]
+    if kinds[0] != kinds[1]:
+        return []
+    kind = JointType(kinds[0])
+    values = []
+    for trace, place, rows in zip((one, two), places, (common.one, common.two), strict=True):
+        start = trace.header.jnt_qposadr[place]
+        values.append(trace.qpos[rows, start : start + kind.nq])
+    a, b = values
+    if kind in (JointType.HINGE, JointType.SLIDE):
+        what: Kind = "joint" if kind is JointType.HINGE else "slide"
+        return [_scalar(name, what, common, a[:, 0], b[:, 0])]
+    found = []
+    if kind is JointType.FREE:
+        apart = np.linalg.norm(a[:, :3] - b[:, :3], axis=1)
+        label = f"{name}, position"
+        found.append(Series(label, "body", common.time, a[:, :3], b[:, :3], apart))
+    turned = [
+        matrix_from_quat(q[:, -4:] / np.linalg.norm(q[:, -4:], axis=1, keepdims=True))
+        for q in (a, b)
+    ]
+    angle = angle_between(*turned)
+    none = np.empty((0,))
+    found.append(Series(f"{name}, rotation", "body rotation", common.time, none, none, angle))
+    return found
+
+
+def _site(name: str, one: Trace, two: Trace, common: Common) -> list[Series]:
+    (p, r), (q, s) = one.site(name), two.site(name)
+    p, r, q, s = p[common.one], r[common.one], q[common.two], s[common.two]
+    none = np.empty((0,))
+    angle = angle_between(r, s)
+    return [
+        Series(f"{name}, position", "tip", common.time, p, q, np.linalg.norm(p - q, axis=1)),
+        Series(f"{name}, rotation", "tip rotation", common.time, none, none, angle),
+    ]

@@ -1,0 +1,170 @@
+"""From what was asked for to two traces: run, opened, or played on the other engine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from ..backends import backend_names, load
+from ..errors import BadInputError, MissingEngineError, StateMachineError, unknown_name
+from ..experiments._common import Progress, part_of, silent
+from ..experiments.scenarios import SCENARIOS, scenario
+from ..traces import Trace, play, read, record_scenario, shipped
+from ..traces.files import SUFFIXES
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to compare.
+
+    Attributes:
+        what: Name of an experiment, or one or two files of traces.
+        backends: The two engines; of one trace the second that is not its own.
+        defaults: What `load` is given.
+        model: Instead of the experiment's own; menagerie: where its name is looked up.
+        seconds: Instead of the experiment's own time [s].
+        seed: Of an experiment that draws something.
+        options: For `Model.replace`, on both sides.
+    """
+
+    what: Sequence[str]
+    backends: tuple[str, str] = ("mujoco", "pybullet")
+    defaults: Literal["model", "engine"] = "model"
+    model: str | None = None
+    menagerie: str | None = None
+    seconds: float | None = None
+    seed: int = 0
+    options: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def is_traces(self) -> bool:
+        """Whether files were named, not an experiment."""
+        return any(Path(word).suffix.lower() in SUFFIXES for word in self.what)
+
+    @property
+    def plain(self) -> bool:
+        """Whether it is what the recorded traces of the package are of."""
+        return (
+            self.model is None
+            and self.menagerie is None
+            and self.seconds is None
+            and self.seed == 0
+            and not self.options
+        )
+
+    def typed(self, backend: str) -> str:
+        """The command that records one side."""
+        words = ["statemachine trace record", *self.what, f"--backend {backend}"]
+        if self.defaults == "engine":
+            words.append("--defaults engine")
+        for flag, value, usual in (
+            ("--model", self.model, None),
+            ("--menagerie", self.menagerie and "DIR", None),
+            ("--seconds", self.seconds, None),
+            ("--seed", self.seed, 0),
+            ("--timestep", self.options.get("timestep"), None),
+        ):
+            if value != usual:
+                words.append(f"{flag} {value}")
+        return " ".join(words)
+
+
+def sides_of(
+    request: Request | str, progress: Progress = silent
+) -> tuple[tuple[Trace, Trace], tuple[str, ...]]:
+    """The two traces that a request is about, and a line for each thing that stood in.
+
+    An experiment runs on both backends. Where one has no engine here, its recorded trace
+    takes its place, if the request is one that was recorded. Two traces are opened; the
+    ctrl of one is played on the other engine.
+
+    Raises:
+        UnknownNameError: No such experiment or backend.
+        MissingEngineError: An engine is missing, and nothing was recorded of this.
+        TraceError: A file is no trace.
+    """
+    if isinstance(request, str):
+        request = Request((request,))
+    if not 1 <= len(request.what) <= 2:
+        raise BadInputError("compare takes one experiment, or one or two traces")
+    if request.is_traces:
+        return _of_traces(request, progress)
+    if len(request.what) == 2:
+        raise BadInputError(
+            "compare takes one experiment: it runs on both engines; two traces are files"
+        )
+    scenario(request.what[0])
+    for name in request.backends:
+        if name not in backend_names():
+            raise unknown_name("backend", name, backend_names())
+    said: list[str] = []
+    traces = [
+        _run(request, name, said, part_of(progress, 0.5 * k, 0.5))
+        for k, name in enumerate(request.backends)
+    ]
+    if all(trace.header.recorded for trace in traces):
+        raise MissingEngineError("no engine of the two is installed here", engine="mujoco")
+    return (traces[0], traces[1]), tuple(said)
+
+
+def _run(request: Request, backend: str, said: list[str], progress: Progress) -> Trace:
+    asked = scenario(request.what[0])
+    try:
+        model = load(
+            request.model or asked.model,
+            backend=backend,
+            defaults=request.defaults,
+            menagerie=request.menagerie,
+        )
+    except MissingEngineError as error:
+        if not request.plain:
+            raise
+        try:
+            trace = shipped(asked.name, backend, request.defaults)
+        except StateMachineError:
+            raise error from None
+        said.append(f"{error}; its side is the recorded run that comes with the package")
+        return trace
+    return record_scenario(
+        asked,
+        model,
+        seconds=request.seconds,
+        seed=request.seed,
+        command=request.typed(backend),
+        defaults=request.defaults,
+        options=request.options,
+        progress=progress,
+    )
+
+
+def _of_traces(request: Request, progress: Progress) -> tuple[tuple[Trace, Trace], tuple[str, ...]]:
+    for word in request.what:
+        if Path(word).suffix.lower() not in SUFFIXES:
+            hint = " (an experiment runs on both engines alone)" if word in SCENARIOS else ""
+            raise BadInputError(f"{word!r} is no trace{hint}: a trace ends in .npz or .parquet")
+    opened = [read(word) for word in request.what]
+    if len(opened) == 2:
+        return (opened[0], opened[1]), ()
+    (trace,) = opened
+    others = [name for name in request.backends if name != trace.header.backend]
+    if not others:
+        raise BadInputError(f"the trace is of {trace.header.backend}: name another with --backends")
+    name = request.model or trace.header.provenance.model_file
+    model = load(name, backend=others[0], defaults=request.defaults, menagerie=request.menagerie)
+    options = {**trace.header.options, **request.options}
+    if options:
+        model = model.replace(**options)
+    played = play(
+        trace,
+        model,
+        command=f"statemachine trace play {request.what[0]} --backend {others[0]}",
+        defaults=request.defaults,
+        options=options,
+        progress=progress,
+    )
+    said = (
+        f"the ctrl of {request.what[0]} was played on {others[0]}, from the state it starts in",
+    )
+    return (trace, played), said

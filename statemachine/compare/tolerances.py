@@ -1,0 +1,121 @@
+"""How much two runs may differ before it matters, and why that much."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import BadInputError, unknown_name
+from ..traces import Trace
+from .series import UNITS, Series
+
+# The SO-101's servos (Feetech STS3215) tell 4096 positions a turn.
+COUNT = 2 * np.pi / 4096
+_COUNT_SAYS = "one count of the servos' encoders, 1/4096 turn: the robot itself tells no more"
+_ENERGY = 0.01  # of what the run turns over
+_FORCE = 0.05  # of the largest
+_BODY, _BODY_TURN = 1e-3, np.radians(1.0)
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """A difference that does not matter: how much [SI], and the reason."""
+
+    value: float
+    reason: str
+
+
+def tolerance_for(
+    series: Series, one: Trace, two: Trace, given: Mapping[str, float] | None = None
+) -> Tolerance:
+    """The tolerance of a quantity.
+
+    Args:
+        series: What is compared.
+        one: The traces that it is of; their reach, energy and timestep are its measure.
+        two: See one.
+        given: Values by kind that win over ours [SI].
+    """
+    kind = series.kind
+    if given and kind in given:
+        return Tolerance(given[kind], "as given")
+    if kind in ("joint", "tip rotation"):
+        return Tolerance(COUNT, _COUNT_SAYS)
+    if kind == "slide":
+        return Tolerance(1e-4, "a tenth of a millimetre")
+    if kind == "tip":
+        reach = max(_reach(one, series), _reach(two, series))
+        return Tolerance(
+            COUNT * reach,
+            f"what one count of a servo's encoder moves it, {reach:.2f} m from the arm's foot",
+        )
+    if kind == "body":
+        return Tolerance(_BODY, "a millimetre: what a grasp of a box of centimetres forgives")
+    if kind == "body rotation":
+        return Tolerance(_BODY_TURN, "a degree, which moves the rim of a hand's breadth by 1 mm")
+    if kind == "energy":
+        range_ = max(float(np.ptp(series.one)), float(np.ptp(series.two)))
+        return Tolerance(
+            max(_ENERGY * range_, 1e-9), f"1 % of the {range_:.3g} J that the run turns over"
+        )
+    if kind == "force":
+        top = max(float(np.max(series.one)), float(np.max(series.two)))
+        return Tolerance(max(_FORCE * top, 1e-6), f"5 % of the largest, {top:.3g} N")
+    longest = max(one.header.timestep, two.header.timestep)
+    return Tolerance(
+        longest * (1 + 1e-9),
+        f"one timestep, {1000 * longest:.3g} ms: an engine looks at contacts once in a step",
+    )
+
+
+def parse_tolerances(words: list[str]) -> dict[str, float]:
+    """Tolerances from words like "joint=0.5deg", "tip=2mm", "energy=0.01".
+
+    Raises:
+        BadInputError: A word is none.
+        UnknownNameError: There is no such kind of quantity.
+    """
+    found = {}
+    for word in words:
+        kind, _, text = word.partition("=")
+        kind = kind.replace("-", " ")
+        if kind not in UNITS:
+            raise unknown_name("kind of quantity", kind, UNITS)
+        scale, unit = 1.0, UNITS[kind]
+        for suffix, factor, of in _SUFFIXES:
+            if text.endswith(suffix):
+                if of != unit:
+                    raise BadInputError(f"{kind} is in {unit}, not in {suffix}: {word!r}")
+                text, scale = text.removesuffix(suffix), factor
+                break
+        try:
+            value = float(text) * scale
+        except ValueError:
+            value = float("nan")
+        if not (np.isfinite(value) and value > 0):
+            raise BadInputError(f"a tolerance reads like joint=0.5deg or tip=2mm; got {word!r}")
+        found[kind] = value
+    return found
+
+
+_SUFFIXES = (
+    ("deg", np.pi / 180, "rad"),
+    ("rad", 1.0, "rad"),
+    ("mm", 1e-3, "m"),
+    ("ms", 1e-3, "s"),
+    ("mJ", 1e-3, "J"),
+    ("m", 1.0, "m"),
+    ("s", 1.0, "s"),
+    ("J", 1.0, "J"),
+    ("N", 1.0, "N"),
+)
+
+
+def _reach(trace: Trace, series: Series) -> float:
+    """How far a site gets from where the first jointed body has its origin [m]."""
+    positions, _ = trace.site(series.name.partition(",")[0])
+    if "xpos" not in trace or len(trace.header.bodies) < 2:
+        return float(np.linalg.norm(positions, axis=1).max())
+    return float(np.linalg.norm(positions - trace["xpos"][:, 1], axis=1).max())

@@ -1,0 +1,159 @@
+"""The page of a comparison of two runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from ..compare import Agreement, Comparison
+from ..page import Page, Table, Text, Verdict
+from .figures_of import quantity, short_time
+
+_WORDS = {"agrees": "agrees", "settles": "settles", "differs": "DIFFERS"}
+
+
+def page(comparison: Comparison, says: str = "", said: Sequence[str] = ()) -> Page:
+    """Figures and verdicts, then the reasons of the tolerances.
+
+    Args:
+        comparison: What was found.
+        says: What happens in the experiment.
+        said: What stood in for a run, line by line.
+    """
+    one, two = comparison.one, comparison.two
+    blocks: list[Any] = []
+    if says:
+        blocks.append(Text(says))
+    blocks += [Text(_sentence(line)) for line in (*said, *comparison.notes)]
+    blocks.append(
+        Table(
+            ("quantity", "max", "at", "RMS", "settled", "beyond from", "verdict"),
+            [_row(found) for found in comparison.agreements],
+            title=f"{one.label} against {two.label}: how far apart",
+            words=frozenset({0, 6}),
+            emphasis=frozenset(
+                k for k, found in enumerate(comparison.agreements) if found.verdict == "differs"
+            ),
+        )
+    )
+    blocks.append(Text(_summary(comparison)))
+    blocks.append(
+        Text(
+            f"Compared at {comparison.moments} moments over {comparison.until:g} s. Settled is "
+            "the mean over the last tenth of them. A quantity agrees if it is within its "
+            "tolerance always, settles if it is so in the end, and differs otherwise."
+        )
+    )
+    blocks.append(
+        Table(
+            ("quantities", "tolerance", "because"),
+            _reasons(comparison),
+            title="What does not matter, and why",
+            words=frozenset({0, 2}),
+        )
+    )
+    for side in (one, two):
+        if side.provenance.emulated:
+            blocks.append(
+                Text(
+                    f"{side.backend}: what the model asks for and the engine lacks is emulated "
+                    f"({', '.join(side.provenance.emulated)}). The engine as its own users meet "
+                    "it: --defaults engine."
+                )
+            )
+            break
+    blocks.append(Text("Neither side is the truth, and two engines that agree may both be wrong."))
+    blocks.append(Verdict(_verdict(comparison), comparison.agrees))
+    title = f"{one.experiment}: {one.label} and {two.label}"
+    return Page(title, _origin(comparison), blocks)
+
+
+def _row(found: Agreement) -> tuple[str, ...]:
+    kind = found.kind
+    if kind == "contact":
+        gap = found.note or quantity(found.max, kind)
+        return (found.name, gap, short_time(found.at), "", "", "", _WORDS[found.verdict])
+    since = "" if found.since is None else short_time(found.since)
+    return (
+        found.name,
+        quantity(found.max, kind),
+        short_time(found.at),
+        quantity(found.rms, kind),
+        quantity(found.settled, kind),
+        since,
+        _WORDS[found.verdict],
+    )
+
+
+def _reasons(comparison: Comparison) -> list[tuple[str, str, str]]:
+    """One row for each tolerance: who shares it, how much, why."""
+    shared: dict[tuple[str, str], list[str]] = {}
+    for found in comparison.agreements:
+        key = (quantity(found.tolerance, found.kind), found.reason)
+        shared.setdefault(key, []).append(found.kind)
+    return [
+        (", ".join(dict.fromkeys(_PLURAL[kind] for kind in kinds)), value, reason)
+        for (value, reason), kinds in shared.items()
+    ]
+
+
+_PLURAL = {
+    "joint": "joints",
+    "slide": "slides",
+    "tip": "fingertip",
+    "tip rotation": "its rotation",
+    "body": "free bodies",
+    "body rotation": "their rotation",
+    "energy": "energy",
+    "contact": "first touches",
+    "force": "contact forces",
+}
+
+
+def _summary(comparison: Comparison) -> str:
+    counts = [
+        sum(found.verdict == verdict for found in comparison.agreements)
+        for verdict in ("agrees", "settles", "differs")
+    ]
+    total = len(comparison.agreements)
+    if counts[0] == total:
+        worst = comparison.worst
+        text = f"All {total} quantities agree at every moment"
+        if worst is not None:
+            text += (
+                f"; nearest to its tolerance comes {worst.name}, with "
+                f"{quantity(worst.max, worst.kind)} of {quantity(worst.tolerance, worst.kind)}"
+            )
+        return text + "."
+    apart = [found.since for found in comparison.agreements if found.since is not None]
+    text = f"Of {total} quantities {counts[0]} agree, {counts[1]} settle and {counts[2]} differ."
+    if apart:
+        first = min(apart)
+        names = [found.name for found in comparison.agreements if found.since == first]
+        text += f" They part at {short_time(first)}: first {', '.join(names[:3])}"
+        text += f" and {len(names) - 3} more." if len(names) > 3 else "."
+    return text
+
+
+def _verdict(comparison: Comparison) -> str:
+    if comparison.agrees:
+        return f"{comparison.one.backend} and {comparison.two.backend} agree within tolerance"
+    beyond = [found.name for found in comparison.agreements if found.verdict != "agrees"]
+    few = ", ".join(beyond[:4]) + (f" and {len(beyond) - 4} more" if len(beyond) > 4 else "")
+    return f"all quantities agree within tolerance (not: {few})"
+
+
+def _origin(comparison: Comparison) -> str:
+    words = []
+    for side in (comparison.one, comparison.two):
+        seed = side.provenance.seed
+        text = f"{side.label}, {1000 * side.timestep:.4g} ms"
+        words.append(text + (f", seed {seed}" if seed is not None else ""))
+    file = comparison.one.provenance.model_file
+    digest = comparison.one.provenance.model_sha256[:8]
+    return f"{file} ({digest}); {'; '.join(words)}"
+
+
+def _sentence(line: str) -> str:
+    text = line[:1].upper() + line[1:]
+    return text if text.endswith(".") else text + "."
