@@ -9,9 +9,11 @@ import sys
 from contextlib import suppress
 from typing import Any
 
-from ._common import PROGRAM, add_backend, add_menagerie, add_model
+from ..errors import BadInputError, TraceError
+from ._common import PROGRAM, add_backend, add_menagerie
 
 _PORT = 8080
+_MODEL = "so101/scene_box"
 
 
 def add(commands: Any) -> None:
@@ -22,7 +24,14 @@ def add(commands: Any) -> None:
         description="Show a simulation in the browser at the pace of the clock, with a slider "
         "for each actuator; the other engine beside it as a ghost. Ctrl-C ends it.",
     )
-    add_model(parser, "so101/scene_box")
+    parser.add_argument(
+        "traces", nargs="*", metavar="TRACE", help="play this recording; a second one is the ghost"
+    )
+    parser.add_argument(
+        "--model",
+        metavar="NAME|FILE",
+        help=f"the model (default {_MODEL}; of a recording, its own)",
+    )
     add_backend(parser, everyone=False)
     parser.add_argument(
         "--ghost", metavar="NAME", help="another engine, under the same commands, seen through"
@@ -54,22 +63,48 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
-    from ..backends import load
-    from ..drawing import drawing_of
     from ..view.pace import checked_speed
     from ..view.server import free_port, require_viser
-    from ..view.session import Session
 
     require_viser()
     checked_speed(options.speed)
     port = free_port(options.host, options.port)
-    names = [options.backend, *([options.ghost] if options.ghost else [])]
-    models = [load(options.model, backend=name, menagerie=options.menagerie) for name in names]
+    return (_play if options.traces else _simulate)(options, port)
+
+
+def _simulate(options: argparse.Namespace, port: int) -> int:
+    """A session on one engine or two."""
+    from ..backends import load
+    from ..drawing import drawing_of
+    from ..view.session import Session
+
+    name = options.model or _MODEL
+    backends = [options.backend, *([options.ghost] if options.ghost else [])]
+    models = [load(name, backend=backend, menagerie=options.menagerie) for backend in backends]
     keyframe = _keyframe(options.keyframe, models[0])
-    drawing = drawing_of(models[0])
+    engines = " and ".join(f"{model.backend} {model.engine_version}" for model in models)
     with Session(models, keyframe, options.site) as session:
-        engines = " and ".join(f"{model.backend} {model.engine_version}" for model in models)
-        _serve(options, session, drawing, keyframe, port, f"{options.model} on {engines}")
+        _serve(options, session, drawing_of(models[0]), keyframe, port, f"{name} on {engines}")
+    return 0
+
+
+def _play(options: argparse.Namespace, port: int) -> int:
+    """One recording or two."""
+    from ..backends import load
+    from ..drawing import drawing_of
+    from ..traces import read
+    from ..view.recording import Recording
+
+    if len(options.traces) > 2:
+        raise BadInputError(f"view shows one trace or two; got {len(options.traces)}")
+    recording = Recording([read(path) for path in options.traces])
+    header = recording.header
+    name = options.model or header.provenance.model_file.removesuffix(".xml")
+    model = load(name, menagerie=options.menagerie)
+    if model.body_names != header.bodies:
+        raise TraceError(f"the trace is of another model than {name}: say which with --model")
+    what = f"{header.experiment or 'a run'} of {name}, recorded on {' and '.join(recording.labels)}"
+    _serve(options, recording, drawing_of(model), None, port, what)
     return 0
 
 
@@ -114,14 +149,17 @@ def _serve(
 
 
 def _announce(options: argparse.Namespace, port: int, what: str, drawing: Any) -> None:
+    everywhere = options.host in ("0.0.0.0", "::")
+    here = everywhere or options.host in ("127.0.0.1", "::1", "localhost")
+    host = f"[{options.host}]" if ":" in options.host else options.host
+    address = f"http://{'localhost' if here else host}:{port}"
     if options.port not in (0, port):
         print(f"port {options.port} is taken, so it is {port}")
-    local = options.host in ("127.0.0.1", "0.0.0.0", "localhost", "::1", "::")
-    host = "localhost" if local else options.host
-    address = f"http://{f'[{host}]' if ':' in host else host}:{port}"
     print(f"{address} shows {what}; Ctrl-C ends it")
-    machine = "HOST" if not os.environ.get("SSH_CONNECTION") else socket.gethostname()
-    if local:
+    if everywhere or not here:
+        print(f"whoever reaches port {port} of this machine can move the sliders")
+    else:
+        machine = socket.gethostname() if os.environ.get("SSH_CONNECTION") else "HOST"
         print(f"from another machine: ssh -L {port}:localhost:{port} {machine}, then {address}")
     for left_out in drawing.left_out:
         print(f"not drawn: {left_out}")

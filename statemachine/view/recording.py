@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import BadInputError, TraceError
-from ..traces import Trace
+from ..records import Array
+from ..traces import Header, Trace
 from .frames import (
     Command,
     Control,
@@ -24,6 +25,7 @@ from .frames import (
 )
 
 _NEEDED = ("xpos", "xquat")
+_EQUAL = 1e-6  # seconds between moments that count as the same
 
 
 class Recording:
@@ -52,21 +54,27 @@ class Recording:
         for other in traces[1:]:
             if (other.header.bodies, other.header.nq) != (first.header.bodies, first.header.nq):
                 raise TraceError(f"{other!r} is of another model than {first!r}")
-            if not math.isclose(other.header.timestep, first.header.timestep):
-                raise TraceError(
-                    f"the timesteps differ: {first.header.timestep:g} s and "
-                    f"{other.header.timestep:g} s"
-                )
         self._traces = tuple(traces)
-        self._rows = min(len(trace) for trace in traces)
         self.timestep = first.header.timestep
-        self.names = tuple(trace.header.label for trace in traces)
+        ends = [float(trace.time[-1] - trace.time[0]) for trace in traces]
+        self.length: float | None = min(ends)
+        self._rows = int(np.searchsorted(first.time - first.time[0], min(ends) + _EQUAL))
+        self.names = tuple(_name(trace.header) for trace in traces)
         sites = first.header.sites if all("site_xpos" in trace for trace in traces) else ()
         usual = "gripperframe" if "gripperframe" in sites else (sites[-1] if sites else "")
         self.tip = usual
         self._site = sites.index(usual) if sites else None
-        self.length: float | None = (self._rows - 1) * self.timestep
         self._row, self._running, self._resets = 0, False, 1
+
+    @property
+    def header(self) -> Header:
+        """Of the first trace."""
+        return self._traces[0].header
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """What made each of them."""
+        return tuple(trace.header.label.removesuffix(", recorded") for trace in self._traces)
 
     @property
     def running(self) -> bool:
@@ -82,15 +90,16 @@ class Recording:
         match command:
             case Run():
                 if self._row == self._rows - 1:
-                    self._row = 0
-                self._running = True
+                    self._jump(0)
+                self._running = self._rows > 1
             case Pause():
                 self._running = False
             case Step(count):
                 self._running = False
                 self.advance(count)
+                self._jump(self._row)
             case Reset():
-                self._row = 0
+                self._jump(0)
             case Seek(time):
                 if not math.isfinite(time):
                     raise BadInputError(f"there is no row at {time} s")
@@ -98,22 +107,33 @@ class Recording:
             case _:
                 raise BadInputError("a recording has no sliders: nothing runs here")
 
+    def _jump(self, row: int) -> None:
+        """Go to a row that the slider did not ask for."""
+        self._row = row
+        self._resets += 1
+
     def advance(self, count: int = 1) -> None:
         """Go on by so many rows; it stops at the last."""
         self._row = min(self._row + max(count, 0), self._rows - 1)
-        if self._row == self._rows - 1:
+        if self._row == self._rows - 1 and self._running:
             self._running = False
+            self._jump(self._row)
 
     def frame(self) -> Frame:
-        """This row."""
-        poses, gap = [], None
-        for trace in self._traces:
-            tip = None if self._site is None else trace["site_xpos"][self._row, self._site]
-            xpos, xquat = trace["xpos"][self._row], trace["xquat"][self._row]
-            poses.append(Pose(trace.header.label, xpos, xquat, tip))
+        """This row of the first trace, and what the other has nearest to its time."""
         first = self._traces[0]
-        if len(self._traces) > 1:
-            gap = self._gap((poses[0], poses[1]))
+        since = first.time[self._row] - first.time[0]
+        rows = [int(np.abs(trace.time - trace.time[0] - since).argmin()) for trace in self._traces]
+        poses = []
+        for trace, name, row in zip(self._traces, self.names, rows, strict=True):
+            tip = None if self._site is None else trace["site_xpos"][row, self._site]
+            poses.append(Pose(name, trace["xpos"][row], trace["xquat"][row], tip))
+        gap = None
+        if len(rows) > 1:
+            other = self._traces[1]
+            # Moments that are not the same say nothing about the engines.
+            if abs(other.time[rows[1]] - other.time[0] - since) < _EQUAL:
+                gap = self._gap((poses[0], poses[1]), (first.qpos[rows[0]], other.qpos[rows[1]]))
         return Frame(
             time=float(first.time[self._row]),
             steps=self._row,
@@ -125,13 +145,16 @@ class Recording:
             trouble="",
         )
 
-    def _gap(self, poses: tuple[Pose, Pose]) -> Gap:
-        header = self._traces[0].header
-        one, two = (trace.qpos[self._row] for trace in self._traces[:2])
+    def _gap(self, poses: tuple[Pose, Pose], qpos: tuple[Array, Array]) -> Gap:
+        header = self.header
         return gap_between(
             header.joints,
             header.jnt_type,
             header.jnt_qposadr,
-            (one, two),
+            qpos,
             (poses[0].tip, poses[1].tip),
         )
+
+
+def _name(header: Header) -> str:
+    return header.backend + (", engine defaults" if header.defaults == "engine" else "")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
+import logging
 import os
 import socket
 from types import ModuleType
@@ -62,8 +64,6 @@ def free_port(host: str, port: int) -> int:
 
 
 def _is_taken(error: OSError) -> bool:
-    import errno
-
     # Windows says WSAEADDRINUSE.
     return error.errno in (errno.EADDRINUSE, 10048)
 
@@ -75,6 +75,8 @@ def serve(host: str, port: int, label: str) -> Any:
         MissingEngineError: viser is not installed.
     """
     viser = require_viser()
+    # Who connects and says nothing, as browsers do to be quick, is no news for a terminal.
+    logging.getLogger("websockets").addHandler(logging.NullHandler())
     with _hush(), _without("_VISER_PORT_OVERRIDE"):
         server = viser.ViserServer(host=host, port=port, label=label, verbose=False)
     # A tab can ask viser to open a tunnel to a server of its makers: not from here.

@@ -23,6 +23,7 @@ _THINNER = 1e-3  # of the extent: a ghost inside its twin is not seen where the 
 _DISTANCE = 1.1  # of the camera, in extents
 _ROUND = ("sphere", "capsule", "ellipsoid", "cylinder")  # shaded smoothly
 _SPAN = 0.1  # seconds between two readouts
+_HELD = 0.3  # seconds for which a slider is still in somebody's hand
 _DEFAULT = "default state"
 _DIM = "opacity:.65;padding-right:.8em;vertical-align:top"
 
@@ -52,7 +53,7 @@ class ViserFront:
         self._asked: queue.SimpleQueue[Command] = queue.SimpleQueue()
         self._frames: list[dict[int, Any]] = []
         self._moved: dict[str, Any] = {}
-        self._resets, self._said, self._when = 0, "", 0.0
+        self._resets, self._said, self._when, self._dragged = 0, "", 0.0, 0.0
         with server.atomic():
             self._build_scene(drawing)
             self._build_panel(speed, keyframe)
@@ -156,7 +157,9 @@ class ViserFront:
         self._count = gui.add_number("steps", 1, min=1, max=100_000, step=1)
         self._on_click(gui.add_button("Step"), lambda: Step(int(self._count.value)))
         start = _DEFAULT if keyframe is None else session.places[keyframe]
-        self._places = gui.add_dropdown("to", (*session.places, _DEFAULT), initial_value=start)
+        places = (*session.places, _DEFAULT) if session.length is None else ("start",)
+        start = start if start in places else places[0]
+        self._places = gui.add_dropdown("to", places, initial_value=start)
         self._on_click(gui.add_button("Reset"), self._reset)
         self._speed = gui.add_number("speed ×", float(speed), min=SLOWEST, max=FASTEST, step=0.05)
         self._on_update(self._speed, lambda: SetSpeed(float(self._speed.value)))
@@ -165,12 +168,12 @@ class ViserFront:
             self._ghost = gui.add_checkbox(f"ghost: {session.names[1]}", True)
             self._on_update(self._ghost, self._show_ghost)
         self._sliders: list[Any] = []
-        self._when_seek: Any = None
+        self._seek: Any = None
         if session.length:
-            self._when_seek = gui.add_slider(
-                "time", 0.0, float(session.length), float(session.timestep), 0.0
+            self._seek = gui.add_slider(
+                "seek [s]", 0.0, float(session.length), float(session.timestep), 0.0
             )
-            self._on_update(self._when_seek, lambda: Seek(float(self._when_seek.value)))
+            self._on_update(self._seek, self._sought)
         if session.controls:
             with gui.add_folder("ctrl"):
                 for index in range(len(session.controls)):
@@ -194,18 +197,23 @@ class ViserFront:
 
     def _follow(self, frame: Frame) -> None:
         """Put the sliders to commands that did not come from them."""
-        for control, slider, value in zip(
-            self._session.controls, self._sliders, frame.ctrl, strict=True
-        ):
-            shown = _round(float(value) / control.scale, slider.step)
+        for index, slider in enumerate(self._sliders):
+            scale = self._session.controls[index].scale
+            shown = _round(float(frame.ctrl[index]) / scale, slider.step)
             slider.value = min(max(shown, slider.min), slider.max)
+        self._follow_time(frame)
+
+    def _follow_time(self, frame: Frame) -> None:
+        # Not out of the hand of someone who drags it.
+        if self._seek is not None and time.monotonic() - self._dragged > _HELD:
+            self._seek.value = min(frame.steps * self._session.timestep, self._seek.max)
 
     def _switch(self, frame: Frame) -> None:
         label = "Pause" if frame.running else "Run"
         if self._switch_button.label != label:
             self._switch_button.label = label
-        if self._when_seek is not None and frame.running:
-            self._when_seek.value = frame.steps * self._session.timestep
+        if frame.running:
+            self._follow_time(frame)
 
     def _say(self, frame: Frame, pace: Pace, note: str) -> None:
         now = time.monotonic()
@@ -225,6 +233,10 @@ class ViserFront:
         place = self._places.value
         places = self._session.places
         return Reset(places.index(place) if place in places else None)
+
+    def _sought(self) -> Command:
+        self._dragged = time.monotonic()
+        return Seek(float(self._seek.value))
 
     def _show_ghost(self) -> None:
         for handle in self._frames[1].values():

@@ -21,10 +21,12 @@ def rows(frame: Frame, pace: Pace, tip: str) -> list[tuple[str, str]]:
         ("steps", f"{frame.steps:,}"),
         ("pace", _pace(frame, pace)),
     ]
+    if tip:
+        found.append(("tip", tip))
     for pose in frame.poses:
         if pose.tip is not None:
             where = "  ".join(f"{1000 * value:.1f}" for value in pose.tip)
-            found.append((f"{tip}, {pose.name}" if len(frame.poses) > 1 else tip, f"{where} mm"))
+            found.append((f"on {pose.name}", f"{where} mm"))
     if frame.gap is not None:
         if frame.gap.tip is not None:
             found.append(("tips apart", f"{1000 * frame.gap.tip:.3f} mm"))
