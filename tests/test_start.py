@@ -13,7 +13,7 @@ from statemachine.engines import ENGINES, require
 
 from .conftest import REQUIRED, ROOT
 
-HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "xml.etree")
+HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "viser", "xml.etree")
 
 
 @pytest.mark.parametrize(
@@ -27,6 +27,7 @@ HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "xml.
         ("from statemachine.cli import main; main(['fingertip', '--help'])", set()),
         ("from statemachine.cli import main; main(['conventions', '--help'])", set()),
         ("from statemachine.cli import main; main(['check', '--help'])", set()),
+        ("from statemachine.cli import main; main(['view', '--help'])", set()),
         ("import statemachine.interface, statemachine.verbs", {"numpy"}),
         ("import statemachine.backends, statemachine.conformance", {"numpy", "xml.etree"}),
         ("import statemachine.kinematics", {"numpy", "xml.etree"}),

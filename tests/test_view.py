@@ -271,11 +271,11 @@ def test_the_fingertip_is_the_usual_site_or_the_one_that_was_named(odd: sm.Model
 
 def test_the_gap_of_slides_is_a_length() -> None:
     gap = frames.gap_between(
-        "ab", [2, 2], [0, 1], (np.zeros(2), np.array([0.1, -0.2])), (None,) * 2
+        "ab", [2, 2], [0, 1], (np.zeros(2), np.array([0.1, -0.2])), (None, None)
     )
     assert (gap.joint, gap.angle, gap.slide, gap.tip) == ("b", 0.2, True, None)
     gap = frames.gap_between(
-        "ab", [2, 3], [0, 1], (np.zeros(2), np.array([0.3, -0.2])), (None,) * 2
+        "ab", [2, 3], [0, 1], (np.zeros(2), np.array([0.3, -0.2])), (None, None)
     )
     assert (gap.joint, gap.angle, gap.slide) == ("b", 0.2, False)
     free = frames.gap_between("a", [0], [0], (np.zeros(7), np.ones(7)), (None, None))
