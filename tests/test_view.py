@@ -18,7 +18,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.errors import BadInputError, TraceError, UnknownNameError
-from statemachine.traces import record
+from statemachine.traces import record, write
 from statemachine.view import frames, words
 from statemachine.view.frames import (
     Command,
@@ -652,17 +652,32 @@ def test_it_says_nothing_but_its_own_lines(tmp_path: Path) -> None:
         (["--site", "nose"], 2, "nose"),
         (["--ghost", "pybulet"], 2, "pybullet"),
         (["--model", "so1O1"], 2, "so101"),
+        (["--seconds", "-1"], 2, "seconds"),
+        (["--seconds", "nan"], 2, "seconds"),
         (["gone.npz"], 2, "gone.npz"),
+        (["gone.npz", "--ghost", "pybullet"], 2, "recording"),
         (["a.npz", "b.npz", "c.npz"], 2, "one trace or two"),
     ],
 )
 def test_every_mistake_is_one_line(cli: Cli, arguments: list[str], code: int, words: str) -> None:
     pytest.importorskip("viser")
-    done = cli("view", *arguments, "--seconds", "0.1")
+    done = cli("view", "--seconds", "0.1", *arguments)
     assert done.returncode == code, done.stderr
     assert words in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert done.stdout == ""
+
+
+def test_a_trace_is_shown_and_no_engine_of_its_own_is_needed(tmp_path: Path) -> None:
+    pytest.importorskip("viser")
+    model = sm.load("so101/scene_box")
+    file = write(record(model, seconds=0.1, keyframe=0, experiment="box"), tmp_path / "box.npz")
+    port = str(_free_pair())
+    with Viewer(tmp_path, str(file), str(file), "--port", port, "--seconds", "0.3") as viewer:
+        code, text, said = viewer.end()
+        assert (code, said) == (0, "")
+        assert "box of so101/scene_box" in text
+        assert f"mujoco {model.engine_version}" in text
 
 
 def test_without_viser_the_extra_is_named(tmp_path: Path) -> None:

@@ -14,9 +14,11 @@ import pytest
 
 import statemachine as sm
 from statemachine.drawing import drawing_of
+from statemachine.traces import record
 from statemachine.view import server as serving
-from statemachine.view.frames import Pause, SetCtrl
+from statemachine.view.frames import Pause, Reset, Run, SetCtrl
 from statemachine.view.live import Live, Pace
+from statemachine.view.recording import Recording
 from statemachine.view.session import Session
 from statemachine.view.viser_front import ViserFront, _page, thinner
 
@@ -293,6 +295,27 @@ def test_the_page_is_told_where_every_body_is_on_each_engine() -> None:
                     np.testing.assert_array_equal(mesh.faces, part.faces)
         finally:
             serving.stop(server)
+
+
+def test_the_slider_of_a_recording_follows_it() -> None:
+    model = sm.load("so101/scene")
+    recording = Recording([record(model, seconds=0.5)])
+    server = serving.serve("127.0.0.1", serving.free_port("127.0.0.1", 0), "t")
+    try:
+        front = ViserFront(server, recording, drawing_of(model))
+        assert (front._seek.min, front._seek.max) == (0, pytest.approx(0.5))
+        recording.apply(Run())
+        for _ in range(40):
+            recording.advance()
+            front.show(recording.frame(), Pace(1.0, None, False), "")
+        assert front._seek.value == pytest.approx(40 * model.timestep)
+        recording.apply(Reset())
+        front.show(recording.frame(), Pace(1.0, None, False), "")
+        assert front._seek.value == 0
+        time.sleep(0.2)
+        assert front.commands() == []
+    finally:
+        serving.stop(server)
 
 
 def test_what_a_model_is_called_is_no_code_on_the_page() -> None:

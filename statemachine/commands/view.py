@@ -68,6 +68,8 @@ def run(options: argparse.Namespace) -> int:
 
     require_viser()
     checked_speed(options.speed)
+    if options.seconds is not None and not 0 < options.seconds < float("inf"):
+        raise BadInputError(f"seconds must be above 0; got {options.seconds:g}")
     port = free_port(options.host, options.port)
     return (_play if options.traces else _simulate)(options, port)
 
@@ -97,6 +99,9 @@ def _play(options: argparse.Namespace, port: int) -> int:
 
     if len(options.traces) > 2:
         raise BadInputError(f"view shows one trace or two; got {len(options.traces)}")
+    for name in ("ghost", "keyframe", "site"):
+        if getattr(options, name) is not None:
+            raise BadInputError(f"--{name} is for a simulation, and a trace is a recording")
     recording = Recording([read(path) for path in options.traces])
     header = recording.header
     name = options.model or header.provenance.model_file.removesuffix(".xml")
