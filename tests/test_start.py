@@ -29,6 +29,7 @@ HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "vise
         ("from statemachine.cli import main; main(['check', '--help'])", set()),
         ("from statemachine.cli import main; main(['view', '--help'])", set()),
         ("import statemachine.interface, statemachine.verbs", {"numpy"}),
+        ("import statemachine.staleness", {"numpy"}),
         ("import statemachine.backends, statemachine.conformance", {"numpy", "xml.etree"}),
         ("import statemachine.kinematics", {"numpy", "xml.etree"}),
     ],

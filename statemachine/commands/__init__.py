@@ -6,7 +6,7 @@ default `run` takes the parsed options and returns the exit code.
 
 from __future__ import annotations
 
-from . import check, compare, conventions, doctor, fingertip, lesson, view
+from . import check, compare, conventions, doctor, fingertip, lesson, trace, view
 
 # In the order in which --help shows them.
-COMMANDS = (lesson, check, conventions, fingertip, compare, view, doctor)
+COMMANDS = (lesson, check, conventions, fingertip, compare, trace, view, doctor)

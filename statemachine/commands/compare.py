@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from ..errors import BadInputError
+from . import _compare_models
 from ._common import PROGRAM, add_json, add_menagerie, complain, show
 
 
@@ -19,7 +20,7 @@ def add(commands: Any) -> None:
             "quantity with its tolerance and a verdict. One trace: its ctrl is played on the "
             "other engine."
         ),
-        epilog=f"Experiments: {', '.join(_EXPERIMENTS)}. Exit code 1: something differs.",
+        epilog=f"Experiments: {', '.join(EXPERIMENTS)}. Exit code 1: something differs.",
     )
     parser.add_argument(
         "what",
@@ -30,7 +31,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--backends",
         nargs=2,
-        default=["mujoco", "pybullet"],
+        default=None,
         metavar=("A", "B"),
         help="the engines (default mujoco pybullet)",
     )
@@ -43,12 +44,13 @@ def add(commands: Any) -> None:
         metavar="KIND=VALUE",
         help="another tolerance, such as joint=0.5deg, tip=2mm, energy=0.1J",
     )
+    _compare_models.add_options(parser)
     add_json(parser)
     parser.set_defaults(run=run)
 
 
 # As `experiments.scenarios.SCENARIOS`, which needs NumPy; a test compares them.
-_EXPERIMENTS = ("hold", "gravity", "droop", "fall", "box", "waves")
+EXPERIMENTS = ("hold", "gravity", "droop", "fall", "box", "waves")
 
 
 def add_defaults(parser: argparse.ArgumentParser) -> None:
@@ -69,16 +71,17 @@ def add_run(parser: argparse.ArgumentParser) -> None:
     add_menagerie(parser)
     parser.add_argument("--seconds", type=float, default=None, metavar="S", help="simulated time")
     parser.add_argument("--timestep", type=float, default=None, metavar="S", help="on both sides")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of waves (default 0)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of what is drawn (0)")
 
 
 def request_of(options: argparse.Namespace) -> Any:
     """What was asked for, as a Request."""
     from ..compare import Request
 
+    one, two = options.backends or ("mujoco", "pybullet")
     return Request(
         what=tuple(options.what),
-        backends=tuple(options.backends),
+        backends=(one, two),
         defaults=options.defaults,
         model=options.model,
         menagerie=options.menagerie if options.model else None,
@@ -90,12 +93,15 @@ def request_of(options: argparse.Namespace) -> Any:
 
 def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
+    if options.models:
+        return _compare_models.run(options)
+    _compare_models.refuse_alone(options)
     if not options.what:
         raise BadInputError(
-            f"compare what? An experiment ({', '.join(_EXPERIMENTS)}) or traces: "
+            f"compare what? An experiment ({', '.join(EXPERIMENTS)}) or traces: "
             f"{PROGRAM} compare hold"
         )
-    from ..compare import compare, parse_tolerances, sides_of
+    from ..compare import compare, parse_tolerances, sides_of, witness
     from ..report import compare as report
     from ..report.progress import progress
 
@@ -107,4 +113,6 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         for line in said:
             complain(line, 0)
-    return show(report.page(found, one.header.says, said), found, options.json)
+    asked = witness(one, two)
+    page = report.page(found, one.header.says, said, asked)
+    return show(page, {"comparison": found, "witness": asked}, options.json)
