@@ -645,6 +645,7 @@ def test_it_says_nothing_but_its_own_lines(tmp_path: Path) -> None:
         (["--keyframe", "hled"], 2, "Did you mean 'held'"),
         (["--keyframe", "7"], 2, "7"),
         (["--port", "70000"], 2, "70000"),
+        (["--host", ""], 2, "must be an address"),
         (["--host", "192.0.2.1"], 2, "192.0.2.1"),
         (["--host", "no.such.host.invalid"], 2, "no address"),
         (["--speed", "0"], 2, "speed"),

@@ -41,6 +41,8 @@ def free_port(host: str, port: int) -> int:
     """
     if not 0 <= port <= 65535:
         raise BadInputError(f"port must be from 0 to 65535; got {port}")
+    if not host.strip():  # which would mean everywhere
+        raise BadInputError("host must be an address; 127.0.0.1 is this machine alone")
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
