@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import random
 import signal
 import socket
 import subprocess
@@ -513,8 +514,8 @@ VIEW = [sys.executable, "-u", "-m", "statemachine", "view"]
 
 
 def _free_pair() -> int:
-    """A port that is free, and the next one too."""
-    for port in range(18080, 19080, 7):
+    """A port that is free, and the next one too; another for each test at the same time."""
+    for port in random.SystemRandom().sample(range(18080, 32000), 100):
         with socket.socket() as one, socket.socket() as two:
             try:
                 one.bind(("127.0.0.1", port))
