@@ -99,6 +99,8 @@ def request_of(options: argparse.Namespace) -> Any:
 
 def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
+    if options.models and (options.why or options.quantity):
+        raise BadInputError("--models compares files: --why and --quantity are of an experiment")
     if options.models:
         return _compare_models.run(options)
     _compare_models.refuse_alone(options)
