@@ -90,7 +90,7 @@ def request_of(options: argparse.Namespace) -> Any:
         backends=(one, two),
         defaults=options.defaults,
         model=options.model,
-        menagerie=options.menagerie if options.model else None,
+        menagerie=options.menagerie,
         seconds=options.seconds,
         seed=options.seed,
         options={} if options.timestep is None else {"timestep": options.timestep},

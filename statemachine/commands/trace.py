@@ -113,7 +113,7 @@ def run_record(options: argparse.Namespace) -> int:
         options.model or (asked.model if asked else "so101/scene"),
         backend=options.backend,
         defaults=options.defaults,
-        menagerie=options.menagerie if options.model else None,
+        menagerie=options.menagerie,
     )
     with progress(f"record {name} on {options.backend}") as told:
         if asked is not None:
