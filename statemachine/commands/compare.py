@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from ..errors import BadInputError
+from . import _compare_pictures as pictures
 from ._common import PROGRAM, add_json, add_menagerie, complain, show
 
 
@@ -43,6 +44,7 @@ def add(commands: Any) -> None:
         metavar="KIND=VALUE",
         help="another tolerance, such as joint=0.5deg, tip=2mm, energy=0.1J",
     )
+    pictures.add(parser)
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -101,10 +103,13 @@ def run(options: argparse.Namespace) -> int:
 
     tolerances = parse_tolerances(options.tolerance)
     request = request_of(options)
+    asked = pictures.checked(options)
     with progress("compare") as told:
         (one, two), said = sides_of(request, told)
     found = compare(one, two, tolerances=tolerances)
     if options.json:
         for line in said:
             complain(line, 0)
-    return show(report.page(found, one.header.says, said), found, options.json)
+    code = show(report.page(found, one.header.says, said), found, options.json)
+    pictures.write(asked, options, one, two, found)
+    return code

@@ -12,8 +12,8 @@ missing takes its process down.
 from __future__ import annotations
 
 from .camera import Camera, framed
-from .frames import LONGEST, Timing, camera_for, frames, timing_of
 from .motion import Motion, models_of, motion_of
+from .pictures import LONGEST, Timing, camera_for, frames, timing_of
 from .probe import RENDERERS, Renderer, offscreen_opengl, renderer_here
 
 __all__ = [

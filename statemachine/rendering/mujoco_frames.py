@@ -95,13 +95,14 @@ class _View:
                 geom.matid = -1
         width, height = self._size
         rgb = np.empty((height, width, 3), dtype=np.uint8)
-        depth = np.empty((height, width), dtype=np.float32)
+        depth = np.empty((height, width), dtype=np.float32)  # as OpenGL has it
         frame = mj.MjrRect(0, 0, width, height)
         mj.mjr_setBuffer(mj.mjtFramebuffer.mjFB_OFFSCREEN, self._pen)  # there may be two pens
         mj.mjr_render(frame, scene, self._pen)
         mj.mjr_readPixels(rgb, depth, frame, self._pen)
         # Reversed depth: 1 at the near plane, 0 at the far one, linear in 1/z.
-        metres = self._near * self._far / (self._near + depth * (self._far - self._near))
+        near, far = self._near, self._far
+        metres = near * far / (near + depth.astype(np.float64) * (far - near))
         metres[depth == 0] = np.inf
         return Shot(rgb[::-1], metres[::-1])
 

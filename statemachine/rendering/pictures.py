@@ -9,7 +9,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -27,7 +27,7 @@ from .motion import Motion, corners, models_of, motion_of
 from .probe import Renderer, environment_with, renderer_here
 
 LONGEST = 5000  # pictures of one film
-_SMALLEST, _LARGEST = (160, 120), (1920, 1440)
+_SMALLEST, _LARGEST = (64, 48), (1920, 1440)
 # From the front, to the right or to the left of the arm, which reaches along x; and below them.
 _AZIMUTHS, _ELEVATION = (140.0, 220.0, 110.0, 250.0), -20.0
 _BIAS = 2  # pixels that the ghost must be nearer by than the solid side before it is seen
@@ -116,7 +116,7 @@ def frames(
     models: tuple[Model, ...] | None = None,
     renderer: Renderer | None = None,
     camera: Camera | None = None,
-) -> Iterator[Pixels]:
+) -> Generator[Pixels]:
     """Pictures (height, width, 3) uint8 of one trace, or of two in one place.
 
     Args:
@@ -165,7 +165,7 @@ def camera_for(motions: list[Motion], models: tuple[Model, ...], size: tuple[int
 
 def _drawn(
     motions: list[Motion], size: tuple[int, int], camera: Camera, renderer: Renderer
-) -> Iterator[Pixels]:
+) -> Generator[Pixels]:
     width, height = size
     facts = {
         "renderer": renderer.name,
