@@ -15,6 +15,8 @@ import numpy as np
 import statemachine as sm
 from benchmarks.interleave import Ratio, interleaved
 from statemachine import __version__
+from statemachine.experiments._common import silent
+from statemachine.traces import recorder
 
 STEPS = 500
 
@@ -102,6 +104,27 @@ def kinematics(name: str, rounds: int) -> list[Ratio]:
     )
 
 
+def recording(name: str, rounds: int) -> list[Ratio]:
+    """A recorded run against a bare loop with the same controller."""
+    model = sm.load(name)
+    bare, watched = sm.make_data(model), sm.make_data(model)
+    target = np.array(_FLOOR)
+
+    def controller(_time: float, _data: sm.Data) -> np.ndarray:
+        return target
+
+    def loop() -> None:
+        for _ in range(STEPS):
+            bare.ctrl[:] = controller(bare.time, bare)
+            sm.step(model, bare)
+
+    return interleaved(
+        loop,
+        {f"recorded, {name}": lambda: recorder._run(model, watched, controller, STEPS, silent)},
+        rounds,
+    )
+
+
 _AIR = [0.0, -0.3, 0.6, 0.3, 0.0, 0.6]
 _FLOOR = [0.0, -0.6, 1.2, 0.5, 0.0, 0.6]  # of `lesson hold`, where the finger meets the floor
 
@@ -150,6 +173,70 @@ def _emulation(name: str, rounds: int, where: str, target: list[float]) -> list[
     return interleaved(engine, {label: emulated, f"{label}, tip read": reading}, rounds)
 
 
+def freshness(name: str, rounds: int) -> list[Ratio]:
+    """What `sm.freshness` and a watch cost: nothing to a step when they are not in use.
+
+    The baseline is `sm.step` on a Data that nobody ever asked; another one like it is a null
+    of two Data. One was asked and watched before; the last is watched, and counted.
+    """
+    model = sm.load(name)
+    never, null, before, watched = (sm.make_data(model) for _ in range(4))
+    call = sm.step
+
+    def steps(data: sm.Data) -> Callable[[], None]:
+        def run() -> None:
+            for _ in range(STEPS):
+                call(model, data)
+
+        return run
+
+    sm.freshness(model, before)
+    with sm.watch_freshness(model, before):
+        call(model, before)
+    with sm.watch_freshness(model, watched):
+        others = {
+            "another Data (null)": steps(null),
+            "asked before": steps(before),
+            "watched": steps(watched),
+        }
+        ratios = interleaved(
+            steps(never),
+            {f"sm.step, {words}, {name}": each for words, each in others.items()},
+            rounds,
+        )
+    return ratios
+
+
+def reading(name: str, rounds: int) -> list[Ratio]:
+    """Step, forward and read the fingertip: by itself, and under a watch.
+
+    With a stale read, each is computed anew beside: what that costs is the last.
+    """
+    model = sm.load(name)
+    alone, watched, late = (sm.make_data(model) for _ in range(3))
+    count = STEPS // 10
+
+    def run(data: sm.Data, up_to_date: bool) -> Callable[[], None]:
+        def each() -> None:
+            for _ in range(count):
+                sm.step(model, data)
+                if up_to_date:
+                    sm.forward(model, data)
+                _ = data.site_xpos
+
+        return each
+
+    with sm.watch_freshness(model, watched), sm.watch_freshness(model, late):
+        return interleaved(
+            run(alone, True),
+            {
+                f"step, forward, read, watched, {name}": run(watched, True),
+                f"step, stale read, watched, {name}": run(late, False),
+            },
+            rounds,
+        )
+
+
 # What DESIGN asks of each: at most this, measured on a quiet machine.
 BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None]] = [
     (step, "so101", 1.02),
@@ -158,6 +245,9 @@ BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None]] = [
     (control_loop, "so101", 1.0),
     (kinematics, "so101", 0.8),
     (emulation, "so101/scene", 1.8),
+    (freshness, "so101", 1.02),
+    (reading, "so101", None),
+    (recording, "so101", 1.10),
 ]
 
 
@@ -171,7 +261,7 @@ def main() -> None:
     for measure, name, budget in BUDGET:
         for ratio in measure(name, rounds):
             spread = f"{ratio.low:.3f} to {ratio.high:.3f}"
-            free = "null" in ratio.name or "tip read" in ratio.name
+            free = any(word in ratio.name for word in ("null", "tip read", "watched,"))
             limit = "" if budget is None or free else f"{budget:.3f}"
             over = "  over" if limit and ratio.median > float(limit) else ""
             print(f"{ratio.name:44}{ratio.median:8.3f}{spread:>18}{limit:>8}{over}")

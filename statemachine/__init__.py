@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from .interface import Model as Model
     from .kinematics import Kinematics as Kinematics
     from .records import State as State
+    from .staleness import freshness as freshness
+    from .staleness import watch_freshness as watch_freshness
     from .verbs import forward as forward
     from .verbs import get_state as get_state
     from .verbs import make_data as make_data
@@ -52,6 +54,8 @@ _HOMES = {
     "Data": "interface",
     "State": "records",
     "Kinematics": "kinematics",
+    "freshness": "staleness",
+    "watch_freshness": "staleness",
 }
 _MODULES = (
     "backends", "compare", "conformance", "errors", "experiments", "kinematics", "models",
@@ -65,12 +69,14 @@ __all__ = [
     "State",
     "__version__",
     "forward",
+    "freshness",
     "get_state",
     "load",
     "make_data",
     "reset",
     "set_state",
     "step",
+    "watch_freshness",
 ]
 
 

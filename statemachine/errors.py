@@ -90,6 +90,15 @@ class ReadOnlyError(StateMachineError, AttributeError):
     """Something derived or constant was assigned to."""
 
 
+class StaleReadError(StateMachineError, RuntimeError):
+    """Something derived was read that is not of now, where that was to be an error."""
+
+    name: str
+    steps: int | None
+    writes: int | None
+    gaps: tuple[Any, ...]
+
+
 class EngineWarning(UserWarning):
     """A warning that an engine gave, brought up into Python."""
 

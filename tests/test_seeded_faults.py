@@ -195,7 +195,10 @@ FAULTS: dict[str, tuple[Patch, set[str]]] = {
     "reset keeps the time": (reset_keeps_the_time, {"time_passes_only_in_step"}),
     "reset computes": (reset_computes, {"fresh_and_reset_are_zero"}),
     "keyframe forgets ctrl": (keyframe_forgets_ctrl, {"keyframes_are_taken_whole"}),
-    "state forgets the warm start": (state_forgets_the_warm_start, {"restored_futures_agree"}),
+    "state forgets the warm start": (
+        state_forgets_the_warm_start,
+        {"restored_futures_agree", "forward_depends_on_the_state_alone"},
+    ),
     "recovery leaves the counters": (
         recovery_leaves_the_counters,
         {"divergence_is_caught_every_time"},

@@ -28,6 +28,7 @@ HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "xml.
         ("from statemachine.cli import main; main(['conventions', '--help'])", set()),
         ("from statemachine.cli import main; main(['check', '--help'])", set()),
         ("import statemachine.interface, statemachine.verbs", {"numpy"}),
+        ("import statemachine.staleness", {"numpy"}),
         ("import statemachine.backends, statemachine.conformance", {"numpy", "xml.etree"}),
         ("import statemachine.kinematics", {"numpy", "xml.etree"}),
     ],

@@ -20,7 +20,7 @@ def add(commands: Any) -> None:
             "quantity with its tolerance and a verdict. One trace: its ctrl is played on the "
             "other engine."
         ),
-        epilog=f"Experiments: {', '.join(_EXPERIMENTS)}. Exit code 1: something differs.",
+        epilog=f"Experiments: {', '.join(EXPERIMENTS)}. Exit code 1: something differs.",
     )
     parser.add_argument(
         "what",
@@ -50,7 +50,7 @@ def add(commands: Any) -> None:
 
 
 # As `experiments.scenarios.SCENARIOS`, which needs NumPy; a test compares them.
-_EXPERIMENTS = ("hold", "gravity", "droop", "fall", "box", "waves")
+EXPERIMENTS = ("hold", "gravity", "droop", "fall", "box", "waves")
 
 
 def add_defaults(parser: argparse.ArgumentParser) -> None:
@@ -94,22 +94,24 @@ def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
     if not options.what:
         raise BadInputError(
-            f"compare what? An experiment ({', '.join(_EXPERIMENTS)}) or traces: "
+            f"compare what? An experiment ({', '.join(EXPERIMENTS)}) or traces: "
             f"{PROGRAM} compare hold"
         )
-    from ..compare import compare, parse_tolerances, sides_of
+    from ..compare import compare, parse_tolerances, sides_of, witness
     from ..report import compare as report
     from ..report.progress import progress
 
     tolerances = parse_tolerances(options.tolerance)
     request = request_of(options)
-    asked = pictures.checked(options)
+    wanted = pictures.checked(options)
     with progress("compare") as told:
         (one, two), said = sides_of(request, told)
     found = compare(one, two, tolerances=tolerances)
     if options.json:
         for line in said:
             complain(line, 0)
-    code = show(report.page(found, one.header.says, said), found, options.json)
-    pictures.write(asked, options, one, two, found)
+    asked = witness(one, two)
+    page = report.page(found, one.header.says, said, asked)
+    code = show(page, {"comparison": found, "witness": asked}, options.json)
+    pictures.write(wanted, options, one, two, found)
     return code

@@ -13,6 +13,7 @@ from .agreement import Agreement, Comparison, Side, compare
 from .series import Series, default_tip, series
 from .sides import Request, sides_of
 from .tolerances import Tolerance, parse_tolerances
+from .witness import Witness, witness
 
 __all__ = [
     "Agreement",
@@ -21,9 +22,11 @@ __all__ = [
     "Series",
     "Side",
     "Tolerance",
+    "Witness",
     "compare",
     "default_tip",
     "parse_tolerances",
     "series",
     "sides_of",
+    "witness",
 ]

@@ -130,6 +130,18 @@ def check_forward_perturbs_nothing(lab: Lab) -> None:
     require_equal(ends[1], ends[0], "state after a run with forwards in between")
 
 
+def check_forward_depends_on_the_state_alone(lab: Lab) -> None:
+    """Another Data, set to the same State, derives the same bits; `freshness` relies on it."""
+    model, data = lab.box, lab.held()
+    data.ctrl[0] += 0.2
+    step(model, data, 3)
+    other = lab.data(model)
+    set_state(model, other, get_state(model, data))
+    for each in (data, other):
+        forward(model, each)
+    same(snapshot(data), snapshot(other), "forward of a restored State")
+
+
 def check_two_data_are_independent(lab: Lab) -> None:
     """Data of one Model share nothing that a step or a write can reach."""
     model = lab.box

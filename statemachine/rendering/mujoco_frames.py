@@ -57,6 +57,9 @@ class _View:
         raw.vis.global_.fovy, raw.vis.global_.orthographic = camera.fovy, 0
         raw.vis.map.znear = camera.near / raw.stat.extent
         raw.vis.map.zfar = camera.far / raw.stat.extent
+        # At the edge of the map of shadows the floor is dotted with them: beyond what is seen.
+        raw.vis.map.shadowclip = 9 * camera.distance / raw.stat.extent
+        raw.vis.quality.shadowsize = 4096
         raw.vis.quality.offsamples = 0  # the pictures are halved: twice smoothed is blurred
         self._near, self._far = camera.near, camera.far
         self._turn = matrix_from_quat(raw.geom_quat)

@@ -5,20 +5,28 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ..compare import Agreement, Comparison
+from ..compare import Agreement, Comparison, Witness
 from ..page import Page, Table, Text, Verdict
 from .figures_of import quantity, short_time
 
+# Of the promises that a backend may emulate, those that move the arm.
+_PHYSICS = ("position servo", "armature", "joint damping", "dry friction", "joint limits")
 _WORDS = {"agrees": "agrees", "settles": "settles", "differs": "DIFFERS"}
 
 
-def page(comparison: Comparison, says: str = "", said: Sequence[str] = ()) -> Page:
+def page(
+    comparison: Comparison,
+    says: str = "",
+    said: Sequence[str] = (),
+    witness: Witness | None = None,
+) -> Page:
     """Figures and verdicts, then the reasons of the tolerances.
 
     Args:
         comparison: What was found.
         says: What happens in the experiment.
         said: What stood in for a run, line by line.
+        witness: What a third party says of both sides' fingertips.
     """
     one, two = comparison.one, comparison.two
     blocks: list[Any] = []
@@ -53,16 +61,24 @@ def page(comparison: Comparison, says: str = "", said: Sequence[str] = ()) -> Pa
         )
     )
     for side in (one, two):
-        if side.provenance.emulated:
+        emulated = [name for name in side.provenance.emulated if name in _PHYSICS]
+        if emulated and side.defaults == "model":
             blocks.append(
                 Text(
                     f"{side.backend}: what the model asks for and the engine lacks is emulated "
-                    f"({', '.join(side.provenance.emulated)}). The engine as its own users meet "
-                    "it: --defaults engine."
+                    f"({', '.join(emulated)}). The engine as its own users meet it: "
+                    "--defaults engine."
                 )
             )
             break
-    blocks.append(Text("Neither side is the truth, and two engines that agree may both be wrong."))
+    text = "Neither side is the truth, and two engines that agree may both be wrong."
+    if witness is not None:
+        text += (
+            f" So a third party was asked where {witness.site} is in each of {witness.rows} "
+            f"poses: {witness.by} puts it within {witness.one:.0e} m of {one.backend}'s and "
+            f"within {witness.two:.0e} m of {two.backend}'s."
+        )
+    blocks.append(Text(text))
     blocks.append(Verdict(_verdict(comparison), comparison.agrees))
     title = f"{one.experiment}: {one.label} and {two.label}"
     return Page(title, _origin(comparison), blocks)

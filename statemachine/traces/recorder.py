@@ -101,7 +101,7 @@ def record(
     if derive:
         told, rewritten = _derive(model, begin, inputs, part_of(progress, share, 1.0 - share))
         if rewritten and controller is None:
-            raise EngineError(f"the run could not be repeated: {rewritten} rows differ")
+            raise _not_repeated(rewritten)
         columns |= told
         columns["energy"], energy_by = energies(model, defaults, inputs["qpos"], inputs["qvel"])
     header = Header(
@@ -166,7 +166,7 @@ def record_scenario(
     """
     chosen = {**scenario.options, **(options or {})}
     replaced = model.replace(**chosen) if chosen else model
-    return record(
+    trace = record(
         replaced,
         scenario.controller(replaced, seed),
         scenario.seconds if seconds is None else seconds,
@@ -179,6 +179,9 @@ def record_scenario(
         seed=seed if scenario.seeded else None,
         progress=progress,
     )
+    if trace.header.rewritten:  # a scenario writes nothing but ctrl
+        raise _not_repeated(trace.header.rewritten)
+    return trace
 
 
 def play(
@@ -220,7 +223,7 @@ def play(
         row = int(np.searchsorted(times, time - began[0], side="right")) - 1
         return commands[max(0, min(row, len(commands) - 1))]
 
-    return record(
+    played = record(
         model,
         controller,
         float(trace.time[-1]) - start,
@@ -233,6 +236,16 @@ def play(
         options=options,
         seed=header.provenance.seed,
         progress=progress,
+    )
+    if played.header.rewritten:
+        raise _not_repeated(played.header.rewritten)
+    return played
+
+
+def _not_repeated(rows: int) -> EngineError:
+    return EngineError(
+        f"the run could not be repeated: {rows} rows began in another state; the engine does "
+        "not give the same bits twice"
     )
 
 
@@ -256,7 +269,7 @@ def _run(
                 if wanted.__class__ is np.ndarray and wanted.shape == shape:
                     ctrl[:] = wanted
                 else:
-                    data.ctrl = wanted
+                    _command(data, wanted, now)
         keep_time(now)
         keep_qpos(qpos_bytes())
         keep_qvel(qvel_bytes())
@@ -281,6 +294,13 @@ def _run(
             raise BadInputError(f"the controller left {name} with an entry that is no number")
     progress(1.0)
     return found, ended
+
+
+def _command(data: Data, wanted: Any, time: float) -> None:
+    try:
+        data.ctrl = wanted
+    except BadInputError as error:
+        raise BadInputError(f"what the controller gave at {time:.3f} s: {error}") from None
 
 
 def _derive(

@@ -68,7 +68,8 @@ class Header:
         geom_bodyid, body_parentid, actuator_jntid: As in a Model.
         ctrlrange: (nu, 2), infinite where unlimited.
         energy_by: The engine that computed the energies, or "".
-        rewritten: Rows in which the controller wrote into the state itself.
+        rewritten: Rows whose state is not what the step before left: the controller wrote it
+            (or the engine does not give the same bits twice).
         ended: Why the run ended before its time, or "".
         single: Whether an npz file of it keeps all but the inputs in single precision.
         recorded: Whether this was read from a file: nothing ran here.
@@ -154,9 +155,9 @@ class Header:
                 raise TraceError(
                     f"this trace has schema {facts.get('schema')!r}; this version reads {SCHEMA}"
                 )
-            for name in ("provenance",):
-                known = {field.name for field in dataclasses.fields(Provenance)}
-                facts[name] = Provenance(**_known(facts[name], known))
+            known = {field.name for field in dataclasses.fields(Provenance)}
+            by = {key: _frozen(value) for key, value in _known(facts["provenance"], known).items()}
+            facts["provenance"] = Provenance(**by)
             known = {field.name for field in dataclasses.fields(cls)}
             header = cls(**{name: _frozen(value) for name, value in _known(facts, known).items()})
             header._check()

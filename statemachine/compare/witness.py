@@ -1,0 +1,86 @@
+"""Each side's fingertip against a third party: two that agree may both be wrong."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from ..errors import StateMachineError
+from ..kinematics import Kinematics
+from ..models import resolve
+from ..traces import Header, Trace
+from .series import default_tip
+
+
+@dataclass(frozen=True)
+class Witness:
+    """How far a site of the traces is from where the witness puts it.
+
+    Attributes:
+        by: The witness and its version.
+        site: Which site.
+        one: Largest distance at any row of the first trace [m]; two: of the second.
+        rows: How many poses were compared.
+    """
+
+    by: str
+    site: str
+    one: float
+    two: float
+    rows: int
+
+
+def witness(one: Trace, two: Trace, path: Path | None = None) -> Witness | None:
+    """Pinocchio's forward kinematics of each trace's qpos, against the recorded site.
+
+    Args:
+        one: A trace.
+        two: Another, of the same model.
+        path: The model's file; by default the one that the headers name.
+
+    Returns:
+        None where Pinocchio is missing, or cannot read the model.
+    """
+    site = default_tip(one.header, two.header)
+    if not site or "site_xpos" not in one or "site_xpos" not in two:
+        return None
+    try:
+        file = resolve(one.header.provenance.model_file) if path is None else path
+        kinematics = _readable(file, one.header)
+        if kinematics is None:
+            return None
+        gaps = [_gap(kinematics, trace, site) for trace in (one, two)]
+    except StateMachineError:
+        return None
+    return Witness(f"pinocchio {kinematics.version}", site, *gaps, rows=len(one) + len(two))
+
+
+def _readable(file: Path, header: Header) -> Kinematics | None:
+    """The robot from a scene's file or from one that it includes."""
+    waiting, seen = [file], set()
+    while waiting:
+        path = waiting.pop(0)
+        if path in seen or not path.is_file():
+            continue
+        seen.add(path)
+        try:
+            found = Kinematics(path)
+        except StateMachineError:
+            includes = ElementTree.parse(path).iter("include")
+            waiting += [file.parent / name for i in includes if (name := i.get("file"))]
+            continue
+        if set(found.joint_names) <= set(header.joints):
+            shared = [name for name in header.joints if name in found.joint_names]
+            return Kinematics(path, joint_names=shared)
+    return None
+
+
+def _gap(kinematics: Kinematics, trace: Trace, site: str) -> float:
+    header = trace.header
+    places = [header.jnt_qposadr[header.joints.index(name)] for name in kinematics.joint_names]
+    theirs = kinematics.poses(trace.qpos[:, places], site).pos
+    ours, _ = trace.site(site)
+    return float(np.linalg.norm(ours - theirs, axis=1).max())

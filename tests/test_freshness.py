@@ -1,0 +1,816 @@
+"""Freshness: of which moment each derived array is, how wrong, and what a watch counts."""
+
+from __future__ import annotations
+
+import gc
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.backends.mujoco_backend import MujocoData
+from statemachine.errors import (
+    BadInputError,
+    ClosedDataError,
+    DivergedError,
+    ForeignDataError,
+    StaleReadError,
+)
+from statemachine.interface import Data, Model
+from statemachine.records import DERIVED, POSES
+from statemachine.report.as_json import plain
+from statemachine.rotations import matrix_from_quat
+from statemachine.staleness import look
+from statemachine.staleness.gaps import Gap, gaps, told
+from statemachine.staleness.look import Scratch, back, readings
+from statemachine.staleness.result import table
+
+from .conftest import ROOT, need_engine
+
+TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
+BODY = """<mujoco><option timestep="0.005" integrator="{integrator}"/>
+<worldbody><body name="b" pos="0 0 1"><freejoint name="f"/>
+<geom name="g" type="box" size=".1 .2 .05" pos="{centre}" mass="1"/>
+<site name="s" pos=".2 0 0"/></body></worldbody></mujoco>"""
+
+
+@pytest.fixture
+def box(backend: str) -> Model:
+    return sm.load("so101/scene_box", backend=backend)
+
+
+@pytest.fixture
+def held(box: Model) -> Iterator[Data]:
+    """The jaws hold the box and the arm turns: mid-contact, after a step."""
+    with sm.make_data(box) as data:
+        sm.reset(box, data, keyframe=0)
+        data.ctrl[0] += 0.3
+        sm.step(box, data, 30)
+        yield data
+
+
+def sizes(found: tuple[Gap, ...]) -> dict[str, float | None]:
+    return {gap.unit: gap.size for gap in found}
+
+
+def bits(data: Data) -> list[bytes]:
+    """Everything that a Data says."""
+    found = []
+    for value in readings(data).values():
+        parts = [value] if isinstance(value, np.ndarray) else vars(value).values()
+        found += [np.array(part).tobytes() for part in parts]
+    return found
+
+
+def test_forward_makes_everything_of_now(box: Model, held: Data) -> None:
+    """By comparing numbers, so it also says that the scratch Data computes what forward does."""
+    assert not sm.freshness(box, held)
+    sm.forward(box, held)
+    fresh = sm.freshness(box, held)
+    assert fresh, fresh
+    assert fresh.stale == ()
+    assert [row.name for row in fresh.rows] == [*DERIVED, "contacts"]
+    assert {(row.of, row.steps, row.gaps) for row in fresh.rows} == {("now", 0, ())}
+    assert len(held.contacts) > 0
+
+
+def test_a_fresh_data_was_never_computed(box: Model) -> None:
+    with sm.make_data(box) as data:
+        state = sm.get_state(box, data)
+        for again in (
+            lambda: None,
+            lambda: sm.reset(box, data),
+            lambda: sm.set_state(box, data, state),
+        ):
+            again()
+            found = sm.freshness(box, data)
+            assert set(POSES) <= set(found.stale)
+            assert {found[name].of for name in found.stale} == {"never computed"}
+            assert found["site_xmat"].gaps == (Gap(None, "rad", ""),)
+            assert sizes(found["contacts"].gaps) == {"appears": 4.0}
+            # The fingertip of the lesson's first table, from the origin.
+            tip = np.linalg.norm((0.3914, -0.001, 0.2463))
+            assert sizes(found["site_xpos"].gaps)["m"] == pytest.approx(tip, abs=1e-4)
+            sm.forward(box, data)
+
+
+def test_after_a_write_everything_is_of_before(backend: str) -> None:
+    """The write of the lesson: 0.8 rad at the shoulder, and the fingertip 270 mm elsewhere."""
+    model = sm.load("so101", backend=backend)
+    with sm.make_data(model) as data:
+        sm.forward(model, data)
+        before = data.site_xpos[model.site_id("gripperframe")].copy()
+        data.qpos[model.joint_id("shoulder_lift")] = 0.8
+        found = sm.freshness(model, data)
+        sm.forward(model, data)
+        after = data.site_xpos[model.site_id("gripperframe")]
+        (gap,) = found["site_xpos"].gaps
+        assert (gap.unit, gap.where) == ("m", "gripperframe")
+        assert gap.size == np.linalg.norm(after - before)
+        assert gap.size == pytest.approx(0.270, abs=0.001)
+        assert sizes(found["xquat"].gaps)["rad"] == pytest.approx(0.8)
+        assert sizes(found["site_xmat"].gaps)["rad"] == pytest.approx(0.8)
+        # Nobody counted, and no step leads here: that is all that can be said.
+        assert (found["xpos"].of, found["xpos"].steps, found["xpos"].writes) == (
+            "an earlier state",
+            None,
+            None,
+        )
+
+
+def test_each_array_has_its_own_inputs(backend: str) -> None:
+    """Found by value: poses do not hear of qvel and ctrl, nor the bias of ctrl."""
+    model = sm.load("so101", backend=backend)
+    with sm.make_data(model) as data:
+        data.qpos[:] = TARGET
+        data.ctrl[:] = TARGET
+        sm.forward(model, data)
+        data.ctrl[1] += 1e-3
+        by_ctrl = set(sm.freshness(model, data).stale)
+        # kp · 0.001 rad, unsaturated: the servo is affine in ctrl.
+        assert sizes(sm.freshness(model, data)["qfrc_actuator"].gaps) == {
+            "N·m": pytest.approx(float(model.actuator_kp[1]) * 1e-3)
+        }
+        data.ctrl[1] = TARGET[1]
+        sm.forward(model, data)
+        data.qvel[1] += 0.1
+        by_qvel = sm.freshness(model, data)
+    # Friction and, by rounding, PyBullet's contact force follow from what the servos do.
+    follows = {"qfrc_friction", "qfrc_constraint", "qfrc_contact"}
+    assert {"qacc", "qfrc_actuator"} <= by_ctrl <= {"qacc", "qfrc_actuator"} | follows
+    assert {"qacc", "qfrc_passive", "qfrc_bias"} <= set(by_qvel.stale)
+    assert set(by_qvel.stale).isdisjoint(POSES)
+    # d·0.1 rad/s of viscous damping.
+    assert sizes(by_qvel["qfrc_passive"].gaps) == {
+        "N·m": pytest.approx(float(model.dof_damping[1]) * 0.1)
+    }
+
+
+def test_the_lag_of_the_hold(backend: str) -> None:
+    """9.95 mm of fingertip at worst, as the lesson says; each step is found by going back."""
+    model = sm.load("so101/scene", backend=backend)
+    tip = model.site_id("gripperframe")
+    worst = 0.0
+    with sm.make_data(model) as data:
+        data.ctrl[:] = TARGET
+        for _ in range(60):  # the worst comes within 0.3 s
+            sm.step(model, data)
+            found = sm.freshness(model, data)
+            left = data.site_xpos[tip].copy()
+            state = sm.get_state(model, data)
+            if "site_xpos" in found.stale:
+                (gap,) = found["site_xpos"].gaps
+                assert found["site_xpos"].of == "1 step ago"
+                with sm.make_data(model) as other:
+                    sm.set_state(model, other, state)
+                    sm.forward(model, other)
+                    assert gap.size == np.linalg.norm(other.site_xpos[tip] - left)
+                worst = max(worst, gap.size or 0.0)
+    assert 1e3 * worst == pytest.approx(9.95, abs=0.01)
+
+
+@pytest.mark.parametrize("nstep", [1, 7])
+@pytest.mark.parametrize("substeps", [1, 4])
+def test_a_step_is_found_by_going_back(backend: str, substeps: int, nstep: int) -> None:
+    model = sm.load("so101/scene_box", backend=backend).replace(substeps=substeps)
+    with sm.make_data(model) as data:
+        data.ctrl[:] = TARGET
+        sm.step(model, data, 10)
+        sm.step(model, data, nstep)
+        found = sm.freshness(model, data)
+        assert found["xpos"].of == ("1 step ago" if substeps == 1 else "1 substep ago")
+        assert found["xpos"].steps == 1
+        assert f"h = {5 / substeps:g} ms" in str(found)
+        # Another state than the one that the last step left: no longer to be found ...
+        data.qvel[:] = 0.3
+        assert sm.freshness(model, data)["xpos"].of == "an earlier state"
+
+
+def test_a_step_is_found_behind_a_later_write(backend: str) -> None:
+    """What hangs on the written joint was written; what carries it is one step old."""
+    model = sm.load("so101", backend=backend)
+    with sm.make_data(model) as data:
+        data.ctrl[:] = 0.3
+        sm.step(model, data, 20)
+        data.qpos[model.joint_id("elbow_flex")] += 0.4
+        found = sm.freshness(model, data)
+    assert found["xpos"].of == "1 step ago"
+    text = " ".join(str(found).split())
+    assert "gives the poses of shoulder, upper_arm, to" in text
+    assert "Not so lower_arm, wrist, gripper and 2 more" in text
+
+
+def test_a_write_is_no_step(box: Model, held: Data) -> None:
+    """Written to where a step did not come from: no moment is claimed."""
+    sm.forward(box, held)
+    held.qpos[0] += 1e-4
+    found = sm.freshness(box, held)
+    assert found["xpos"].of == "an earlier state"
+    assert "does not lead to these poses" in str(found)
+    # Nor where all is so near that rounding could have it lead here.
+    held.qvel[:] = 0
+    sm.forward(box, held)
+    held.qpos[0] += 1e-13
+    assert sm.freshness(box, held)["xpos"].of == "an earlier state"
+
+
+def test_a_body_in_the_air(box: Model) -> None:
+    """Slides and turns are told apart, each with its unit: it falls, and nothing turns it."""
+    place = int(box.jnt_qposadr[box.joint_id("box")])
+    with sm.make_data(box) as data:
+        data.qpos[place + 2] = 1.0
+        found = sm.freshness(box, data)["qacc"].gaps
+        assert sizes(found)["m/s²"] == pytest.approx(9.81)
+        assert {gap.unit: gap.where for gap in found}["m/s²"] == "box"
+        assert {gap.unit: gap.where for gap in found}["rad/s²"] != "box"
+        assert "need be age" not in str(sm.freshness(box, data))  # nothing touches
+
+
+@pytest.mark.filterwarnings("ignore:PyBullet. the integrator RK4")
+@pytest.mark.parametrize("integrator", ["Euler", "RK4"])
+@pytest.mark.parametrize("centre", ["0 0 0", ".1 0 0"])
+def test_a_body_that_turns(backend: str, integrator: str, centre: str, tmp_path: Path) -> None:
+    path = tmp_path / "body.xml"
+    path.write_text(BODY.format(integrator=integrator, centre=centre))
+    model = sm.load(path, backend=backend)
+    with sm.make_data(model) as data:
+        data.qvel[:] = (1, 2, 3, 4, 5, 6)
+        sm.step(model, data, 7)
+        found = sm.freshness(model, data)
+        spin = data.qvel[3:].copy()
+    row = found["xquat"]
+    assert not row.now
+    # PyBullet moves the centre of mass along a straight line, not the origin; RK4 leaves
+    # values of its fourth stage. Neither is claimed to be one step old.
+    semi_implicit = integrator == "Euler" or backend == "pybullet"
+    at_its_centre = centre == "0 0 0" or backend == "mujoco"
+    if semi_implicit and at_its_centre:
+        assert (row.of, row.steps) == ("1 step ago", 1)
+        turned = 0.005 * np.linalg.norm(spin)  # of the velocity after the step
+        assert sizes(row.gaps)["rad"] == pytest.approx(turned, rel=1e-9)
+        assert set(sizes(found["qacc"].gaps)) <= {"m/s²", "rad/s²"}
+    else:
+        assert (row.of, row.steps) == ("an earlier state", None)
+        assert ("fourth stage" in str(found)) == (backend == "mujoco")
+
+
+def test_going_back_is_the_inverse_of_the_engines_way() -> None:
+    model = sm.load("so101/scene_box")
+    random = np.random.default_rng(3)
+    for _ in range(20):
+        qpos, qvel = random.uniform(-1, 1, model.nq), random.uniform(-5, 5, model.nv)
+        qpos[-4:] /= np.linalg.norm(qpos[-4:])
+        moved = qpos.copy()
+        mujoco.mj_integratePos(model.raw, moved, qvel, 0.01)
+        assert np.allclose(back(model, moved, qvel, 0.01), qpos, rtol=0, atol=1e-14)
+
+
+def test_data_is_untouched_and_so_is_its_future(box: Model) -> None:
+    ends = []
+    for ask in (False, True):
+        with sm.make_data(box) as data:
+            sm.reset(box, data, keyframe=0)
+            data.ctrl[0] += 0.3
+            for k in range(40):
+                sm.step(box, data)
+                if ask and k % 10 == 0:
+                    arrays = data.qpos, data.qvel, data.ctrl
+                    before, said = sm.get_state(box, data), bits(data)
+                    sm.freshness(box, data)
+                    with sm.watch_freshness(box, data) as watch:
+                        _ = data.xpos, data.contacts
+                        assert sm.freshness(box, data)["xpos"].of == "1 step ago"
+                    assert watch.reads == 2
+                    assert sm.get_state(box, data) == before
+                    assert bits(data) == said
+                    assert all(
+                        one is two
+                        for one, two in zip(arrays, (data.qpos, data.qvel, data.ctrl), strict=True)
+                    )
+            ends.append((sm.get_state(box, data), bits(data)))
+    assert ends[0] == ends[1]
+
+
+def test_every_scratch_is_closed(backend: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Data] = []
+
+    def make_data(model: Model) -> Data:
+        made.append(sm.make_data(model))
+        return made[-1]
+
+    monkeypatch.setattr(look, "make_data", make_data)
+    model = sm.load("so101", backend=backend)
+    with sm.make_data(model) as data:
+        sm.freshness(model, data)
+        with sm.watch_freshness(model, data):
+            sm.freshness(model, data)
+        with pytest.raises(RuntimeError, match="mine"), sm.watch_freshness(model, data):
+            raise RuntimeError("mine")
+        monkeypatch.setattr(Scratch, "one_step_back", None)  # fails in the middle
+        sm.step(model, data, 3)
+        with pytest.raises(TypeError):
+            sm.freshness(model, data)
+        with pytest.raises(TypeError), sm.watch_freshness(model, data):
+            pass
+        sm.step(model, data)
+    assert [repr(each).endswith("closed>") for each in made] == [True] * 5
+
+
+def test_nothing_leaks() -> None:
+    need_engine("pybullet")
+    import pybullet
+
+    model = sm.load("so101", backend="pybullet")
+
+    def clients() -> int:
+        gc.collect()
+        return sum(pybullet.isConnected(i) for i in range(200))
+
+    with sm.make_data(model) as data:
+        sm.freshness(model, data)  # the mirror of the Model, which forward needs, stays
+        before = clients()
+        for _ in range(3):
+            sm.step(model, data)
+            sm.freshness(model, data)
+            with sm.watch_freshness(model, data):
+                _ = data.xpos
+        with pytest.raises(RuntimeError, match="mine"), sm.watch_freshness(model, data):
+            raise RuntimeError("mine")
+        assert clients() == before
+
+
+def test_what_cannot_be_asked_is_said(backend: str) -> None:
+    model = sm.load("so101", backend=backend)
+    data, other = sm.make_data(model), sm.load("so101", backend=backend)
+    for ask in (sm.freshness, sm.watch_freshness):
+        with pytest.raises(ForeignDataError):
+            ask(other, data)
+        with pytest.raises(TypeError, match="a Model and a Data"):
+            ask(data, model)  # pyright: ignore[reportArgumentType]
+    data.qpos[1] = np.nan
+    with pytest.raises(BadInputError, match="shoulder_lift"):
+        sm.freshness(model, data)
+    with pytest.raises((DivergedError, BadInputError)):
+        sm.step(model, data)
+    if backend == "mujoco":
+        with pytest.raises(DivergedError):
+            sm.freshness(model, data)
+    sm.reset(model, data)
+    assert sm.freshness(model, data).stale
+    data.close()
+    with pytest.raises(ClosedDataError):
+        sm.freshness(model, data)
+
+
+def test_an_engine_that_does_not_tell_forces() -> None:
+    need_engine("pybullet")
+    model = sm.load("so101/scene", backend="pybullet", defaults="engine")
+    with sm.make_data(model) as data:
+        data.ctrl[:] = 0.3
+        sm.step(model, data, 10)
+        found = sm.freshness(model, data)
+        assert [row.name for row in found.rows] == [
+            *POSES,
+            "qfrc_bias",
+            "qfrc_actuator",
+            "contacts",
+        ]
+        assert "does not tell: qacc," in str(found)
+        assert found["site_xpos"].of == "1 step ago"
+        sm.forward(model, data)
+        assert sm.freshness(model, data)
+
+
+def test_the_memory_of_contacts_is_no_age() -> None:
+    """PyBullet finds other points in a world that is set to a state than in one that ran."""
+    need_engine("pybullet")
+    for name in ("mujoco", "pybullet"):
+        model = sm.load("so101/scene_box", backend=name)
+        with sm.make_data(model) as data:
+            sm.reset(model, data, keyframe=0)
+            sm.step(model, data, 50)
+            scratch = Scratch(model)
+            expected = scratch.now(sm.get_state(model, data))
+            scratch.close()
+            sm.step(model, data)
+            found = gaps(model, "contacts", data.contacts, expected["contacts"])
+            assert bool(found) == (name == "pybullet")
+            assert ("need be age" in str(sm.freshness(model, data))) == (name == "pybullet")
+
+
+# The table.
+
+
+def test_the_table_fits_and_says_what_to_do(box: Model, held: Data) -> None:
+    text = str(sm.freshness(box, held))
+    assert repr(sm.freshness(box, held)) == text
+    lines = text.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert f"scene_box on {box.backend} {box.engine_version} at 6.15 s" in lines[0]
+    assert lines[-1] == "sm.forward(model, data) makes all of them of now."
+    assert all(any(line.startswith(name) for line in lines) for name in (*DERIVED, "contacts"))
+    sm.forward(box, held)
+    assert str(sm.freshness(box, held)).splitlines()[-1] == "All are of now."
+
+
+def test_results_are_records(box: Model, held: Data) -> None:
+    found = sm.freshness(box, held)
+    with pytest.raises(AttributeError):
+        found.time = 3.0  # pyright: ignore[reportAttributeAccessIssue]
+    with pytest.raises(sm.errors.UnknownNameError, match="site_xpos"):
+        found["site_xpo"]
+    as_json = plain(found)
+    assert as_json["stale"] == list(found.stale)
+    assert as_json["rows"][0]["name"] == "xpos"
+
+
+@pytest.mark.parametrize(
+    ("gap", "text"),
+    [
+        (Gap(0.00995, "m", "tip"), "9.95 mm at tip"),
+        (Gap(np.pi / 2, "rad", ""), "90°"),
+        (Gap(1.0, "appears", "a – b"), "1 appears at a – b"),
+        (Gap(2.0, "vanishes", "a – b"), "2 vanish at a – b"),
+        (Gap(2.5, "N·m", "j"), "2.5 N·m at j"),
+        (Gap(1e-12, "m", "tip"), "below 1e-06 mm at tip"),
+        (Gap(None, "rad", ""), "all zero, which is no rotation"),
+    ],
+)
+def test_gaps_in_words(gap: Gap, text: str) -> None:
+    assert str(gap) == text
+
+
+def test_rounding_is_left_out_beside_more() -> None:
+    small, large = Gap(1e-15, "N", "box"), Gap(0.5, "N·m", "j")
+    assert told([small, large]) == "0.5 N·m at j"
+    assert told([small]) == "below 1e-06 N at box"
+    assert told([]) == ""
+
+
+def test_a_figure_and_its_place_stay_on_one_line() -> None:
+    lines = table(("a", "b"), [("x" * 40, "12 mm at a long place; 13 N at another place")])
+    assert [line[43:] for line in lines[2:]] == ["12 mm at a long place;", "13 N at another place"]
+
+
+def test_contacts_are_matched_by_what_touches() -> None:
+    """One moves, one of its pair comes, another pair goes."""
+    model = sm.load("so101/scene_box")
+    with sm.make_data(model) as data:
+        sm.reset(model, data, keyframe=1)
+        sm.forward(model, data)
+        now = data.contacts
+    assert len(now) == 4
+
+    def part(keep: list[int], geom: tuple[int, int] | None = None, shift: float = 0.0):
+        found = {name: np.array(value[keep]) for name, value in vars(now).items()}
+        found["pos"][0] += (shift, 0, 0)
+        if geom:
+            found["geom"][-1] = geom
+        return type(now)(**found)
+
+    assert gaps(model, "contacts", now, now) == ()
+    assert sizes(gaps(model, "contacts", part([3, 1, 0, 2]), now)) == {}  # another order
+    less = gaps(model, "contacts", part([0, 1, 2]), now)
+    assert sizes(less) == {"appears": 1.0}
+    assert less[0].where == "floor – box"
+    assert sizes(gaps(model, "contacts", now, part([0, 1]))) == {"vanishes": 2.0}
+    assert sizes(gaps(model, "contacts", part([0, 1, 2, 3], shift=1e-3), now)) == {
+        "m": pytest.approx(1e-3)
+    }
+    assert sizes(gaps(model, "contacts", part([0, 1, 2, 3], geom=(1, 2)), now)) == {
+        "appears": 1.0,
+        "vanishes": 1.0,
+    }
+
+
+# Seeded faults: what a program, or a backend, gets wrong shows by value.
+
+
+def test_a_forward_that_omits_the_forces() -> None:
+    model = sm.load("so101")
+    with sm.make_data(model) as data:
+        data.ctrl[:] = 0.3
+        sm.step(model, data, 20)
+        mujoco.mj_kinematics(model.raw, data.raw)  # a student's short cut past the interface
+        found = sm.freshness(model, data)
+        assert set(found.stale).isdisjoint(POSES)
+        assert {"qacc", "qfrc_bias", "qfrc_passive"} <= set(found.stale)
+
+
+def test_a_step_that_claims_to_be_fresh() -> None:
+    """A backend that recomputes after its step: of now by value, whatever a watch counted."""
+    model = sm.load("so101")
+    with sm.make_data(model) as data:
+        data.ctrl[:] = 0.3
+        bare = data._advance
+        object.__setattr__(
+            data, "_advance", lambda *n: (bare(*n), mujoco.mj_forward(model.raw, data.raw))
+        )
+        sm.step(model, data, 20)
+        assert sm.freshness(model, data)
+        with sm.watch_freshness(model, data, raise_on_stale=True):
+            sm.step(model, data)
+            _ = data.site_xpos, data.qacc
+
+
+def test_a_forward_that_does_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = sm.load("so101")
+    with sm.make_data(model) as data:
+        data.ctrl[:] = 0.3
+        sm.step(model, data, 20)
+        old = MujocoData._recompute
+        monkeypatch.setattr(
+            MujocoData, "_recompute", lambda self: None if self is data else old(self)
+        )
+        sm.forward(model, data)
+        assert sm.freshness(model, data)["xpos"].of == "1 step ago"
+
+
+def test_what_is_written_past_the_interface_is_seen() -> None:
+    """A force that only the engine's own object takes."""
+    model = sm.load("so101")
+    with sm.make_data(model) as data:
+        sm.forward(model, data)
+        data.raw.qfrc_applied[1] = 0.1
+        assert "qacc" in sm.freshness(model, data).stale
+        with (
+            sm.watch_freshness(model, data, raise_on_stale=True),
+            pytest.raises(StaleReadError, match="qacc is of an earlier state"),
+        ):
+            _ = data.qacc
+
+
+# Watching.
+
+
+def test_a_watch_counts_writes_and_steps(box: Model) -> None:
+    with sm.make_data(box) as data, sm.watch_freshness(box, data):
+
+        def row(name: str) -> tuple[str, int | None, int | None]:
+            found = sm.freshness(box, data)[name]
+            return found.of, found.steps, found.writes
+
+        assert row("xpos") == ("never computed", None, None)
+        sm.forward(box, data)
+        assert row("xpos") == ("now", 0, 0)
+        data.qpos[1] = 0.8
+        data.ctrl[:] = 0.2
+        data.ctrl[2] = 0.3
+        data.ctrl[2] = 0.3  # the same again is no change
+        data.ctrl = np.full(box.nu, 0.1)
+        assert row("xpos") == ("1 write ago", 0, 1)
+        assert row("qfrc_actuator") == ("4 writes ago", 0, 4)
+        assert sm.freshness(box, data).written[:2] == (
+            "qpos[1] (shoulder_lift)",
+            "ctrl[0] (shoulder_pan)",
+        )
+        data.qpos[1] = 0.0  # back where it was: the poses are of now
+        assert row("xpos") == ("now", 0, 0)
+        assert row("qfrc_actuator") == ("5 writes ago", 0, 5)
+        sm.step(box, data, 12)
+        assert row("xpos") == ("1 step ago", 1, 0)
+        data.qpos[1] += 0.1
+        assert row("xpos") == ("1 step and 1 write ago", 1, 1)
+        assert sm.freshness(box, data).written == ("qpos[1] (shoulder_lift)",)
+        data.qvel[1] = 3.0
+        data.ctrl[1] = 0.7
+        assert row("qfrc_bias") == ("1 step and 2 writes ago", 1, 2)  # ctrl is not its
+        assert row("qfrc_actuator") == ("1 step and 3 writes ago", 1, 3)
+        sm.reset(box, data)
+        assert row("xpos") == ("never computed", None, None)
+        state = sm.get_state(box, data)
+        sm.forward(box, data)
+        sm.set_state(box, data, state)
+        assert row("xpos") == ("never computed", None, None)
+
+
+def test_a_watch_begins_with_what_can_be_found(backend: str) -> None:
+    model = sm.load("so101", backend=backend)
+    with sm.make_data(model) as data:
+        data.ctrl[:] = 0.3
+        sm.step(model, data, 10)
+        with sm.watch_freshness(model, data):
+            data.qpos[0] += 0.1
+            assert sm.freshness(model, data)["xpos"].of == "1 step and 1 write ago"
+        sm.forward(model, data)
+        data.qpos[0] += 0.1
+        with sm.watch_freshness(model, data):
+            data.qpos[0] += 0.1
+            assert sm.freshness(model, data)["xpos"].of == "an earlier state"
+
+
+def test_a_stale_read_raises_and_says_what_to_do(box: Model) -> None:
+    with sm.make_data(box) as data, sm.watch_freshness(box, data, raise_on_stale=True):
+        with pytest.raises(StaleReadError, match=r"^xpos was never computed .*box"):
+            _ = data.xpos
+        sm.forward(box, data)
+        for name in DERIVED:
+            getattr(data, name)
+        _ = data.contacts
+        data.qvel[0] = 0.5
+        _ = data.site_xpos, data.xquat  # do not depend on it
+        with pytest.raises(StaleReadError):
+            _ = data.qfrc_passive
+        data.qpos[1] = 0.8
+        with pytest.raises(StaleReadError) as caught:
+            _ = data.site_xpos
+        error = caught.value
+        assert str(error) == (
+            f"site_xpos is of 1 write ago ({1e3 * error.gaps[0].size:.3g} mm at gripperframe; "
+            "written since: qpos[1] (shoulder_lift)): call sm.forward(model, data) before "
+            "reading it"
+        )
+        assert (error.name, error.steps, error.writes) == ("site_xpos", 0, 1)
+        assert 1e3 * error.gaps[0].size == pytest.approx(270, abs=1)
+        with pytest.raises(StaleReadError, match=r"^contacts is of 2 writes ago .*appear"):
+            _ = data.contacts
+        data.qpos[1] = 0.0
+        data.qvel[0] = 0.0
+        _ = data.contacts  # everything is back
+        sm.step(box, data, 3)
+        with pytest.raises(StaleReadError, match=r"is of 1 step ago \(.* mm at"):
+            _ = data.xpos
+        data.qpos[1] = np.nan
+        with pytest.raises(StaleReadError, match=r"is of 1 step and 1 write ago \(written since: "):
+            _ = data.xpos
+
+
+def test_a_watch_names_the_lines_that_read(box: Model) -> None:
+    class Controller:
+        """Keeps the Data in an object: every name for it is watched."""
+
+        def __init__(self, data: Data) -> None:
+            self.data = data
+
+        def __call__(self) -> None:
+            _ = self.data.site_xpos
+
+    with sm.make_data(box) as data:
+        controller = Controller(data)
+        line = Controller.__call__.__code__.co_firstlineno + 1
+        data.ctrl[:6] = TARGET
+        with sm.watch_freshness(box, data) as watch:
+            for _ in range(5):
+                sm.step(box, data)
+                controller()
+            sm.forward(box, data)
+            controller()
+        controller()  # nobody watches any more
+    assert watch.reads == 6
+    (read,) = watch.stale_reads
+    assert (read.name, read.count, read.of) == ("site_xpos", 5, "1 step ago")
+    assert read.place == f"test_freshness.py:{line}"
+    text = str(watch)
+    assert text.startswith("5 of 6 reads were stale")
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def test_a_watch_that_does_not_raise_never_does(backend: str) -> None:
+    """What is written is no number, which the program may still mend: no size, no error."""
+    model = sm.load("so101", backend=backend)
+    with sm.make_data(model) as data, sm.watch_freshness(model, data) as watch:
+        sm.forward(model, data)
+        data.qpos[1] = np.nan
+        _ = data.site_xpos
+        data.qpos[1] = 0.0
+        _ = data.site_xpos
+    (read,) = watch.stale_reads
+    assert (read.of, read.gaps) == ("1 write ago", ())
+    assert str(watch).splitlines()[-1].endswith("not to be told")
+
+
+def test_the_worst_of_many_reads_is_told(backend: str) -> None:
+    model = sm.load("so101", backend=backend)
+    with sm.make_data(model) as data, sm.watch_freshness(model, data) as watch:
+        lags = []
+        data.ctrl[:] = TARGET
+        sm.forward(model, data)
+        for _ in range(60):
+            sm.step(model, data)
+            _ = data.site_xpos
+            lags.append(sm.freshness(model, data)["site_xpos"].gaps[0].size)
+    (read,) = watch.stale_reads
+    assert read.gaps[0].size == max(lags)
+    assert read.count == 60
+    assert lags[-1] < max(lags)
+
+
+def test_a_watch_leaves_nothing_behind(box: Model) -> None:
+    with sm.make_data(box) as data:
+        kind, advance = type(data), data._advance
+        with sm.watch_freshness(box, data):
+            assert isinstance(data, kind)
+            assert type(data).__name__ == kind.__name__
+            with pytest.raises(BadInputError, match="watched already"):
+                sm.watch_freshness(box, data).__enter__()
+        assert type(data) is kind
+        assert data._advance is advance
+        sm.step(box, data)
+    with sm.make_data(box) as data:
+        with sm.watch_freshness(box, data):
+            data.close()
+            assert data.qpos.shape == (box.nq,)
+        with pytest.raises(ClosedDataError):
+            _ = data.xpos
+
+
+def test_a_watched_data_is_refused_and_comes_back_as_any(backend: str) -> None:
+    model = sm.load("so101", backend=backend)
+    with sm.make_data(model) as data, sm.watch_freshness(model, data, raise_on_stale=True):
+        sm.forward(model, data)
+        data.qpos[1] = np.inf
+        with pytest.raises((DivergedError, BadInputError)):
+            sm.step(model, data)
+        sm.reset(model, data)
+        with pytest.raises(StaleReadError, match="never computed"):
+            _ = data.xpos
+        sm.forward(model, data)
+        _ = data.xpos
+        with pytest.raises(sm.errors.ReadOnlyError):
+            data.xpos = 0  # pyright: ignore[reportAttributeAccessIssue]
+        with pytest.raises(BadInputError):
+            data.ctrl = [1.0]
+
+
+def test_a_watched_run_is_the_run(box: Model) -> None:
+    ends = []
+    for watched in (False, True):
+        with sm.make_data(box) as data:
+            sm.reset(box, data, keyframe=0)
+
+            def run(data: Data = data) -> None:
+                for k in range(30):
+                    data.ctrl[0] = 0.02 * k
+                    sm.step(box, data, 1 + k % 2)
+                    _ = data.site_xpos, data.contacts
+
+            if watched:
+                with sm.watch_freshness(box, data):
+                    run()
+            else:
+                run()
+            ends.append((sm.get_state(box, data), bits(data)))
+    assert ends[0] == ends[1]
+
+
+def test_the_module_is_not_loaded_unless_it_is_asked_for() -> None:
+    code = (
+        "import sys, statemachine as sm; m = sm.load('so101'); d = sm.make_data(m); "
+        "sm.step(m, d); sm.forward(m, d); print('statemachine.staleness' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True
+    )
+    assert done.stdout.strip() == "False"
+
+
+@pytest.mark.parametrize("first", ["import statemachine.staleness", "pass"])
+def test_the_name_is_the_function(first: str) -> None:
+    code = f"import statemachine as sm\n{first}\nprint(callable(sm.freshness))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True
+    )
+    assert done.stdout.strip() == "True"
+
+
+def test_rotations_are_compared_as_rotations() -> None:
+    """A quaternion and its negative are one rotation, of other bits."""
+    model = sm.load("so101")
+    one = np.tile([1.0, 0, 0, 0], (model.nbody, 1))
+    two = one.copy()
+    two[2] = (np.cos(0.1), np.sin(0.1), 0, 0)
+    (gap,) = gaps(model, "xquat", one, two)
+    assert (gap.size, gap.where) == (pytest.approx(0.2), model.body_names[2])
+    (gap,) = gaps(model, "xquat", one, -one)
+    assert gap.size == 0
+    mats = matrix_from_quat(two)[: model.nsite].reshape(-1, 9)
+    (gap,) = gaps(model, "site_xmat", np.tile(np.eye(3).ravel(), (model.nsite, 1)), -mats + 0)
+    assert gap.size != 0
+
+
+def test_a_model_without_names_sites_or_motors(tmp_path: Path) -> None:
+    """A ball and a slide, and nothing that could be named."""
+    path = tmp_path / "plain.xml"
+    path.write_text(
+        '<mujoco><worldbody><body><joint type="ball" damping="1e-3"/>'
+        '<geom size=".1" pos=".2 0 0" mass="1"/>'
+        '<body pos=".4 0 0"><joint type="slide" axis="0 1 0"/><geom size=".05" mass="1"/>'
+        "</body></body></worldbody></mujoco>"
+    )
+    model = sm.load(path)
+    with sm.make_data(model) as data:
+        assert "never computed" in str(sm.freshness(model, data))
+        data.qvel[:] = (1, 2, 3, 0.5)
+        sm.step(model, data, 30)
+        found = sm.freshness(model, data)
+        assert found["xpos"].of == "1 step ago"
+        assert "the poses of body 1, body 2" in " ".join(str(found).split())
+        assert set(sizes(found["qacc"].gaps)) == {"m/s²", "rad/s²"}
+        assert found["site_xpos"].now  # there are none
+        sm.forward(model, data)
+        assert sm.freshness(model, data)

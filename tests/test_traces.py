@@ -1,0 +1,571 @@
+"""Traces: what is recorded is what was run, and a file holds it whole."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import json
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.errors import (
+    BadInputError,
+    EngineError,
+    MissingEngineError,
+    TraceError,
+    UnknownNameError,
+)
+from statemachine.experiments.scenarios import SCENARIOS
+from statemachine.traces import (
+    COLUMNS,
+    CONTACTS,
+    Trace,
+    export_csv,
+    files,
+    play,
+    read,
+    record,
+    record_scenario,
+    shipped,
+    shipped_names,
+    write,
+)
+from statemachine.traces.controllers import controller_from
+
+from .conftest import ROOT, Cli, need_engine
+
+INPUTS = ("time", "qpos", "qvel", "ctrl")
+
+
+def traced(name: str, backend: str = "mujoco", seconds: float = 0.5, **options: Any) -> Trace:
+    scenario = SCENARIOS[name]
+    model = sm.load(scenario.model, backend=backend)
+    return record_scenario(scenario, model, seconds=seconds, **options)
+
+
+def same(one: Trace, two: Trace, columns: Any = None) -> bool:
+    return all(one[name].tobytes() == two[name].tobytes() for name in columns or one.columns)
+
+
+@pytest.fixture(scope="module")
+def box() -> Trace:
+    return traced("box", seconds=0.3)
+
+
+# What is recorded is what was run.
+
+
+def test_the_rows_are_those_of_a_bare_loop(backend: str) -> None:
+    trace = traced("hold", backend)
+    model = sm.load("so101/scene", backend=backend)
+    with sm.make_data(model) as data:
+        for k in range(101):
+            data.ctrl[:] = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
+            assert trace.time[k] == data.time
+            for name in ("qpos", "qvel", "ctrl"):
+                assert trace[name][k].tobytes() == getattr(data, name).tobytes(), (name, k)
+            sm.step(model, data)
+    assert len(trace) == 101
+    assert trace.header.rewritten == 0
+
+
+@pytest.mark.parametrize("substeps", [1, 3])
+def test_derived_columns_are_of_the_state_of_their_row(backend: str, substeps: int) -> None:
+    model = sm.load("so101/scene", backend=backend).replace(substeps=substeps)
+    trace = record_scenario(SCENARIOS["hold"], model, seconds=0.2)
+    with sm.make_data(model) as data:
+        for row in (0, 7, 20, len(trace) - 1):
+            data.qpos, data.qvel, data.ctrl = trace.qpos[row], trace.qvel[row], trace.ctrl[row]
+            sm.forward(model, data)
+            for name in ("xpos", "xquat", "site_xpos", "site_xmat", "qfrc_bias", "qfrc_actuator"):
+                assert np.allclose(trace[name][row], getattr(data, name), atol=1e-9), (name, row)
+    # Nothing else would show a column that is one row late.
+    assert not np.allclose(trace["site_xpos"][7], trace["site_xpos"][8], atol=1e-6)
+
+
+def test_contacts_are_those_of_the_step(box: Trace) -> None:
+    model = sm.load("so101/scene_box")
+    with sm.make_data(model) as data:
+        sm.reset(model, data, "held")
+        for row in range(30):
+            data.ctrl[:] = box.ctrl[row]
+            sm.step(model, data)
+            mine = box["contact_row"] == row
+            assert box["contact_geom"][mine].tolist() == data.contacts.geom.tolist()
+            assert box["contact_force"][mine].tobytes() == data.contacts.force.tobytes()
+    touches = box.touches()
+    assert set(touches) == {"gripper – box", "moving_jaw_so101_v1 – box"}
+    assert all(rows.all() for rows in touches.values())
+
+
+def test_energies_of_a_pendulum_are_those_on_paper(tmp_path: Path) -> None:
+    file = tmp_path / "pendulum.xml"
+    file.write_text(
+        "<mujoco><option timestep='0.001'/><worldbody><body><joint name='j' axis='0 1 0' "
+        "armature='0.3' damping='0'/><inertial pos='0 0 -0.5' mass='2' diaginertia='0.1 0.1 0.1'/>"
+        "</body></worldbody></mujoco>"
+    )
+    model = sm.load(file)
+    trace = record(model, None, 0.5, qpos=[1.0], qvel=[0.7])
+    angle, speed = trace.qpos[:, 0], trace.qvel[:, 0]
+    inertia = 0.1 + 2 * 0.5**2 + 0.3  # body about the joint, and rotor
+    assert np.allclose(trace["energy"][:, 0], 0.5 * inertia * speed**2, rtol=1e-12)
+    assert np.allclose(trace["energy"][:, 1], -2 * 9.81 * 0.5 * np.cos(angle), rtol=1e-12)
+    assert trace.header.energy_by.startswith("mujoco ")
+
+
+def test_energies_of_both_engines_are_measured_by_one_yardstick() -> None:
+    need_engine("pybullet")
+    one, two = traced("droop"), traced("droop", "pybullet")
+    assert one["energy"][0].tolist() == two["energy"][0].tolist()
+    raw = sm.load("so101/scene", backend="pybullet", defaults="engine")
+    engine = record_scenario(SCENARIOS["droop"], raw, seconds=0.1, defaults="engine")
+    # It has no gravity there; its states are weighed by the model's.
+    assert engine["energy"][0].tolist() == one["energy"][0].tolist()
+
+
+def test_an_engine_that_does_not_tell_leaves_nan() -> None:
+    need_engine("pybullet")
+    raw = sm.load("so101/scene", backend="pybullet", defaults="engine")
+    trace = record_scenario(SCENARIOS["hold"], raw, seconds=0.05, defaults="engine")
+    assert np.isnan(trace["qfrc_contact"]).all()
+    assert np.isfinite(trace["site_xpos"]).all()
+    assert trace.header.label.endswith("engine defaults")
+
+
+# Controllers.
+
+
+def test_a_controller_sees_time_and_data_and_gives_ctrl() -> None:
+    model = sm.load("so101")
+    seen: list[float] = []
+
+    def controller(time: float, data: sm.Data) -> list[float] | None:
+        seen.append(time)
+        return [0.1] * 6 if data.qpos[0] < 0.05 else None
+
+    trace = record(model, controller, 0.1)
+    assert len(seen) == len(trace) == 21
+    assert trace.ctrl[0].tolist() == [0.1] * 6
+    assert trace.header.experiment == "controller"
+
+
+@pytest.mark.parametrize(
+    ("gives", "says"),
+    [
+        (0.3, "wants 6 numbers"),
+        ([0.1] * 5, "wants 6 numbers"),
+        ([float("nan")] * 6, "is not a finite number"),
+        ("up", "real numbers"),
+    ],
+)
+def test_what_is_no_ctrl_is_said_with_the_time(gives: Any, says: str) -> None:
+    model = sm.load("so101")
+    with pytest.raises(BadInputError, match=says) as caught:
+        record(model, lambda time, _data: gives if time > 0.02 else None, 0.1)
+    assert "0.025 s" in str(caught.value)
+
+
+def test_a_nan_in_an_array_of_the_right_shape_is_found(backend: str) -> None:
+    model = sm.load("so101", backend=backend)
+    bad = np.full(6, np.nan)
+    with pytest.raises(BadInputError, match="ctrl"):
+        record(model, lambda time, _data: bad if time > 0.02 else None, 0.1)
+    with pytest.raises(BadInputError, match="ctrl"):  # in the last row, after the last step
+        record(model, lambda time, _data: bad if time > 0.096 else None, 0.1)
+
+
+def test_a_controller_that_kicks_is_repeated_exactly(backend: str) -> None:
+    model = sm.load("so101/scene", backend=backend)
+
+    def kick(time: float, data: sm.Data) -> None:
+        if abs(time - 0.1) < 1e-6:
+            data.qvel[1] = 3.0
+
+    trace = record(model, kick, 0.3)
+    assert trace.header.rewritten == 1
+    row = int(np.argmax(np.abs(trace.qvel[:, 1])))
+    assert trace.qvel[row, 1] == 3.0
+    assert abs(trace.time[row] - 0.1) < 1e-6
+
+
+def test_an_engine_that_does_not_repeat_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    from statemachine.traces import recorder
+
+    honest, calls = recorder.step, []
+
+    def restless(model: sm.Model, data: sm.Data) -> None:
+        calls.append(1)
+        honest(model, data)
+        data.qpos[0] += 1e-15 * len(calls)
+
+    monkeypatch.setattr(recorder, "step", restless)
+    with pytest.raises(EngineError, match="could not be repeated"):
+        traced("hold", seconds=0.1)
+    with pytest.raises(EngineError, match="could not be repeated"):
+        record(sm.load("so101"), None, 0.1)
+
+
+def test_a_run_that_diverges_keeps_its_rows(tmp_path: Path) -> None:
+    model = sm.load("so101")
+
+    def wild(time: float, data: sm.Data) -> None:
+        if time > 0.05:
+            data.qvel[:] = 9e9
+
+    trace = record(model, wild, 0.5)
+    assert trace.header.ended
+    assert 10 < len(trace) < 101
+    again = read(write(trace, tmp_path / "wild.npz"))
+    assert same(trace, again)
+
+
+def test_it_starts_where_it_is_told() -> None:
+    model = sm.load("so101/scene_box")
+    assert record(model, None, 0.01, keyframe="held").header.keyframe == "held"
+    with sm.make_data(model) as data:
+        sm.reset(model, data, "held")
+        sm.step(model, data, 20)
+        state = sm.get_state(model, data)
+        sm.step(model, data)
+        after = data.qpos.copy()
+    trace = record(model, None, 0.01, state=state)
+    assert trace.qpos[1].tobytes() == after.tobytes()
+    with pytest.raises(BadInputError, match="not from both"):
+        record(model, None, 0.01, state=state, keyframe="held")
+    with pytest.raises(UnknownNameError):
+        record(model, None, 0.01, keyframe="hold")
+
+
+def test_the_seed_makes_the_waves() -> None:
+    one, again, other = (traced("waves", seed=seed) for seed in (3, 3, 4))
+    assert same(one, again)
+    assert not np.array_equal(one.ctrl, other.ctrl)
+    assert one.header.provenance.seed == 3
+    low, high = np.array(one.header.ctrlrange).T
+    assert ((one.ctrl >= low) & (one.ctrl <= high)).all()
+
+
+def test_a_scenario_for_other_actuators_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "bare.xml"
+    file.write_text(
+        "<mujoco><worldbody><body><joint/><geom size='.1'/></body></worldbody></mujoco>"
+    )
+    with pytest.raises(BadInputError, match="6 actuators"):
+        record_scenario(SCENARIOS["hold"], sm.load(file))
+
+
+# Playing on another engine.
+
+
+def test_played_on_its_own_engine_it_is_the_same_run(backend: str) -> None:
+    trace = traced("waves", backend)
+    again = play(trace, sm.load("so101", backend=backend))
+    assert same(trace, again)
+
+
+def test_played_with_another_timestep_commands_hold() -> None:
+    trace = traced("waves")
+    finer = play(trace, sm.load("so101").replace(timestep=0.0025))
+    assert len(finer) == 2 * len(trace) - 1
+    assert np.array_equal(finer.ctrl[::2], trace.ctrl)
+    assert np.array_equal(finer.ctrl[1::2], trace.ctrl[:-1])
+
+
+def test_played_on_another_robot_it_is_refused() -> None:
+    with pytest.raises(TraceError, match="other joints"):
+        play(traced("waves"), sm.load("so101/scene_box"))
+
+
+# Files.
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".parquet"])
+@pytest.mark.parametrize("name", ["box", "droop"])
+def test_a_file_holds_every_bit(name: str, suffix: str, tmp_path: Path) -> None:
+    trace = traced(name, seconds=0.2)
+    path = write(trace, tmp_path / f"one{suffix}")
+    again = read(path)
+    assert set(again.columns) == set(trace.columns) == {*COLUMNS, *CONTACTS}
+    for column in trace.columns:
+        assert again[column].dtype == trace[column].dtype
+        assert again[column].shape == trace[column].shape
+    assert same(trace, again)
+    assert again.header.recorded
+    assert dataclasses.replace(again.header, recorded=False) == trace.header
+    assert write(trace, tmp_path / f"two{suffix}").read_bytes() == path.read_bytes()
+    assert sorted(file.name for file in tmp_path.iterdir()) == [f"one{suffix}", f"two{suffix}"]
+
+
+def test_opening_one_needs_no_engine(tmp_path: Path, box: Trace) -> None:
+    path = write(box, tmp_path / "box.npz")
+    code = (
+        "import sys\n"
+        "for name in ('mujoco', 'pybullet', 'pinocchio'): sys.modules[name] = None\n"
+        "from statemachine.traces import read\n"
+        "from statemachine.compare import compare\n"
+        f"trace = read({str(path)!r})\n"
+        "print(len(trace), compare(trace, trace).agrees)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    assert done.stdout.split() == [str(len(box)), "True"], done.stderr
+
+
+def test_a_table_reader_understands_the_parquet_file(tmp_path: Path, box: Trace) -> None:
+    from pyarrow import parquet
+
+    path = write(box, tmp_path / "box.parquet")
+    table = parquet.read_table(path)
+    assert table["qpos"][3].as_py() == box.qpos[3].tolist()
+    mine = box["contact_row"] == 3
+    assert table["contact_dist"][3].as_py() == box["contact_dist"][mine].tolist()
+    assert parquet.ParquetFile(path).metadata.row_group(0).column(0).compression == "ZSTD"
+
+
+def test_without_pyarrow_one_line_names_the_extra(
+    tmp_path: Path, box: Trace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    with pytest.raises(MissingEngineError, match=r"statemachine-sim\[parquet\]"):
+        write(box, tmp_path / "box.parquet")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_write_that_fails_leaves_what_was_there(
+    tmp_path: Path, box: Trace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write(box, tmp_path / "box.npz")
+    before = path.read_bytes()
+
+    def full(file: Any, **_arrays: Any) -> None:
+        file.write(b"half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(files.np, "savez_compressed", full)
+    with pytest.raises(OSError, match="No space"):
+        write(box, path)
+    assert path.read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == ["box.npz"]
+
+
+def _npz(path: Path, **arrays: Any) -> Path:
+    with path.open("wb") as out:
+        np.savez(out, **arrays)
+    return path
+
+
+def _header(trace: Trace, **changes: Any) -> Any:
+    text = json.dumps({**json.loads(trace.header.as_json()), **changes})
+    return np.frombuffer(text.encode(), dtype=np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"qpos": np.zeros((3, 3))}, "shape"),
+        ({"qpos": None}, "needs the column 'qpos'"),
+        ({"time": None}, "a column 'time'"),
+        ({"qvel": "nan"}, "not a finite number"),
+        ({"contact_row": "late"}, "ascending"),
+        ({"contact_geom": "far"}, "geom that is not there"),
+        ({"contact_dist": None}, "contacts only"),
+        ({"speed": np.zeros(3)}, "no column 'speed'"),
+        ({"qpos": np.array(["a"])}, "not numbers"),
+        ({"header": np.frombuffer(b"{}", dtype=np.uint8)}, "schema None"),
+        ({"header": np.frombuffer(b"\xff\xfe", dtype=np.uint8)}, "is no trace"),
+        ({"header": {"nq": -1}}, "no count"),
+        ({"header": {"nq": "7"}}, "no count"),
+        ({"header": {"timestep": 0}}, "no time"),
+        ({"header": {"joints": ["a"]}}, "entries"),
+        ({"header": {"schema": 99}}, "this version reads 1"),
+        ({"header": {"provenance": {}}}, "no header"),
+        ({"header": None}, "no header"),
+        ({"qpos": np.array([{}], dtype=object)}, "is no trace"),
+    ],
+)
+def test_a_broken_file_is_one_line(
+    change: dict[str, Any], says: str, tmp_path: Path, box: Trace
+) -> None:
+    arrays: dict[str, Any] = {name: np.array(array) for name, array in box.columns.items()}
+    arrays["header"] = _header(box)
+    for name, value in change.items():
+        if value is None:
+            del arrays[name]
+        elif isinstance(value, dict):
+            arrays[name] = _header(box, **value)
+        elif isinstance(value, str):
+            arrays[name].flat[-1] = {"nan": np.nan, "late": 0, "far": 999}[value]
+        else:
+            arrays[name] = value
+    path = _npz(tmp_path / "bad.npz", **arrays)
+    with pytest.raises(TraceError, match=says) as caught:
+        read(path)
+    assert "bad.npz" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_is_no_trace_at_all(tmp_path: Path, box: Trace) -> None:
+    good = write(box, tmp_path / "box.npz").read_bytes()
+    for name, content in (("empty", b""), ("text", b"hello"), ("half", good[: len(good) // 2])):
+        for suffix in (".npz", ".parquet"):
+            path = tmp_path / f"{name}{suffix}"
+            path.write_bytes(content)
+            with pytest.raises(TraceError, match="is no trace"):
+                read(path)
+    with pytest.raises(BadInputError, match=r"\.npz or \.parquet"):
+        read(tmp_path / "box.csv")
+    with pytest.raises(FileNotFoundError):
+        read(tmp_path / "nowhere.npz")
+    bomb = io.BytesIO()
+    with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("qpos.npy", bytes(1000))
+    text = bytearray(bomb.getvalue())
+    place = text.rindex((1000).to_bytes(4, "little"))  # what the list of contents says of it
+    text[place : place + 4] = (2**32 - 2).to_bytes(4, "little")
+    for entry in range(1):
+        (tmp_path / f"bomb{entry}.npz").write_bytes(bytes(text))
+    files_most, files._MOST = files._MOST, 2**31
+    try:
+        with pytest.raises(TraceError, match="unfolds"):
+            read(tmp_path / "bomb0.npz")
+    finally:
+        files._MOST = files_most
+
+
+def test_csv_has_a_name_for_every_number(tmp_path: Path, box: Trace) -> None:
+    main, contacts = export_csv(box, tmp_path / "box.csv")
+    with main.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(box)
+    assert float(rows[5]["qpos.elbow_flex"]) == box.qpos[5, 2]
+    assert float(rows[5]["qpos.box.qw"]) == box.qpos[5, 9]
+    assert float(rows[5]["qvel.box.wz"]) == box.qvel[5, 11]
+    assert float(rows[5]["energy.potential"]) == box["energy"][5, 1]
+    tip = box.header.sites.index("gripperframe")
+    assert float(rows[5]["site_xpos.gripperframe.z"]) == box["site_xpos"][5, tip, 2]
+    widths = sum(int(np.prod(box.header.shape(name))) for name in COLUMNS if name in box)
+    assert len(rows[0]) == widths
+    with contacts.open(encoding="utf-8") as file:
+        touching = list(csv.DictReader(file))
+    assert len(touching) == len(box["contact_row"])
+    assert {row["body_2"] for row in touching} == {"box"}
+    assert float(touching[9]["force.normal"]) == box["contact_force"][9, 0]
+
+
+def test_arrays_are_read_only(box: Trace) -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        box.qpos[0, 0] = 1.0
+    with pytest.raises(UnknownNameError, match="qpos"):
+        box["qposs"]
+
+
+# What comes with the package.
+
+
+def test_each_scenario_was_recorded_with_both_defaults() -> None:
+    expected = {f"{name}.pybullet{end}" for name in SCENARIOS for end in ("", ".engine")}
+    assert set(shipped_names()) == expected
+    trace = shipped("hold", "pybullet", "engine")
+    assert trace.header.recorded
+    assert trace.header.defaults == "engine"
+    with pytest.raises(UnknownNameError, match="recorded trace"):
+        shipped("hold", "mujoco")
+
+
+@pytest.mark.slow
+def test_recorded_traces_are_what_the_engine_does_here() -> None:
+    need_engine("pybullet")
+    sys.path.insert(0, str(ROOT / "models" / "so101"))
+    try:
+        import make_traces  # pyright: ignore[reportMissingImports]
+    finally:
+        sys.path.pop(0)
+    made = make_traces.traces()
+    assert set(made) == set(shipped_names())
+    for name, trace in made.items():
+        kept = read(make_traces.FOLDER / f"{name}.npz")
+        if kept.header.provenance.versions != trace.header.provenance.versions:
+            pytest.skip(f"recorded with {kept.header.provenance.versions}: run make traces")
+        assert kept.header.provenance.model_sha256 == trace.header.provenance.model_sha256, name
+        assert same(trace, kept, INPUTS), name
+        for column in trace.columns:
+            rounded = trace[column].astype(np.float32)
+            if column not in INPUTS:
+                assert np.array_equal(kept[column], rounded, equal_nan=True), (name, column)
+
+
+# The command.
+
+
+def test_the_command_records_plays_shows_and_exports(cli: Cli, tmp_path: Path) -> None:
+    done = cli("trace", "record", "hold", "--seconds", "0.2")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("hold.mujoco.npz: 41 rows of hold on mujoco ")
+    header = json.loads(cli("trace", "show", "hold.mujoco.npz", "--json").stdout)
+    assert header["command"] == "statemachine trace record hold --seconds 0.2"
+    page = cli("trace", "show", "hold.mujoco.npz").stdout
+    assert "opened without an engine" in page
+    assert max(map(len, page.splitlines())) <= 80
+    assert cli("trace", "play", "hold.mujoco.npz", "-o", "again.parquet").returncode == 0
+    assert same(read(tmp_path / "again.parquet"), read(tmp_path / "hold.mujoco.npz"))
+    assert cli("trace", "csv", "again.parquet").stdout.split() == [
+        "again.csv", "again.contacts.csv",
+    ]  # fmt: skip
+
+
+CONTROLLERS = """
+def controller(time, data):
+    return [0.1] * 6
+
+def late(time, data):
+    if time > 0.1:
+        return 1 / 0
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "says", "code"),
+    [
+        (("record",), "record what?", 2),
+        ((), "trace what?", 2),
+        (("record", "hold", "--controller", "c.py"), "record what?", 2),
+        (("record", "hodl"), "Did you mean 'hold'?", 2),
+        (("record", "hold", "-o", "x.csv"), ".npz or .parquet", 2),
+        (("record", "hold", "-o", "nowhere/x.npz"), "no folder nowhere", 2),
+        (("record", "hold", "--keyframe", "held"), "has its own start", 2),
+        (("record", "hold", "--seconds", "-1"), "seconds must be above 0", 2),
+        (("record", "--controller", "c.py:late"), "c.py, line 7, at 0.100 s: ZeroDivision", 2),
+        (("record", "--controller", "c.py:never"), "has no function never", 2),
+        (("record", "--controller", "d.py"), "no controller file d.py", 2),
+        (("record", "--controller", "e.py"), "e.py, line 1: SyntaxError", 2),
+        (("show", "c.npz"), "c.npz", 2),
+        (("show", "c.py"), ".npz or .parquet", 2),
+    ],
+)
+def test_mistakes_are_one_line(
+    words: tuple[str, ...], says: str, code: int, cli: Cli, tmp_path: Path
+) -> None:
+    (tmp_path / "c.py").write_text(CONTROLLERS)
+    (tmp_path / "e.py").write_text("def controller(:")
+    done = cli("trace", *words)
+    assert done.returncode == code
+    (line,) = done.stderr.splitlines()
+    assert says in line
+    assert not [file for file in tmp_path.iterdir() if file.suffix not in (".py", "")]
+
+
+def test_a_controller_of_ones_own(tmp_path: Path) -> None:
+    file = tmp_path / "c.py"
+    file.write_text(CONTROLLERS)
+    trace = record(sm.load("so101"), controller_from(f"{file}:controller"), 0.05)
+    assert (trace.ctrl == 0.1).all()
