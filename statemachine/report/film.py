@@ -106,8 +106,8 @@ def write_film(
 
     def pictures() -> Iterator[Any]:
         for k, frame in enumerate(drawn):
+            progress((k + 1) / timing.count)  # before: nobody asks for more than the last
             yield overlay.paint(frame, k)
-            progress((k + 1) / timing.count)
 
     try:
         if path.suffix.lower() == ".mp4":
