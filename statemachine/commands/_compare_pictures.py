@@ -73,7 +73,7 @@ def checked(options: argparse.Namespace) -> Pictures:
 
         films.check_suffix(film)
         check_speed(options.fps, options.slow)
-        check_size(options.size)
+        check_size(options.size, films.SMALLEST)
         _check_place(film)
         with progress("looking for OpenGL"):
             renderer = renderer_here(None if options.renderer == "auto" else options.renderer)

@@ -97,12 +97,12 @@ def check_speed(fps: float, slow: float) -> None:
         raise BadInputError(f"--slow is from 0.05 to 100 times as long; got {slow:g}")
 
 
-def check_size(size: tuple[int, int]) -> None:
+def check_size(size: tuple[int, int], smallest: tuple[int, int] = _SMALLEST) -> None:
     """Raise BadInputError for a width and height that no film has."""
     for k, word in enumerate(("width", "height")):
-        if not _SMALLEST[k] <= size[k] <= _LARGEST[k] or size[k] % 2:
+        if not smallest[k] <= size[k] <= _LARGEST[k] or size[k] % 2:
             raise BadInputError(
-                f"the {word} of a film is even, from {_SMALLEST[k]} to {_LARGEST[k]} pixels; "
+                f"the {word} of a film is even, from {smallest[k]} to {_LARGEST[k]} pixels; "
                 f"got {size[k]}"
             )
 

@@ -12,10 +12,13 @@ from ..errors import BadInputError, MissingEngineError
 from ..experiments._common import Progress, silent
 from ..model import Model
 from ..rendering import Renderer, Timing, frames, renderer_here, timing_of
+from ..rendering.pictures import check_size
 from ..traces import Trace
 from .figures_of import scale_of
+from .plot_panels import side_labels
 from .film_files import SUFFIXES, write_mp4, write_webp
 from .film_overlay import Overlay, Strip
+SMALLEST = (240, 180)  # in which the strip and the text have room
 
 
 @dataclass(frozen=True)
@@ -91,10 +94,12 @@ def write_film(
         MissingEngineError: An extra is missing, or nothing here can draw.
     """
     check_suffix(path)
+    check_size(size, SMALLEST)
     timing = timing_of(one, two, fps, slow)
     renderer = renderer_here() if renderer is None else renderer
     strip = _strip(one, two, comparison)
-    overlay = Overlay(size, timing, one.header.experiment, _labels(one, two), strip)
+    labels = [one.header.label] if two is None else side_labels(one, two)
+    overlay = Overlay(size, timing, one.header.experiment, labels, strip)
     drawn = frames(
         one,
         two,
@@ -123,16 +128,6 @@ def _length(path: Path, timing: Timing) -> float:
     if path.suffix.lower() == ".mp4":  # all of its pictures are shown equally long
         return timing.count / timing.fps
     return sum(timing.milliseconds) / 1000
-
-
-def _labels(one: Trace, two: Trace | None) -> list[str]:
-    labels = [trace.header.label for trace in (one, two) if trace is not None]
-    if len(labels) == 2 and labels[0] == labels[1] and two is not None:
-        labels = [
-            f"{trace.header.provenance.model_file}, {1000 * trace.header.timestep:.3g} ms"
-            for trace in (one, two)
-        ]
-    return labels
 
 
 def _strip(one: Trace, two: Trace | None, comparison: Comparison | None) -> Strip | None:

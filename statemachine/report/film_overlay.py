@@ -81,7 +81,7 @@ class Overlay:
         self._speed = "real time" if slow == 1 else f"{_ratio(slow)} of real time"
         if strip is not None:
             self._left, self._right = 3.4 * self._text, size[0] - 0.8 * self._text
-            self._top, self._bottom = 1.5 * self._text, low - 0.6 * self._text
+            self._top, self._bottom = 1.75 * self._text, low - 0.6 * self._text
             self._scale()
             self._done, self._to_come = self._drawn(_VIOLET), self._drawn(_PALE)
 

@@ -89,7 +89,7 @@ def of_comparison(one: Trace, two: Trace, comparison: Comparison, tip: str | Non
     first = min((agreement.since or 0.0 for agreement in parted), default=None)
     notes = [
         "Upper: both sides. Lower: how far apart, on a log axis; the dotted line is the "
-        "tolerance, and what is beyond it is filled."
+        "tolerance, and what is beyond it is filled. Beside the verdict: the largest difference."
     ]
     if first is not None:
         names = [agreement.name for agreement in parted if agreement.since == first]
@@ -100,7 +100,7 @@ def of_comparison(one: Trace, two: Trace, comparison: Comparison, tip: str | Non
     return Figure(
         title=one.header.experiment,
         lines=_origin(one, two),
-        labels=_labels(one, two),
+        labels=side_labels(one, two),
         panels=panels,
         touches=_touches([one, two], comparison.until),
         seconds=comparison.until,
@@ -217,7 +217,8 @@ def _spans(
     return spans
 
 
-def _labels(one: Trace, two: Trace) -> list[str]:
+def side_labels(one: Trace, two: Trace) -> list[str]:
+    """Names of the sides; of one engine twice, with what tells them apart."""
     labels = [one.header.label, two.header.label]
     if labels[0] == labels[1]:
         labels = [f"{t.header.label}, {t.header.provenance.model_file}" for t in (one, two)]
