@@ -13,7 +13,7 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13 python3.14; 
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null \
 	&& { echo $$p; break; }; done)
 
-.PHONY: help lesson test test-fast test-newest check format hooks bench picture urdf traces docs notebook clean
+.PHONY: help lesson test test-fast test-newest check format hooks bench picture report urdf traces docs notebook clean
 
 help:
 	@sed -n 's/^# make /  make /p' Makefile
@@ -30,6 +30,7 @@ lesson: $(VENV)/run.stamp
 	@echo "  statemachine lesson gravity --backend all     on all engines, side by side"
 	@echo "  statemachine lesson questions   check yourself"
 	@echo "  python exercises/step_loop.py   then four functions for you to write"
+	@echo "  statemachine compare hold --html hold.html     where two engines part, and why"
 	@echo "  statemachine doctor             what this machine has, and what to do"
 
 test: check
@@ -71,6 +72,12 @@ picture: $(VENV)/test.stamp
 # make urdf         write models/so101/so101.urdf anew from so101.xml
 urdf: $(VENV)/run.stamp
 	@$(BIN)/python models/so101/make_urdf.py
+
+# make report       where the engines part when the arm is told one pose, and why: hold.html
+report: $(VENV)/run.stamp
+	@# 1: they differ, which is what the page is about.
+	@$(BIN)/statemachine compare hold --html hold.html >/dev/null || [ $$? -eq 1 ]
+	@echo "hold.html: open it in a browser"
 
 # make traces       record on PyBullet anew what the package brings for where it has no wheel
 traces: $(VENV)/run.stamp

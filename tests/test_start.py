@@ -26,6 +26,7 @@ HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "xml.
         ("from statemachine.cli import main; main(['lesson', 'gravity', '--help'])", set()),
         ("from statemachine.cli import main; main(['fingertip', '--help'])", set()),
         ("from statemachine.cli import main; main(['conventions', '--help'])", set()),
+        ("from statemachine.cli import main; main(['audit', '--help'])", set()),
         ("from statemachine.cli import main; main(['check', '--help'])", set()),
         ("import statemachine.interface, statemachine.verbs", {"numpy"}),
         ("import statemachine.staleness", {"numpy"}),

@@ -16,22 +16,23 @@ _RENDERERS = ("auto", "mujoco", "pybullet")
 
 def add(parser: argparse.ArgumentParser) -> None:
     """The options."""
-    parser.add_argument(
+    group = parser.add_argument_group("pictures")
+    group.add_argument(
         "--plot", default=None, metavar="FILE", help="write a figure: .svg, .png or .pdf"
     )
-    parser.add_argument(
+    group.add_argument(
         "--film", default=None, metavar="FILE", help="write a film of both sides: .webp or .mp4"
     )
-    parser.add_argument(
+    group.add_argument(
         "--fps", type=float, default=30.0, metavar="N", help="of the film (default 30)"
     )
-    parser.add_argument(
+    group.add_argument(
         "--slow", type=float, default=1.0, metavar="N", help="of the film: N times slower"
     )
-    parser.add_argument(
+    group.add_argument(
         "--size", type=_size, default=(640, 480), metavar="WxH", help="of the film (640x480)"
     )
-    parser.add_argument(
+    group.add_argument(
         "--renderer",
         default="auto",
         choices=_RENDERERS,

@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from ..errors import BadInputError
+from . import _compare_models
 from . import _compare_pictures as pictures
 from ._common import PROGRAM, add_json, add_menagerie, complain, show
 
@@ -31,7 +32,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--backends",
         nargs=2,
-        default=["mujoco", "pybullet"],
+        default=None,
         metavar=("A", "B"),
         help="the engines (default mujoco pybullet)",
     )
@@ -45,6 +46,7 @@ def add(commands: Any) -> None:
         help="another tolerance, such as joint=0.5deg, tip=2mm, energy=0.1J",
     )
     pictures.add(parser)
+    _compare_models.add_options(parser)
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -71,16 +73,17 @@ def add_run(parser: argparse.ArgumentParser) -> None:
     add_menagerie(parser)
     parser.add_argument("--seconds", type=float, default=None, metavar="S", help="simulated time")
     parser.add_argument("--timestep", type=float, default=None, metavar="S", help="on both sides")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of waves (default 0)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of what is drawn (0)")
 
 
 def request_of(options: argparse.Namespace) -> Any:
     """What was asked for, as a Request."""
     from ..compare import Request
 
+    one, two = options.backends or ("mujoco", "pybullet")
     return Request(
         what=tuple(options.what),
-        backends=tuple(options.backends),
+        backends=(one, two),
         defaults=options.defaults,
         model=options.model,
         menagerie=options.menagerie if options.model else None,
@@ -92,6 +95,9 @@ def request_of(options: argparse.Namespace) -> Any:
 
 def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
+    if options.models:
+        return _compare_models.run(options)
+    _compare_models.refuse_alone(options)
     if not options.what:
         raise BadInputError(
             f"compare what? An experiment ({', '.join(EXPERIMENTS)}) or traces: "

@@ -15,9 +15,10 @@ from ..rendering import Renderer, Timing, frames, renderer_here, timing_of
 from ..rendering.pictures import check_size
 from ..traces import Trace
 from .figures_of import scale_of
-from .plot_panels import side_labels
 from .film_files import SUFFIXES, write_mp4, write_webp
 from .film_overlay import Overlay, Strip
+from .plot_panels import side_labels
+
 SMALLEST = (240, 180)  # in which the strip and the text have room
 
 

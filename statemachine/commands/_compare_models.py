@@ -1,0 +1,91 @@
+"""`statemachine compare --models A B`: two descriptions of a robot, before anything moves."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..errors import BadInputError
+from ._common import show
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Those of this half of the command; --backends, --seed, --menagerie, --json are shared."""
+    group = parser.add_argument_group("comparing descriptions of a robot")
+    group.add_argument(
+        "--models",
+        nargs="+",
+        metavar="NAME|FILE",
+        help="two models, URDF or MJCF, before anything moves; FILE@ENGINE, or --backends and one "
+        "model: what an engine makes of it",
+    )
+    group.add_argument(
+        "--frame", action="append", default=[], metavar="A=B", help="a frame of A that is B's"
+    )
+    group.add_argument(
+        "--rename", action="append", default=[], metavar="A=B", help="a joint or link that is B's"
+    )
+    group.add_argument(
+        "--digits", type=int, default=6, metavar="N", help="equal means to so many digits (6)"
+    )
+    group.add_argument("--all", action="store_true", help="a row for every figure that differs")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compare, and show."""
+    from ..backends import backend_engine
+    from ..compare.models import compare, split
+    from ..report import model_diff
+    from ..report.progress import progress
+
+    given = [split(text) for text in options.models]
+    if options.what:
+        raise BadInputError(f"--models compares descriptions; {options.what[0]} is a run")
+    for name in ("model", "seconds", "timestep", "tolerance", "plot", "film"):
+        if getattr(options, name) not in (None, []):
+            raise BadInputError(f"--{name} is of a run, and --models runs nothing")
+    if options.backends:
+        if any(engine for _, engine in given):
+            raise BadInputError("--backends and FILE@ENGINE say the same: give one of them")
+        for engine in options.backends:
+            backend_engine(engine)
+        if len(given) == 1:
+            given *= 2
+        given = [
+            (model, engine) for (model, _), engine in zip(given, options.backends, strict=False)
+        ]
+    if len(given) != 2 or len(options.models) > 2:
+        hint = "two models, or one and --backends A B"
+        raise BadInputError(f"--models wants {hint}; got {len(options.models)}")
+    if not 1 <= options.digits <= 17:
+        raise BadInputError(f"--digits wants a number from 1 to 17; got {options.digits}")
+    if options.seed < 0:
+        raise BadInputError(f"--seed must not be negative; got {options.seed}")
+    with progress("compare"):
+        result = compare(
+            given[0][0],
+            given[1][0],
+            engines=(given[0][1], given[1][1]),
+            frames=_pairs(options.frame, "--frame"),
+            rename=_pairs(options.rename, "--rename"),
+            digits=options.digits,
+            seed=options.seed,
+            menagerie=options.menagerie,
+        )
+    return show(model_diff.page(result, options.all), result, options.json)
+
+
+def refuse_alone(options: argparse.Namespace) -> None:
+    """Raise BadInputError for an option of --models without it."""
+    for name in ("frame", "rename", "all"):
+        if getattr(options, name):
+            raise BadInputError(f"--{name} goes with --models")
+
+
+def _pairs(given: list[str], option: str) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for text in given:
+        one, sign, two = text.partition("=")
+        if not (one and sign and two):
+            raise BadInputError(f"{option} wants A=B, a name of A's and one of B's; got {text!r}")
+        found[one] = two
+    return found

@@ -1,0 +1,209 @@
+"""A robot as its file describes it, in one set of conventions for every format.
+
+A tree of links. Each hangs on its parent by one joint or by none, at a pose that is that
+of all joint positions zero. What a format cannot say, or a file does not, is None: that is
+something else than zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from ...records import Array
+from ...rotations import angle_between
+
+Range = tuple[float, float]
+
+
+class Placement(NamedTuple):
+    """A pose: `pos` (3,) [m], `mat` (3, 3)."""
+
+    pos: Array
+    mat: Array
+
+    def __matmul__(self, inner: Placement) -> Placement:
+        """The pose `inner`, given in this frame, in the frame that this one is given in."""
+        return Placement(self.pos + self.mat @ inner.pos, self.mat @ inner.mat)
+
+    @property
+    def inverse(self) -> Placement:
+        """The way back."""
+        return Placement(-self.mat.T @ self.pos, self.mat.T)
+
+    def of(self, point: Array) -> Array:
+        """A point (3,) of this frame in the frame that this one is given in."""
+        return self.pos + self.mat @ point
+
+    def distance(self, other: Placement) -> float:
+        """Between the origins [m]."""
+        return float(np.linalg.norm(self.pos - other.pos))
+
+    def angle(self, other: Placement) -> float:
+        """Between the axes [rad]."""
+        return float(angle_between(self.mat, other.mat))
+
+
+HERE = Placement(np.zeros(3), np.eye(3))
+
+
+@dataclass(frozen=True, eq=False)
+class Inertial:
+    """Mass [kg], centre of mass (3,) [m], inertia (3, 3) about it [kg m²], in link axes."""
+
+    mass: float
+    com: Array
+    tensor: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """What a link touches with.
+
+    Attributes:
+        kind: box, sphere, cylinder, capsule, ellipsoid, mesh, plane or another word.
+        place: In the link's frame.
+        size: Half edges of a box or ellipsoid, radius, radius and half length [m].
+        points: (n, 3) corners of a mesh [m], in its own frame; None if it was not read.
+        volume: [m³]; None where there is none to be had.
+        name: As in the file, may be empty.
+        friction: (sliding, torsional, rolling) coefficients, or None where not said.
+        contact: Further settings of its contacts, by name.
+    """
+
+    kind: str
+    place: Placement
+    size: tuple[float, ...] = ()
+    points: Array | None = None
+    volume: float | None = None
+    name: str = ""
+    friction: tuple[float, ...] | None = None
+    contact: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """How a link moves against its parent.
+
+    Attributes:
+        name: As in the file.
+        kind: hinge, slide, ball, planar or free.
+        axis, anchor: (3,) unit direction, and a point of it [m], in the link's frame.
+        limits: Lowest and highest position [rad or m]; None where it has none.
+        velocity: Highest speed [rad/s or m/s].
+        effort: Largest force of what drives it [N·m or N], infinite where unlimited.
+        armature: Inertia of the rotor as the joint feels it [kg m² or kg].
+        damping: [N·m·s/rad or N·s/m]; friction: dry friction [N·m or N].
+        stiffness: Of a spring in it; rest: where that is slack.
+        follows: Joint, factor and offset where it mimics another.
+    """
+
+    name: str
+    kind: str
+    axis: Array
+    anchor: Array
+    limits: Range | None = None
+    velocity: float | None = None
+    effort: float | None = None
+    armature: float | None = None
+    damping: float | None = None
+    friction: float | None = None
+    stiffness: float | None = None
+    rest: float | None = None
+    follows: tuple[str, float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A rigid part.
+
+    Attributes:
+        name: As in the file.
+        parent: Name of the link that carries it; empty for the root.
+        place: In the parent's frame, all joints at zero.
+        joint: None where it is fixed.
+        inertial: None where the file gives it none.
+        shapes: What it touches with.
+    """
+
+    name: str
+    parent: str
+    place: Placement
+    joint: Joint | None
+    inertial: Inertial | None
+    shapes: tuple[Shape, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A named frame that a link carries: `place` in the link's frame."""
+
+    name: str
+    link: str
+    place: Placement
+
+
+@dataclass(frozen=True, eq=False)
+class Actuator:
+    """What drives a joint.
+
+    Attributes:
+        joint: Its name; empty where it drives something else.
+        kind: position, velocity, motor, or general.
+        kp, kv: Gains of a position servo.
+        gain: Force for each unit of ctrl, where it is no position servo.
+        gear: Joint force for each unit of its own.
+        forces, controls: Ranges, None where unlimited.
+    """
+
+    name: str
+    joint: str
+    kind: str
+    kp: float | None
+    kv: float | None
+    gain: float | None
+    gear: float
+    forces: Range | None
+    controls: Range | None
+
+
+Setting = float | str | tuple[float, ...] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """One file, as one reader has it.
+
+    Attributes:
+        name: Of the file, with its folder.
+        reader: What read it, with its version: "XML", "mujoco 4.0.0".
+        format: URDF or MJCF, or the engine that was asked.
+        links: Parents before children; the first is the root.
+        frames: Sites; a link is a frame too.
+        actuators: None where the format has no word for them.
+        settings: Of the simulation, by name; None where the format has no word for them.
+        defaults: What its engine takes for a setting that a file does not name.
+        touch: The same of the contacts of a shape.
+        rooted: Whether the root is the world; in a URDF it is a link of the robot.
+        notes: What a reader should know, in sentences.
+    """
+
+    name: str
+    reader: str
+    format: str
+    links: tuple[Link, ...]
+    frames: tuple[Frame, ...]
+    actuators: tuple[Actuator, ...] | None
+    settings: Mapping[str, Setting] | None
+    rooted: bool
+    notes: tuple[str, ...] = ()
+    defaults: Mapping[str, Setting] = field(default_factory=dict)
+    touch: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """All joints, in the order of the links."""
+        return tuple(link.joint for link in self.links if link.joint)

@@ -1,0 +1,292 @@
+"""A URDF as a description: its XML, and nothing that an engine makes of it.
+
+An engine's importer is the wrong witness here. MuJoCo's fuses fixed links, drops the root's
+mass and the limit of speed; Pinocchio's drops names of collision shapes and is not to be had
+on Windows; both refuse a file for one missing mesh. The format is small, so its XML is read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from ...errors import ModelError
+from ...records import Array
+from ._urdf_numbers import number, numbers, origin
+from .description import HERE, Inertial, Joint, Link, Placement, Robot, Shape
+from .meshes import read_mesh, volume_of
+
+Element = ElementTree.Element
+_LARGEST = 64 * 2**20  # bytes; a description is text, its meshes are elsewhere
+_MOST = 2_000  # links
+_KINDS = {
+    "revolute": "hinge",
+    "continuous": "hinge",
+    "prismatic": "slide",
+    "floating": "free",
+    "planar": "planar",
+}
+_LABEL = "a URDF"
+
+
+class _Builder(ElementTree.TreeBuilder):
+    """Refuses a document type: with it come entities, which can grow without bound."""
+
+    def doctype(self, name: str, _pubid: str | None, _system: str | None) -> None:
+        raise ModelError(f"it has a <!DOCTYPE {name}>, which {_LABEL} has no use for")
+
+
+def read(path: Path) -> Robot:
+    """The description in a URDF file.
+
+    Raises:
+        ModelError: It is no URDF, or its figures make no sense; in one line.
+    """
+    try:
+        return _Reader(path).robot()
+    except ModelError as error:
+        raise ModelError(f"{path.name}: {error}") from None
+
+
+def _parse(path: Path) -> Element:
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise ModelError(f"it is larger than {_LARGEST >> 20} MB, which no description is")
+        parser = ElementTree.XMLParser(target=_Builder())
+        parser.feed(path.read_bytes())
+        root = parser.close()
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        if isinstance(error, ModelError):
+            raise
+        raise ModelError(f"it is no XML: {error}") from None
+    if root.tag != "robot":
+        raise ModelError(f"it is no URDF: its root element is <{root.tag}>, not <robot>")
+    for element in root.iter():
+        if "xacro" in element.tag:
+            raise ModelError("it is a xacro: turn it into a URDF first (xacro file > file.urdf)")
+    return root
+
+
+class _Reader:
+    """One file while it is read."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.root = _parse(path)
+        self.notes: list[str] = []
+        self._scaled: dict[tuple[str, tuple[float, ...]], tuple[Array | None, str]] = {}
+
+    def robot(self) -> Robot:
+        elements = {}
+        for link in self.root.findall("link"):
+            name = _name(link)
+            if name in elements:
+                raise ModelError(f"two links are called {name!r}")
+            elements[name] = link
+        if len(elements) > _MOST:
+            raise ModelError(f"it has {len(elements):,} links, and {_MOST:,} are the most here")
+        if not elements:
+            raise ModelError("it has no <link>")
+        hung: dict[str, tuple[str, Element]] = {}
+        names: set[str] = set()
+        for joint in self.root.findall("joint"):
+            name = _name(joint)
+            if name in names:
+                raise ModelError(f"two joints are called {name!r}")
+            names.add(name)
+            parent, child = _end(joint, "parent", elements), _end(joint, "child", elements)
+            if child in hung:
+                raise ModelError(f"link {child!r} hangs on two joints")
+            hung[child] = (parent, joint)
+        order = _order(list(elements), {child: parent for child, (parent, _) in hung.items()})
+        links = tuple(
+            self._link(name, elements[name], *hung.get(name, ("", None))) for name in order
+        )
+        if self.root.find("transmission") is not None:
+            self.notes.append(
+                "its <transmission> elements are for a controller and are not compared"
+            )
+        return Robot(
+            name="/".join(self.path.parts[-2:]),
+            reader="its XML",
+            format="URDF",
+            links=links,
+            frames=(),
+            actuators=None,
+            settings=None,
+            rooted=False,
+            notes=tuple(self.notes),
+        )
+
+    def _link(self, name: str, element: Element, parent: str, joint: Element | None) -> Link:
+        place, moves = HERE, None
+        if joint is not None:
+            place, moves = origin(joint, f"joint {_name(joint)!r}"), _joint(joint)
+        shapes = [self._shape(each, name) for each in element.findall("collision")]
+        friction = self._friction(element, name)
+        if friction is not None:
+            shapes = [replace(each, friction=friction) for each in shapes]
+        return Link(name, parent, place, moves, _inertial(element, name), tuple(shapes))
+
+    def _friction(self, element: Element, name: str) -> tuple[float, ...] | None:
+        """Of PyBullet's own element <contact>, where there is one."""
+        contact = element.find("contact")
+        if contact is None:
+            return None
+        tags = ("lateral_friction", "spinning_friction", "rolling_friction")
+        found = [contact.find(tag) for tag in tags]
+        if found[0] is None:
+            return None
+        return tuple(
+            0.0 if each is None else number(each, "value", f"link {name!r}") for each in found
+        )
+
+    def _shape(self, element: Element, link: str) -> Shape:
+        where = f"a collision shape of link {link!r}"
+        geometry = element.find("geometry")
+        solid = None if geometry is None else next(iter(geometry), None)
+        if solid is None:
+            raise ModelError(f"{where} has no geometry")
+        place, name = origin(element, where), element.get("name", "")
+        if solid.tag == "mesh":
+            return self._mesh(solid, place, name, link, where)
+        if solid.tag == "box":
+            size = tuple(edge / 2 for edge in numbers(solid, "size", 3, where))
+        elif solid.tag == "sphere":
+            size = (number(solid, "radius", where),)
+        elif solid.tag in ("cylinder", "capsule"):
+            size = (number(solid, "radius", where), number(solid, "length", where) / 2)
+        else:
+            self.notes.append(f"{where} is a <{solid.tag}>, which is not known here")
+            return Shape(solid.tag, place, name=name)
+        if min(size) < 0:
+            raise ModelError(f"{where} has a negative size")
+        return Shape(solid.tag, place, size, volume=volume_of(solid.tag, size), name=name)
+
+    def _mesh(self, solid: Element, place: Placement, name: str, link: str, where: str) -> Shape:
+        file = solid.get("filename", "")
+        scale = tuple(numbers(solid, "scale", 3, where, (1.0, 1.0, 1.0)))
+        if (file, scale) not in self._scaled:
+            self._scaled[file, scale] = read_mesh(file, self.path.parent)
+        points, trouble = self._scaled[file, scale]
+        if points is None:
+            self.notes.append(
+                f"the mesh {file!r} of link {link!r} {trouble}: its size is not known"
+            )
+            return Shape("mesh", place, name=name)
+        scaled = points * scale
+        volume = volume_of("mesh", (), scaled)
+        return Shape("mesh", place, points=scaled.reshape(-1, 3), volume=volume, name=name)
+
+
+def _name(element: Element) -> str:
+    name = element.get("name", "")
+    if not name.strip():
+        raise ModelError(f"a <{element.tag}> has no name")
+    return name
+
+
+def _end(joint: Element, tag: str, links: dict[str, Element]) -> str:
+    element = joint.find(tag)
+    link = "" if element is None else element.get("link", "")
+    if link not in links:
+        what = f"a {tag} {link!r}, which is no link" if link else f"no {tag}"
+        raise ModelError(f"joint {_name(joint)!r} has {what}")
+    return link
+
+
+def _order(names: list[str], parent: dict[str, str]) -> list[str]:
+    """Parents before children, depth first, siblings as in the file."""
+    roots = [name for name in names if name not in parent]
+    if len(roots) > 1:
+        raise ModelError(f"{len(roots)} links hang on nothing: {', '.join(roots[:4])}")
+    children: dict[str, list[str]] = {}
+    for name in names:
+        if name in parent:
+            children.setdefault(parent[name], []).append(name)
+    order: list[str] = []
+    waiting = roots
+    while waiting:
+        name = waiting.pop()
+        order.append(name)
+        waiting += reversed(children.get(name, []))
+    if len(order) < len(names):
+        left = next(name for name in names if name not in set(order))
+        raise ModelError(f"its links go round in a circle, {left!r} among them")
+    return order
+
+
+def _joint(element: Element) -> Joint | None:
+    name, kind = _name(element), element.get("type", "")
+    where = f"joint {name!r}"
+    if kind == "fixed":
+        return None
+    if kind not in _KINDS:
+        raise ModelError(f"{where} is of type {kind!r}; known: fixed, {', '.join(_KINDS)}")
+    axis_element = element.find("axis")
+    axis = np.array([1.0, 0.0, 0.0])  # what the format takes where none is given
+    if axis_element is not None:
+        axis = numbers(axis_element, "xyz", 3, where, (1.0, 0.0, 0.0))
+    length = float(np.linalg.norm(axis))
+    if length < 1e-9 and kind != "floating":
+        raise ModelError(f"the axis of {where} is zero")
+    limit, dynamics, mimic = (element.find(tag) for tag in ("limit", "dynamics", "mimic"))
+
+    def of(part: Element | None, attribute: str, default: float | None = None) -> float | None:
+        if part is None or part.get(attribute) is None:
+            return default if part is not None else None
+        return number(part, attribute, where)
+
+    limits = None
+    if kind in ("revolute", "prismatic"):
+        if limit is None:
+            raise ModelError(f"{where} is {kind} and has no <limit>")
+        low, high = of(limit, "lower", 0.0) or 0.0, of(limit, "upper", 0.0) or 0.0
+        limits = (low, high) if low <= high else None  # PyBullet's way to say "none"
+    return Joint(
+        name=name,
+        kind=_KINDS[kind],
+        axis=axis / max(length, 1e-9),
+        anchor=np.zeros(3),
+        limits=limits,
+        velocity=of(limit, "velocity"),
+        effort=of(limit, "effort"),
+        damping=of(dynamics, "damping"),
+        friction=of(dynamics, "friction"),
+        follows=None
+        if mimic is None
+        else (
+            mimic.get("joint", ""),
+            of(mimic, "multiplier", 1.0) or 0.0,
+            of(mimic, "offset", 0.0) or 0.0,
+        ),
+    )
+
+
+def _inertial(link: Element, name: str) -> Inertial | None:
+    element = link.find("inertial")
+    if element is None:
+        return None
+    where = f"the <inertial> of link {name!r}"
+    mass_element, inertia = element.find("mass"), element.find("inertia")
+    if mass_element is None:
+        raise ModelError(f"{where} has no <mass>")
+    mass = number(mass_element, "value", where)
+    if mass < 0:
+        raise ModelError(f"{where} gives a mass of {mass} kg")
+    tensor = np.zeros((3, 3))
+    if inertia is not None:
+        for i, j, word in (
+            (0, 0, "xx"),
+            (0, 1, "xy"),
+            (0, 2, "xz"),
+            (1, 1, "yy"),
+            (1, 2, "yz"),
+            (2, 2, "zz"),
+        ):
+            tensor[i, j] = tensor[j, i] = number(inertia, f"i{word}", where)
+    place = origin(element, where)
+    return Inertial(mass, place.pos, place.mat @ tensor @ place.mat.T)

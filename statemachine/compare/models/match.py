@@ -1,0 +1,267 @@
+"""Which part of one description is which of the other, and how their frames lie.
+
+Joints are one by their names. Where names differ, two joints are taken for one that hang on
+the same part, are of one kind and have one axis; that is said, and `renamed` overrules it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...errors import unknown_name
+from ...records import Array
+from .description import HERE, Placement, Robot
+from .tree import Group, Tree
+
+_NEAR, _TILT = 5e-3, 0.1  # [m] and [rad] within which two axes may be one
+_ODD = 1e-4  # [m] at which a mismatch counts half
+Places = dict[tuple[int, int], list[tuple[Placement, Placement]]]
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """A rigid group of one description and its counterpart.
+
+    Attributes:
+        one, two: The groups.
+        align: The frame of `one` in that of `two`, as the same solid: identity unless the
+            files put the frame of this link elsewhere.
+        by: How it was found: root, name or place.
+        moved: Whether it hangs on another part in the other file.
+    """
+
+    one: Group
+    two: Group
+    align: Placement
+    by: str
+    moved: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Matching:
+    """All pairs, parents first, and what is left over."""
+
+    pairs: tuple[Pair, ...]
+    only_one: tuple[Group, ...]
+    only_two: tuple[Group, ...]
+
+    def of(self, number: int) -> Pair | None:
+        """The pair of a group of the first description."""
+        return next((pair for pair in self.pairs if pair.one.number == number), None)
+
+
+def renamed(robot: Robot, names: Mapping[str, str]) -> Robot:
+    """A description whose joints, links and frames go by other names.
+
+    Raises:
+        UnknownNameError: It has nothing of such a name.
+    """
+    known = {each.name for each in (*robot.joints, *robot.links, *robot.frames)}
+    for name in names:
+        if name not in known:
+            raise unknown_name(f"joint, link or frame of {robot.name}", name, sorted(known))
+
+    def of(name: str) -> str:
+        return names.get(name, name)
+
+    links = tuple(
+        replace(
+            link,
+            name=of(link.name),
+            parent=of(link.parent),
+            joint=link.joint and replace(link.joint, name=of(link.joint.name)),
+        )
+        for link in robot.links
+    )
+    frames = tuple(replace(f, name=of(f.name), link=of(f.link)) for f in robot.frames)
+    drives = robot.actuators and tuple(replace(a, joint=of(a.joint)) for a in robot.actuators)
+    return replace(robot, links=links, frames=frames, actuators=drives)
+
+
+def match(one: Tree, two: Tree) -> Matching:
+    """Pairs of rigid groups."""
+    pairs: dict[int, Pair] = {}
+    taken: set[int] = set()
+    names = _fixed_frames(one, two)
+
+    def add(a: Group, b: Group, by: str, moved: bool = False) -> None:
+        above = pairs.get(a.parent)
+        if by == "root" or above is None or moved:
+            align = _of_root(one, two, a, b, names) if by == "root" else HERE
+        else:
+            align = _of_child(one, two, a, b, names, above.align)
+        pairs[a.number] = Pair(a, b, align, by, moved)
+        taken.add(b.number)
+
+    add(*_bases(one, two), "root")
+    for group in one.groups:
+        if group.number in pairs or group.joint is None:
+            continue
+        above = pairs.get(group.parent)
+        named = two.by_joint.get(group.joint.name)
+        if named is not None and named.number not in taken:
+            hung = above is not None and above.two.number == named.parent
+            add(group, named, "name", moved=not hung)
+        elif above is not None:
+            found = _placed(one, two, group, above, taken)
+            if found is not None:
+                add(group, found, "place")
+    return Matching(
+        tuple(pairs.values()),
+        tuple(group for group in one.groups if group.number not in pairs),
+        tuple(group for group in two.groups if group.number not in taken),
+    )
+
+
+def _bases(one: Tree, two: Tree) -> tuple[Group, Group]:
+    """The roots; a base that floats in one file and stands still in the other is one too."""
+    for name, a in one.by_joint.items():
+        b = two.by_joint.get(name)
+        if b is None or a.parent < 0 or b.parent < 0:
+            continue
+        above = one.groups[a.parent], two.groups[b.parent]
+        floats = [bool(each.joint and each.joint.kind == "free") for each in above]
+        if floats[0] != floats[1] and above[floats[0]].parent < 0:
+            return above
+        break
+    return one.groups[0], two.groups[0]
+
+
+def _placed(one: Tree, two: Tree, group: Group, above: Pair, taken: set[int]) -> Group | None:
+    """A group of the second description that hangs where `group` does, by the same axis."""
+    joint = group.joint
+    assert joint is not None
+    found: list[tuple[float, Group]] = []
+    for other in two.children(above.two.number):
+        hers = other.joint
+        if other.number in taken or hers is None or hers.kind != joint.kind:
+            continue
+        if hers.name in one.by_joint:
+            continue
+        if joint.kind not in ("hinge", "slide"):
+            if group.name == other.name:
+                return other
+            continue
+        (at, axis), (there, along) = _line(group, above.align), _line(other, HERE)
+        if _apart(at, there, along) < _NEAR and abs(axis @ along) > np.cos(_TILT):
+            found.append((_apart(at, there, along), other))
+    return min(found, key=lambda each: each[0])[1] if found else None
+
+
+def _line(group: Group, align: Placement) -> tuple[Array, Array]:
+    """A point of a group's joint axis and its direction, in an aligned parent's frame."""
+    joint = group.joint
+    assert joint is not None
+    place = align @ group.place
+    return place.of(joint.anchor), place.mat @ joint.axis
+
+
+def _apart(point: Array, other: Array, axis: Array) -> float:
+    """Distance of a point from the line through another."""
+    return float(np.linalg.norm(np.cross(axis, point - other)))
+
+
+def _of_root(one: Tree, two: Tree, a: Group, b: Group, names: Places) -> Placement:
+    """How the frames of two roots lie: as they are, or so that links of them coincide."""
+    choices = [HERE]
+    ours = {link.name: place for link, place in a.links}
+    theirs = {link.name: place for link, place in b.links}
+    choices += [theirs[name] @ ours[name].inverse for name in ours if name in theirs]
+    # The robot's first link, where only one of the files has a world around it.
+    firsts = [
+        group.links[1][1]
+        if tree.robot.rooted and group.number == 0 and len(group.links) > 1
+        else HERE
+        for tree, group in ((one, a), (two, b))
+    ]
+    choices.append(firsts[1] @ firsts[0].inverse)
+    return _best(one, two, a, b, names, choices)
+
+
+def _of_child(
+    one: Tree, two: Tree, a: Group, b: Group, names: Places, above: Placement
+) -> Placement:
+    """How the frames of a pair lie: one frame, or two of a solid that is in one place."""
+    return _best(one, two, a, b, names, [HERE, b.place.inverse @ above @ a.place])
+
+
+def _best(
+    one: Tree, two: Tree, a: Group, b: Group, names: Places, choices: list[Placement]
+) -> Placement:
+    fixed = names.get((a.number, b.number), [])
+    scores = [sum(e / (e + _ODD) for e in _errors(one, two, a, b, fixed, each)) for each in choices]
+    least = min(scores)
+    return next(each for each, score in zip(choices, scores, strict=True) if score <= least + 0.5)
+
+
+def _errors(
+    one: Tree,
+    two: Tree,
+    a: Group,
+    b: Group,
+    fixed: list[tuple[Placement, Placement]],
+    align: Placement,
+) -> Iterator[float]:
+    """How far apart [m] the features of two solids are that are laid on each other."""
+    if a.joint and b.joint and a.joint.kind in ("hinge", "slide"):
+        yield float(np.linalg.norm(align.mat @ a.joint.axis - b.joint.axis)) / 10
+        if a.joint.kind == "hinge":
+            yield _apart(align.of(a.joint.anchor), b.joint.anchor, b.joint.axis)
+    for child in one.children(a.number):
+        other = two.by_joint.get(child.joint.name) if child.joint else None
+        if other is None or other.joint is None or other.parent != b.number:
+            continue
+        if other.joint.kind in ("hinge", "slide"):
+            (at, axis), (there, along) = _line(child, align), _line(other, HERE)
+            yield _apart(at, there, along)
+            yield float(np.linalg.norm(np.cross(axis, along))) / 10
+    mine, theirs = a.inertial, b.inertial
+    if mine.mass and theirs.mass:
+        yield float(np.linalg.norm(align.of(mine.com) - theirs.com))
+        turned = align.mat @ mine.tensor @ align.mat.T
+        yield float(np.sqrt(np.abs(turned / mine.mass - theirs.tensor / theirs.mass).max())) / 10
+    for place, other_place in fixed:
+        yield (align @ place).distance(other_place)
+
+
+def _fixed_frames(one: Tree, two: Tree) -> Places:
+    """Frames of one name by the groups that carry them, those of the groups themselves apart."""
+    found: Places = {}
+    for name, other_name in frame_names(one, two).items():
+        (at, place), (there, other) = one.frames[name], two.frames[other_name]
+        if not (place is HERE and other is HERE):
+            found.setdefault((at, there), []).append((place, other))
+    return found
+
+
+def frame_names(one: Tree, two: Tree, given: Mapping[str, str] | None = None) -> dict[str, str]:
+    """Frames that are one: those given, of one name, or of names that say the same.
+
+    "gripperframe" and "gripper_frame_link" do: case, signs and a last "link" or "site" apart.
+
+    Raises:
+        UnknownNameError: A frame that was given is not there.
+    """
+    found: dict[str, str] = {}
+    for name, other in (given or {}).items():
+        for tree, each in ((one, name), (two, other)):
+            if each not in tree.frames:
+                raise unknown_name(f"frame in {tree.robot.name}", each, tree.frames)
+        found[name] = other
+    rest = [name for name in two.frames if name not in found.values()]
+    plain = {_plain(name): name for name in reversed(rest)}
+    for name in one.frames:
+        if name not in found:
+            other = name if name in rest else plain.get(_plain(name))
+            if other is not None and other not in found.values():
+                found[name] = other
+    return found
+
+
+def _plain(name: str) -> str:
+    letters = re.sub(r"[^a-z0-9]", "", name.lower())
+    return re.sub(r"(link|site)$", "", letters) or letters

@@ -1,0 +1,226 @@
+"""Two descriptions of a robot, side by side, as a page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+
+from ..compare.models import Agreement, Compared, Difference, Side
+from ..compare.models.ledger import SUBJECTS, Value
+from ..page import Block, Page, Table, Text, Verdict
+
+_ROWS = 8  # of a table, unless all are asked for
+# Units as a reader has them, of differences; a result has SI.
+_MOMENT = "of a part"  # kg m², which are of another size than those of a joint
+_APART = {
+    "rad": (180 / math.pi, "°"),
+    "m": (1e3, "mm"),
+    "m³": (1e6, "cm³"),
+    _MOMENT: (1e6, "kg mm²"),
+}
+# ... and of the figures themselves.
+_SHOWN = {unit: _APART[unit] for unit in ("m", "m³", _MOMENT)}
+_LAST = {
+    "places": "so",
+    "armature": "share",
+    "drive": "holds",
+    "effort": "ratio",
+    "damping": "slows in, A / B",
+    "dry friction": "share",
+    "limits": "so",
+    "mass": "share",
+    "centre of mass": "load",
+    "inertia": "share",
+    "settings": "",
+    "structure": "",
+}
+_WHY = {
+    "places": "In the frame of the link that carries the joint. A zero position of x: where A "
+    "reads 0, B reads x.",
+    "tool frame": "In the frame of B's link.",
+    "armature": "M_ii is the inertia that the joint's motor feels, at zero, armature included.",
+    "drive": "sags: by how much the servo gives way to the weight of what the joint carries, its "
+    "axis level. damping ratio: of the joint alone, with M_ii at zero.",
+    "damping": "slows in: the time M_ii / damping in which a joint that nothing drives comes to "
+    "1/e of its speed.",
+    "centre of mass": "load: weight times distance, what the shift adds to the joint at most.",
+    "inertia": "Principal moments of the rigid part, about its centre of mass. M_ii is that of "
+    "the joint that carries it, at zero, armature included.",
+    "mass": "Of rigid parts: links without a joint between them are weighed together.",
+    "shapes": "In the frame of B's link; sizes are half edges, radius, or radius and half length.",
+}
+
+
+def page(result: Compared, everything: bool = False) -> Page:
+    """What differs, the weightiest first; then what is equal, and how well.
+
+    Args:
+        result: Of `compare`.
+        everything: Whether every figure has a row of its own.
+    """
+    blocks: list[Block] = [_sides(result), _verdict(result)]
+    for subject, group in groupby(result.found.differences, key=lambda each: each.subject):
+        blocks += _subject(subject, list(group), everything)
+    blocks += _equal(result)
+    notes = [
+        *(f"A: {note}" for note in result.one.notes),
+        *(f"B: {note}" for note in result.two.notes),
+        *result.found.notes,
+    ]
+    blocks += [Text(f"{note[0].upper()}{note[1:]}.") for note in notes]
+    origin = ", ".join(f"{name} {version}" for name, version in result.versions.items())
+    names = [
+        f"{side.file} on {side.reader.split()[0]}" if side.format == "engine" else side.file
+        for side in (result.one, result.two)
+    ]
+    return Page(f"Before anything moves: {names[0]} against {names[1]}", origin, blocks)
+
+
+def _sides(result: Compared) -> Text:
+    def said(side: Side) -> str:
+        how = (
+            f"loaded into {side.reader}"
+            if side.format == "engine"
+            else f"{side.format}, by {side.reader}"
+        )
+        return (
+            f"{side.file} ({how}; {side.links} links, {side.joints} joints, {side.shapes} shapes)"
+        )
+
+    weigh = [f"{mass:.4g} kg" for mass in result.found.mass]
+    alike = (
+        "Both weigh " + weigh[0] if weigh[0] == weigh[1] else f"They weigh {' and '.join(weigh)}"
+    )
+    return Text(f"A is {said(result.one)}. B is {said(result.two)}. {alike}.")
+
+
+def _verdict(result: Compared) -> Verdict:
+    matter = [each for each in result.found.differences if each.matters]
+    if not matter:
+        return Verdict(f"nothing differs that matters, to {result.digits} digits", True)
+    subjects = ", ".join(dict.fromkeys(each.subject for each in matter))
+    count = f"{len(matter)} figures differ" if len(matter) > 1 else "1 figure differs"
+    return Verdict(f"{count}, the weightiest first: {subjects}", False)
+
+
+def _subject(subject: str, found: list[Difference], everything: bool) -> Iterator[Block]:
+    rows = (
+        [_row(subject, [each]) for each in found] if everything else list(_together(subject, found))
+    )
+    shown = rows if everything else rows[:_ROWS]
+    headers: list[str] = ["", "A", "B", "apart", _LAST.get(subject, "")]
+    keep = [k for k in range(5) if k < 3 or any(row[k] for row in shown)]
+    title = SUBJECTS[subject]
+    if not any(each.matters for each in found):
+        title += " (for the record)"
+    yield Table(
+        [headers[k] for k in keep],
+        [[row[k] for k in keep] for row in shown],
+        title,
+        frozenset(range(len(keep))),
+    )
+    if len(rows) > len(shown):
+        yield Text(f"… and {len(rows) - len(shown)} more, no weightier: --all shows every one.")
+    if subject == "armature":
+        yield from _faster(found)
+    if subject in _WHY:
+        yield Text(_WHY[subject])
+
+
+def _faster(found: list[Difference]) -> Iterator[Block]:
+    """What the absence of armature does, at its worst."""
+    worst = max(found, key=lambda each: each.share)
+    if 0 < worst.share < 1 and not (worst.one and worst.two):
+        side = "B" if worst.two is None or not worst.two else "A"
+        times = 1 / (1 - worst.share)
+        shown = f"{times:,.0f}" if times >= 100 else f"{times:.3g}"
+        yield Text(f"The same torque accelerates {worst.where} {shown} times as fast in {side}.")
+
+
+def _together(subject: str, found: Sequence[Difference]) -> Iterator[list[str]]:
+    """Rows; where three or more places have one figure with the same values, one for all."""
+    groups: dict[tuple[object, ...], list[Difference]] = {}
+    for each in found:
+        groups.setdefault((each.figure, each.one, each.two, each.size, each.unit), []).append(each)
+    for group in groups.values():
+        if len(group) < 3:
+            for each in group:
+                yield _row(subject, [each])
+        else:
+            yield _row(subject, group)
+
+
+def _row(subject: str, group: Sequence[Difference]) -> list[str]:
+    first, last = group[0], group[-1]
+    where = first.where if len(group) == 1 else f"{first.where} + {len(group) - 1} more:"
+    unit = _MOMENT if subject == "inertia" and first.unit == "kg m²" else first.unit
+    effect = first.effect
+    if len(group) > 1 and last.effect != effect:
+        effect = f"{effect} … {last.effect}"
+    label = f"{where} {first.figure}".strip().removesuffix(":")
+    shows = first.size is not None and first.one is not None and first.two is not None
+    turned = first.size is not None and first.one is None and first.two is None
+    # What one of them does not say is no distance.
+    apart = _number(first.size or 0.0, unit, _APART) if shows or turned else ""
+    values = ["", ""] if turned else [_value(each, unit) for each in (first.one, first.two)]
+    return [label, *values, apart, effect]
+
+
+def _value(value: Value, unit: str) -> str:
+    if value is None:
+        return "not said"
+    if isinstance(value, str):
+        return value
+    if isinstance(value, tuple):
+        factor, shown = _SHOWN.get(unit, (1.0, "" if len(value) == 3 else unit))
+        words = " ".join(_digits(each * factor) for each in value)
+        return f"{words} {shown}".strip()
+    return _number(value, unit, _SHOWN)
+
+
+def _number(value: float, unit: str, units: dict[str, tuple[float, str]]) -> str:
+    factor, shown = units.get(unit, (1.0, unit))
+    gap = "" if shown in ("", "°") else " "
+    return f"{_digits(value * factor)}{gap}{shown}"
+
+
+def _digits(value: float) -> str:
+    return f"{value + 0.0:.4g}"
+
+
+def _equal(result: Compared) -> Iterator[Block]:
+    found = result.found
+    if found.agreements:
+        rows = [
+            _agreement(list(group))
+            for _, group in groupby(found.agreements, key=lambda each: each.subject)
+        ]
+        yield Table(
+            ("", "figures", "apart, at most", "to digits"), rows, "What is equal", frozenset({0})
+        )
+    posed = found.posed
+    if posed.joints:
+        yield Text(
+            f"The same positions of {posed.joints} joints put every link within "
+            f"{_tiny(posed.distance * 1e3)} mm and {_tiny(math.degrees(posed.angle))}° of the same "
+            f"pose, at {posed.poses} poses (seed {posed.seed})"
+            + (f"; {posed.link} is the furthest off." if posed.distance > 1e-5 else ".")
+        )
+
+
+def _tiny(value: float) -> str:
+    return f"{value:.4g}" if value > 1e-2 else f"{value:.1g}"
+
+
+def _agreement(group: Sequence[Agreement]) -> list[str]:
+    """A row for a subject: the worst in each of its units."""
+    subject, worst = group[0].subject, []
+    for each in group:
+        of = _MOMENT if subject == "inertia" else each.unit
+        factor, unit = _APART.get(of, (1.0, of))
+        if each.worst:
+            worst.append(f"{each.worst * factor:.1e} {unit}".replace(" °", "°").strip())
+    count, digits = sum(each.count for each in group), min(each.digits for each in group)
+    name = SUBJECTS[subject].partition(":")[0]
+    return [name, str(count), ", ".join(worst) or "0", "all" if digits == 17 else str(digits)]

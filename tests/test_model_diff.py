@@ -1,0 +1,714 @@
+"""Two descriptions of a robot: every seeded difference is found, alone and with its size."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rich.cells import cell_len
+
+from statemachine import load
+from statemachine.compare.models import Compared, Difference, compare, read, split
+from statemachine.compare.models.ledger import SUBJECTS, digits_of
+from statemachine.compare.models.tree import Tree
+from statemachine.errors import ModelError, UnknownNameError
+from statemachine.kinematics import Kinematics
+from statemachine.models import models_dir
+from statemachine.report import model_diff
+from statemachine.report.as_json import dumps
+from statemachine.rotations import angle_between
+
+from .conftest import Cli, need_engine
+from .two_arms import mjcf, urdf
+
+Pair = Callable[..., tuple[Path, Path]]
+
+
+@pytest.fixture
+def pair(tmp_path: Path) -> Pair:
+    """The arm as two files, with changes to one side, the other, or both."""
+
+    def write(in_urdf: dict[str, Any] | None = None, in_mjcf: dict[str, Any] | None = None) -> Any:
+        one, two = tmp_path / "arm.urdf", tmp_path / "arm.xml"
+        one.write_text(urdf(**(in_urdf or {})))
+        two.write_text(mjcf(**(in_mjcf or {})))
+        return one, two
+
+    return write
+
+
+def _differ(result: Compared) -> list[Difference]:
+    return [each for each in result.found.differences if each.matters]
+
+
+def test_the_same_arm_in_two_formats_is_equal(pair: Pair) -> None:
+    result = compare(*pair())
+    assert result.equal, _differ(result)
+    assert result.found.posed.distance < 1e-15
+    assert result.found.posed.joints == 3
+    # The speed, for which an MJCF has no word, is said for the record.
+    assert {each.subject for each in result.found.differences} == {"speed"}
+    counts = {each.subject: each.count for each in result.found.agreements}
+    assert counts["mass"] == 4
+    assert counts["limits"] == 6
+    assert counts["damping"] == counts["dry friction"] == counts["effort"] == 3
+    assert result.found.mass == (pytest.approx(0.96), pytest.approx(0.96))
+
+
+@pytest.mark.parametrize("side", ["in_urdf", "in_mjcf"])
+@pytest.mark.parametrize(
+    ("change", "subject", "where", "figure", "size"),
+    [
+        ({"upper_mass": 0.21}, "mass", "upper", "", 0.01),
+        ({"motor_mass": 0.06 + 1e-5, "motor_pos": "0.05 0.01 0"}, "mass", "fore", "", 1e-5),
+        ({"upper_com": "0.01 0.002 0.034"}, "centre of mass", "upper", "", 0.004),
+        ({"upper_moments": (3.3e-4, 2e-4, 1.5e-4)}, "inertia", "upper", "moments", 5e-5),
+        ({"upper_pos": "0.02 0.003 0.104"}, "places", "shoulder", "origin", 0.005),
+        ({"roll_pos": "0.131 0 0"}, "places", "wrist_roll", "origin", 0.001),
+        ({"fore_rpy": "1.4707963267948966 0 0"}, "places", "elbow", "frame turned", 0.1),
+        ({"fore_axis": "0 0 -1"}, "places", "elbow", "axis", math.pi),
+        ({"roll_low": -2.841}, "limits", "wrist_roll", "lower", 0.097),
+        ({"roll_high": 2.841}, "limits", "wrist_roll", "upper", 0.097),
+        ({"box_pos": "0.05 0 0.007"}, "shapes", "upper: beam", "middle", 0.007),
+        ({"ball": 0.016}, "shapes", "hand: ball", "size", 0.001),
+        ({"tool_pos": "0.08 0.0199 0"}, "tool frame", "gripper", "origin", 0.0199),
+        ({"tool_rpy": "0 1.5707963267948966 0"}, "tool frame", "gripper", "axes", math.pi / 2),
+    ],
+)
+def test_each_seeded_difference_is_found_with_its_size(
+    pair: Pair,
+    side: str,
+    change: dict[str, Any],
+    subject: str,
+    where: str,
+    figure: str,
+    size: float,
+) -> None:
+    found = _differ(compare(*pair(**{side: change})))
+    hit = [d for d in found if (d.subject, d.figure) == (subject, figure)]
+    assert len(hit) == 1, found
+    assert hit[0].where.startswith(where)
+    assert hit[0].size == pytest.approx(size, rel=1e-6)
+    # Nothing else, but for what is the same fact: a shape's volume and extent, a shifted
+    # part's composite.
+    beside = {"mass": {"centre of mass", "inertia"}, "shapes": {"shapes"}}.get(subject, set())
+    assert {d.subject for d in found} <= {subject, *beside}
+    if subject not in ("mass", "shapes"):
+        assert len(found) == 1, found
+
+
+def test_a_shifted_zero_is_told_from_a_turned_frame(pair: Pair) -> None:
+    """0.3 rad of the frame are about the joint's own axis: 0.25 more are its zero."""
+    (found,) = _differ(compare(*pair({"upper_rpy": "0 0 0.55"})))
+    assert (found.subject, found.where, found.figure) == ("places", "shoulder", "zero position")
+    assert found.two == pytest.approx(0.25)
+    # The tool is 0.32 m away from the axis of the shoulder, and turns with it.
+    assert re.fullmatch(r"moves what it carries by up to \d+(\.\d+)? mm", found.effect)
+
+
+@pytest.mark.parametrize("figure", ["effort", "damping", "friction"])
+def test_figures_of_all_joints(pair: Pair, figure: str) -> None:
+    found = _differ(compare(*pair({figure: 10.0})))
+    subject = {"friction": "dry friction"}.get(figure, figure)
+    assert [(d.subject, d.one) for d in found] == [(subject, 10.0)] * 3
+    assert {d.where for d in found} == {"shoulder", "elbow", "wrist_roll"}
+    sizes = {"effort": 10 - 2.94, "damping": 10 - 0.6, "friction": 10 - 0.05}
+    assert [d.size for d in found] == [pytest.approx(sizes[figure])] * 3
+
+
+def test_what_a_urdf_cannot_say_is_not_zero(pair: Pair) -> None:
+    option = 'timestep="0.005" gravity="0 0 -1.62" integrator="implicitfast"'
+    found = _differ(
+        compare(
+            *pair(
+                {"damping": None},
+                {
+                    "armature": 0.028,
+                    "kp": 50.0,
+                    "option": option,
+                    "stiffness": 2.0,
+                    "geom": 'friction="0.7 0.005 0.0001"',
+                },
+            )
+        )
+    )
+    assert all(each.one is None for each in found)
+    said = {(d.subject, d.figure): d.two for d in found}
+    assert said == {
+        ("armature", ""): 0.028,
+        ("drive", "drive"): "position",
+        ("drive", "kp"): 50.0,
+        ("drive", "kv"): 1.0,
+        ("damping", ""): 0.6,
+        ("dry friction", ""): 0.05,
+        ("spring", "stiffness"): 2.0,
+        ("settings", "timestep"): 0.005,
+        ("settings", "gravity"): (0.0, 0.0, -1.62),
+        ("settings", "integrator"): "implicitfast",
+        ("contact", "friction"): (0.7, 0.005, 0.0001),
+    }
+
+
+def test_the_public_pair(pair: Pair, cli: Cli) -> None:
+    """The differences that the two public descriptions of the SO-101 have."""
+    one, two = pair(
+        {
+            "roll_low": -2.841,
+            "roll_high": 2.841,
+            "effort": 10.0,
+            "damping": None,
+            "tool_pos": "0.08 0 -0.0199",
+            "tool_rpy": "0 1.5707963267948966 0",
+        },
+        {"armature": 0.028, "kp": 998.22},
+    )
+    done = cli("compare", "--models", str(one), str(two), "--json")
+    assert done.returncode == 1
+    assert done.stderr == ""
+    found = json.loads(done.stdout, parse_constant=lambda name: pytest.fail(name))
+    by = {(d["subject"], d["where"], d["figure"]): d for d in found["found"]["differences"]}
+    frame = "gripper_frame_link, gripperframe"
+    assert by["tool frame", frame, "origin"]["size"] == pytest.approx(0.0199)
+    assert by["tool frame", frame, "axes"]["size"] == pytest.approx(math.pi / 2)
+    limit = by["limits", "wrist_roll", "upper"]
+    assert (limit["one"], limit["two"]) == (2.841, 2.744)
+    assert limit["effect"] == "A goes 5.56° further"
+    effort = by["effort", "wrist_roll", ""]
+    assert (effort["one"], effort["two"], effort["effect"]) == (10, 2.94, "3.4 times")
+    assert by["damping", "elbow", ""]["one"] is None
+    assert by["armature", "elbow", ""]["two"] == 0.028
+    assert found["equal"] is False
+    assert found["found"]["posed"]["distance"] < 1e-12  # where the joints are, they agree
+    assert found["versions"].keys() >= {"statemachine", "mujoco", "numpy", "python"}
+    page = cli("compare", "--models", str(one), str(two))
+    assert page.returncode == 1
+    for text in ("19.9 mm", "90°", "2.841", "2.744", "10 N·m", "2.94 N·m", "not said"):
+        assert text in page.stdout, text
+    lines = page.stdout.splitlines()
+    assert max(map(cell_len, lines)) <= 80
+    assert all(line == line.rstrip() for line in lines)
+    assert "nan" not in page.stdout.lower().split()
+
+
+def test_our_own_urdf_holds_all_that_a_urdf_can() -> None:
+    result = compare(models_dir() / "so101" / "so101.urdf", "so101")
+    assert {d.subject for d in _differ(result)} == {"armature", "drive", "settings", "contact"}
+    armature = [d for d in _differ(result) if d.subject == "armature"]
+    # Figures of the compiled model: M_ii at qpos0 has the armature in it.
+    raw = load("so101").raw
+    whole = {raw.joint(i).name: raw.dof_M0[i] for i in range(6)}
+    assert len(armature) == 6
+    for each in armature:
+        assert each.two == 0.028
+        assert each.share == pytest.approx(0.028 / whole[each.where], rel=1e-9)
+    assert armature[0].where == "gripper"  # the lightest: it weighs most
+    assert result.found.posed.distance < 1e-12
+    assert result.found.mass[0] == pytest.approx(float(raw.body_mass.sum()), rel=1e-15)
+
+
+@pytest.mark.parametrize("digits", [9, 6])
+def test_rounded_figures_are_equal_and_the_largest_is_stated(tmp_path: Path, digits: int) -> None:
+    text = (models_dir() / "so101" / "so101.urdf").read_text()
+    rounded = re.sub(r"-?\d+\.\d+(e-?\d+)?", lambda hit: f"{float(hit[0]):.{digits}g}", text)
+    assert rounded != text
+    (tmp_path / "rounded.urdf").write_text(rounded)
+    result = compare(tmp_path / "rounded.urdf", models_dir() / "so101" / "so101.urdf")
+    assert result.equal, _differ(result)
+    worst = min(each.digits for each in result.found.agreements)
+    assert digits - 2 <= worst <= digits + 1
+    assert max(each.worst for each in result.found.agreements) > 0
+    strict = compare(
+        tmp_path / "rounded.urdf", models_dir() / "so101" / "so101.urdf", digits=digits + 3
+    )
+    assert not strict.equal
+
+
+def test_digits() -> None:
+    assert digits_of(0.0) == 17
+    assert digits_of(abs(2.74385 - 2.7438473) / 2.7438473) == 6
+    assert digits_of(abs(1.234567 - 1.234569) / 1.2345) == 6
+    assert digits_of(1.0) == 0
+
+
+_ENTRIES = st.floats(-0.3, 0.3)
+_LINK = st.tuples(
+    st.floats(0.01, 2.0),
+    st.lists(_ENTRIES, min_size=12, max_size=12),
+    st.lists(st.floats(1e-4, 1e-2), min_size=3, max_size=3),
+)
+
+
+@settings(max_examples=40, deadline=None)
+@given(links=st.lists(_LINK, min_size=1, max_size=4), random=st.randoms(use_true_random=False))
+def test_fixed_links_weigh_what_mujoco_makes_of_them(
+    links: Any, random: Any, tmp_path_factory: Any
+) -> None:
+    """However a rigid part is cut: MuJoCo fuses fixed links when it imports a URDF."""
+    texts = ['<robot name="r"><link name="root"/>']
+    for k, (mass, figures, moments) in enumerate(links):
+        x, y, z = moments  # of masses on the axes: such moments are those of a solid
+        at, turn, com, spin = (" ".join(map(repr, figures[i : i + 3])) for i in range(0, 12, 3))
+        on = "root" if not k else f"l{random.randrange(k)}"
+        kind = "fixed" if k else "continuous"
+        texts.append(
+            f'<link name="l{k}"><inertial><origin xyz="{com}" rpy="{spin}"/>'
+            f'<mass value="{mass!r}"/><inertia ixx="{y + z!r}" iyy="{x + z!r}" izz="{x + y!r}" '
+            'ixy="0" ixz="0" iyz="0"/></inertial></link>'
+            f'<joint name="j{k}" type="{kind}"><origin xyz="{at}" rpy="{turn}"/>'
+            f'<parent link="{on}"/><child link="l{k}"/><axis xyz="0 1 0"/></joint>'
+        )
+    path = tmp_path_factory.mktemp("urdf") / "r.urdf"
+    path.write_text("".join(texts) + "</robot>")
+    ours, theirs = (
+        Tree(read(path)).groups[1].inertial,
+        Tree(read(path, "mujoco")).groups[1].inertial,
+    )
+    assert ours.mass == pytest.approx(theirs.mass, rel=1e-12)
+    assert np.allclose(ours.com, theirs.com, atol=1e-12)
+    assert np.allclose(ours.tensor, theirs.tensor, atol=1e-12)
+    assert compare(path, path, engines=(None, "mujoco")).equal
+
+
+def test_poses_of_a_urdf_are_the_witnesses(pair: Pair, pinocchio: None) -> None:
+    one, _ = pair({"upper_axis": "0.6 0 0.8", "fore_axis": "0 0.28 0.96"})
+    tree, witness = Tree(read(one)), Kinematics(one)
+    for qpos in np.random.default_rng(0).uniform(-1, 1, (20, 3)):
+        poses = tree.poses(dict(zip(witness.joint_names, qpos, strict=True)))
+        number, place = tree.frames["gripper_frame_link"]
+        tip = poses[number] @ place
+        theirs = witness.pose(qpos, "gripper_frame_link", "body")
+        assert np.linalg.norm(tip.pos - theirs.pos) < 1e-14
+        assert angle_between(tip.mat, theirs.mat) < 1e-14
+
+
+def test_references_of_joints_and_several_on_one_body(tmp_path: Path) -> None:
+    """MuJoCo's own positions are the witness: joints at zero are not its default pose."""
+    text = """<mujoco><compiler angle="radian"/><worldbody>
+      <body name="a" pos="0.1 0 0" euler="0 0 1">
+      <joint name="x" axis="1 0 0" ref="0.4" pos="0 0.1 0"/>
+      <joint name="s" type="slide" axis="0 1 0" ref="0.02"/>
+      <joint name="z" axis="0 0 1" ref="-0.7" pos="0.05 0 0"/><geom size="0.1"/>
+      <site name="tip" pos="0.3 0.2 0.1"/></body></worldbody></mujoco>"""
+    path = tmp_path / "many.xml"
+    path.write_text(text)
+    tree, model = Tree(read(path)), load(path)
+    from statemachine import forward, make_data
+
+    data = make_data(model)
+    for qpos in np.random.default_rng(1).uniform(-1, 1, (10, 3)):
+        data.qpos = qpos
+        forward(model, data)
+        poses = tree.poses(dict(zip(model.joint_names, qpos, strict=True)))
+        number, place = tree.frames["tip"]
+        assert np.linalg.norm((poses[number] @ place).pos - data.site_xpos[0]) < 1e-15
+
+
+def test_other_frames_of_links_are_no_difference_of_the_robot(tmp_path: Path) -> None:
+    """The same solid, with the frame of a link turned and moved: only a note."""
+    body = """<mujoco><worldbody><body name="a"><joint name="j" axis="0 0 1"/>
+      <inertial pos="0.1 0 0" mass="1" diaginertia="0.01 0.02 0.03"/>
+      <body name="b" pos="0.3 0 0"><joint name="k" axis="0 1 0"/>
+      <inertial pos="0 0 0.1" mass="1" diaginertia="0.01 0.02 0.03"/>
+      </body></body></worldbody></mujoco>"""
+    # The frame of `a` is put 0.05 m along x: everything in it moves back by so much.
+    other = body.replace('name="a"', 'name="a" pos="0.05 0 0"').replace(
+        'axis="0 0 1"', 'axis="0 0 1" pos="-0.05 0 0"'
+    )
+    other = other.replace('pos="0.1 0 0"', 'pos="0.05 0 0"').replace(
+        'pos="0.3 0 0"', 'pos="0.25 0 0"'
+    )
+    for name, text in (("one.xml", body), ("two.xml", other)):
+        (tmp_path / name).write_text(text)
+    result = compare(tmp_path / "one.xml", tmp_path / "two.xml")
+    assert result.equal, _differ(result)
+    assert any(
+        "'a' is put elsewhere on the same solid, 50 mm" in note for note in result.found.notes
+    )
+    assert result.found.posed.distance < 1e-15
+
+
+def test_joints_of_other_names(pair: Pair, tmp_path: Path) -> None:
+    one, two = pair()
+    text = one.read_text().replace('"shoulder"', '"1"').replace('"elbow"', '"2"')
+    one.write_text(
+        text.replace('"wrist_roll"', '"3"')
+        .replace('link name="hand"', 'link name="h"')
+        .replace('link="hand"', 'link="h"')
+    )
+    by_place = compare(one, two)
+    assert by_place.equal, _differ(by_place)
+    assert any("joint '1' of A is taken for 'shoulder' of B" in n for n in by_place.found.notes)
+    by_name = compare(
+        one, two, rename={"1": "shoulder", "2": "elbow", "3": "wrist_roll", "h": "hand"}
+    )
+    assert by_name.equal
+    assert not any("is taken for" in note for note in by_name.found.notes)
+    with pytest.raises(UnknownNameError, match="Did you mean 'hand'"):
+        compare(two, one, rename={"hnad": "h"})
+
+
+def test_joints_that_may_be_one_are_suggested(pair: Pair) -> None:
+    one, two = pair({"roll_axis": "0 1 0"})
+    text = one.read_text().replace('"wrist_roll"', '"roll"').replace('"hand"', '"palm"')
+    one.write_text(text)
+    result = compare(one, two)
+    assert any("--rename roll=wrist_roll takes them for one" in note for note in result.found.notes)
+    assert {d.subject for d in _differ(result)} >= {"structure"}
+    (found,) = _differ(compare(one, two, rename={"roll": "wrist_roll"}))
+    assert (found.subject, found.figure) == ("places", "axis")
+    assert found.size == pytest.approx(math.pi / 2)
+
+
+def test_the_order_of_the_two_is_only_an_order(pair: Pair) -> None:
+    one, two = pair({"roll_high": 2.841, "effort": 10.0}, {"armature": 0.028, "kp": 50.0})
+    there, back = _differ(compare(one, two)), _differ(compare(two, one))
+    assert sorted((d.subject, d.where, d.figure, str(d.one), str(d.two)) for d in there) == sorted(
+        (d.subject, d.where, d.figure, str(d.two), str(d.one)) for d in back
+    )
+
+
+def test_parts_of_one_only(tmp_path: Path) -> None:
+    result = compare("so101/scene_box", "so101")
+    said = {(d.subject, d.where): (d.one, d.two) for d in _differ(result)}
+    assert said["shapes", "world"] == ("1 plane", "none")
+    ((_, box),) = [(k, v) for k, v in said.items() if k[0] == "structure"]
+    assert box[1] == "nothing"
+    assert compare("so101", "so101").equal
+
+
+def test_boxes_whose_axes_go_by_other_names(pair: Pair, tmp_path: Path) -> None:
+    one, two = pair()
+    text = two.read_text()
+    turned = text.replace(
+        'size="0.05 0.015 0.01" pos', 'size="0.015 0.05 0.01" euler="0 0 1.5707963267948966" pos'
+    )
+    assert turned != text
+    two.write_text(turned)
+    assert compare(one, two).equal
+
+
+def test_a_capsule_in_three_pieces(tmp_path: Path) -> None:
+    """A URDF has no capsule: a cylinder with a sphere on each end is one."""
+    ends = (
+        '<collision><origin xyz="0 0 {}"/><geometry><sphere radius="0.02"/></geometry></collision>'
+    )
+    (tmp_path / "c.urdf").write_text(
+        '<robot name="r"><link name="a"><collision><geometry><cylinder radius="0.02" length="0.1"/>'
+        f"</geometry></collision>{ends.format('0.05')}{ends.format('-0.05')}</link></robot>"
+    )
+    (tmp_path / "c.xml").write_text(
+        '<mujoco><worldbody><body name="a"><geom type="capsule" size="0.02 0.05" mass="0"/>'
+        "</body></worldbody></mujoco>"
+    )
+    result = compare(tmp_path / "c.urdf", tmp_path / "c.xml")
+    assert result.equal, _differ(result)
+
+
+def _stl(path: Path, edge: float) -> None:
+    """A cube about the origin, in ASCII."""
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * edge / 2
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    lines = ["solid cube"]
+    for a, b, c, d in faces:
+        for triangle in ((a, b, c), (a, c, d)):
+            points = "".join(f"vertex {' '.join(map(str, corners[i]))}\n" for i in triangle)
+            lines.append(f"facet normal 0 0 0\nouter loop\n{points}endloop\nendfacet")
+    path.write_text("\n".join([*lines, "endsolid cube"]))
+
+
+def test_meshes_are_measured_and_missing_ones_are_said(tmp_path: Path) -> None:
+    text = (
+        '<robot name="r"><link name="a"><collision><geometry>'
+        '<mesh filename="package://any/meshes/{}.stl" scale="0.001 0.001 0.001"/>'
+        "</geometry></collision></link></robot>"
+    )
+    (tmp_path / "meshes").mkdir()
+    _stl(tmp_path / "meshes" / "cube.stl", 100.0)
+    _stl(tmp_path / "meshes" / "big.stl", 110.0)
+    for name in ("cube", "big", "gone"):
+        (tmp_path / f"{name}.urdf").write_text(text.format(name))
+    found = {d.figure: d for d in _differ(compare(tmp_path / "cube.urdf", tmp_path / "big.urdf"))}
+    assert found["volume"].one == pytest.approx(1e-3)
+    assert found["volume"].two == pytest.approx(1.331e-3)
+    assert found["ends at +x"].size == pytest.approx(0.005)
+    assert compare(tmp_path / "cube.urdf", tmp_path / "cube.urdf").equal
+    gone = compare(tmp_path / "cube.urdf", tmp_path / "gone.urdf")
+    assert any("gone.stl' of link 'a' is not there" in note for note in gone.two.notes)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            '<!DOCTYPE r [<!ENTITY a "aa"><!ENTITY b "&a;&a;">]><robot name="r">&b;</robot>',
+            "DOCTYPE",
+        ),
+        ("<robot", "no XML"),
+        ("<mujoco/>", "no URDF"),
+        ('<robot name="r"/>', "no <link>"),
+        ('<robot name="r"><link name="a"/><link name="b"/></robot>', "2 links hang on nothing"),
+        ('<robot name="r"><link name="a"/><link name="a"/></robot>', "two links are called 'a'"),
+        ('<robot name="r"><link/></robot>', "a <link> has no name"),
+        (
+            '<robot name="r"><link name="a"/><link name="b"/><link name="c"/>'
+            '<joint name="j" type="fixed"><parent link="b"/><child link="c"/></joint>'
+            '<joint name="k" type="fixed"><parent link="c"/><child link="b"/></joint></robot>',
+            "in a circle, 'b'",
+        ),
+        (
+            '<robot name="r"><link name="a"/><joint name="j" type="fixed"><parent link="a"/>'
+            '<child link="z"/></joint></robot>',
+            "'z', which is no link",
+        ),
+        (
+            '<robot name="r"><link name="a"><inertial><mass value="nan"/></inertial></link>'
+            "</robot>",
+            "not finite",
+        ),
+        (
+            '<robot name="r"><link name="a"><inertial><mass value="-1"/></inertial></link></robot>',
+            "a mass of -1.0 kg",
+        ),
+        (
+            '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="revolute">'
+            '<parent link="a"/><child link="b"/></joint></robot>',
+            "has no <limit>",
+        ),
+        (
+            '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="hinge">'
+            '<parent link="a"/><child link="b"/></joint></robot>',
+            "of type 'hinge'",
+        ),
+        (
+            '<robot name="r"><link name="a"><collision><origin xyz="1 2"/><geometry>'
+            '<sphere radius="1"/></geometry></collision></link></robot>',
+            "should be 3 numbers",
+        ),
+        (
+            '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+            '<xacro:include filename="x"/><link name="a"/></robot>',
+            "xacro",
+        ),
+    ],
+)
+def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "bad.urdf"
+    path.write_text(text)
+    with pytest.raises(ModelError, match=re.escape(said)) as caught:
+        read(path)
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith("bad.urdf: ")
+
+
+def test_an_mjcf_goes_on_without_its_meshes(pair: Pair) -> None:
+    one, two = pair()
+    mesh = '<asset><mesh name="gone" file="gone.stl"/></asset><worldbody>'
+    text = two.read_text().replace("<worldbody>", mesh)
+    text = text.replace('<geom name="ball"', '<geom type="mesh" mesh="gone"/><geom name="ball"')
+    two.write_text(text)
+    result = compare(one, two)
+    (found,) = _differ(result)
+    assert (found.where, found.one, found.two) == ("hand", "1 sphere", "1 mesh, 1 sphere")
+    assert any("gone.stl are not there" in note for note in result.two.notes)
+    two.write_text(text.replace("<worldbody>", "<worldbody><nonsense/>"))
+    with pytest.raises(ModelError, match="nonsense"):
+        compare(one, two)
+
+
+def test_deep_and_large_files_end_soon(tmp_path: Path) -> None:
+    links = "".join(f'<link name="l{k}"/>' for k in range(1500))
+    joints = "".join(
+        f'<joint name="j{k}" type="continuous"><parent link="l{k}"/>'
+        f'<child link="l{k + 1}"/></joint>'
+        for k in range(1499)
+    )
+    path = tmp_path / "long.urdf"
+    nested = "<x>" * 100_000 + "</x>" * 100_000
+    path.write_text(f'<robot name="r">{links}{joints}{nested}</robot>')
+    assert len(Tree(read(path)).groups) == 1500
+    many = "".join(f'<link name="l{k}"/>' for k in range(3000))
+    path.write_text(f'<robot name="r">{many}</robot>')
+    with pytest.raises(ModelError, match="3,000 links"):
+        read(path)
+
+
+def test_what_the_engines_make_of_a_urdf() -> None:
+    need_engine("pybullet")
+    path = models_dir() / "so101" / "so101.urdf"
+    found = _differ(compare(path, path, engines=("mujoco", "pybullet")))
+    said = {(d.subject, d.figure): (d.one, d.two) for d in found}
+    assert said["structure", "base"] == ("stands", "floats")
+    assert said["settings", "gravity"] == ((0.0, 0.0, -9.81), (0.0, 0.0, 0.0))
+    assert said["settings", "timestep"] == (0.002, pytest.approx(1 / 240))
+    assert said["contact", "friction"][1] == (0.5, 0.0, 0.0)
+    # Without URDF_USE_INERTIA_FROM_FILE inertias come from the shapes; masses do not.
+    assert any(d.subject == "inertia" for d in found)
+    assert not any(d.subject == "mass" for d in found)
+    # What each of them does of itself was asked of it.
+    assert len([d for d in found if d.subject == "engine"]) == 3
+    result = compare(path, path, engines=(None, "pybullet"))
+    assert result.found.posed.distance < 1e-12
+    assert {d.subject for d in _differ(result)} >= {"inertia", "contact", "settings"}
+
+
+def test_what_an_import_drops() -> None:
+    """MuJoCo's import of a URDF: no speed, no names of fixed links, no mass of the root."""
+    path = models_dir() / "so101" / "so101.urdf"
+    result = compare(path, path, engines=(None, "mujoco"))
+    assert result.equal, _differ(result)
+    assert {d.subject for d in result.found.differences} == {"speed"}
+    notes = " ".join(result.found.notes)
+    assert "B gives its base no mass" in notes
+    assert "only A has the frames camera_mount, baseframe, gripperframe" in notes.replace(
+        "camera_mount, gripperframe, baseframe", "camera_mount, baseframe, gripperframe"
+    )
+
+
+def test_split() -> None:
+    assert split("so101@pybullet") == ("so101", "pybullet")
+    assert split("a@b/so101.xml") == ("a@b/so101.xml", None)
+    assert split("so101") == ("so101", None)
+
+
+def test_the_command(cli: Cli, tmp_path: Path) -> None:
+    same = cli("compare", "--models", "so101", "so101")
+    assert same.returncode == 0, same.stderr
+    assert "nothing differs that matters, to 6 digits" in same.stdout
+    assert max(map(cell_len, same.stdout.splitlines())) <= 80
+    everything = cli("compare", "--models", "so101", "so101/scene_box", "--all")
+    assert everything.returncode == 1
+    (tmp_path / "bad.urdf").write_text("<robot")
+    for arguments, text in (
+        (("--models", "so101", "bad.urdf"), "bad.urdf: it is no XML"),
+        (("--models", "so101", "so102"), "no model named 'so102'"),
+        (("--models", "so101"), "--models wants two models, or one and --backends A B; got 1"),
+        (("--models", "so101", "so101", "so101"), "got 3"),
+        (("--models", "so101", "--backends", "mujoco", "bulet"), "no backend named 'bulet'"),
+        (("--models", "so101@mujoco", "so101", "--backends", "mujoco", "mujoco"), "say the same"),
+        (("--models", "so101", "so101", "--frame", "gripperframe"), "--frame wants A=B"),
+        (("--models", "so101", "so101", "--frame", "x=y"), "no frame in so101/so101.xml named 'x'"),
+        (("--models", "so101", "so101", "--digits", "0"), "--digits wants a number from 1 to 17"),
+        (("hold", "--models", "so101", "so101"), "hold is a run"),
+        (("--models", "so101", "so101", "--seconds", "1"), "--seconds is of a run"),
+        (("hold", "--all"), "--all goes with --models"),
+    ):
+        done = cli("compare", *arguments)
+        assert done.returncode == 2, (arguments, done.stderr)
+        assert text in done.stderr
+        assert len(done.stderr.splitlines()) == 1
+        assert done.stdout == ""
+
+
+def test_the_page_names_every_subject(pair: Pair) -> None:
+    one, two = pair({"roll_high": 2.841}, {"armature": 0.028})
+    page = model_diff.page(compare(one, two))
+    titles = [getattr(block, "title", "") for block in page.blocks]
+    assert titles.index(SUBJECTS["armature"]) < titles.index(SUBJECTS["limits"])
+    assert not page.holds
+    json.loads(dumps(compare(one, two)))
+
+
+def test_frames_that_were_given(pair: Pair) -> None:
+    one, two = pair({"tool_pos": "0.08 0 0.01"})
+    two.write_text(two.read_text().replace("gripperframe", "tcp"))
+    assert compare(one, two).equal  # nobody said that they are one
+    (found,) = _differ(compare(one, two, frames={"gripper_frame_link": "tcp"}))
+    assert found.size == pytest.approx(0.01)
+
+
+def test_an_engine_that_nothing_reads() -> None:
+    with pytest.raises(UnknownNameError, match="no backend named 'newton'"):
+        read("so101", "newton")
+
+
+PENDULUM = """<mujoco><compiler angle="radian" autolimits="true"/><option {option}/><worldbody>
+  <body name="a"><joint name="j" type="{kind}" axis="0 1 0" {joint}/>
+  <inertial pos="0.5 0 0" mass="2" diaginertia="{inertia}"/>
+  <geom name="g" size="0.1" mass="0" {geom}/></body></worldbody>
+  <actuator><{drive} joint="j" {gains}/></actuator></mujoco>"""
+PLAIN = {
+    "option": "",
+    "kind": "hinge",
+    "joint": "",
+    "inertia": "0.1 0.1 0.1",
+    "geom": "",
+    "drive": "position",
+    "gains": 'kp="50" kv="1"',
+}
+
+
+def _pendula(folder: Path, **changes: str) -> list[Difference]:
+    for name, each in (("one", {}), ("two", changes)):
+        (folder / f"{name}.xml").write_text(PENDULUM.format(**{**PLAIN, **each}))
+    return _differ(compare(folder / "one.xml", folder / "two.xml"))
+
+
+@pytest.mark.parametrize(
+    ("change", "subject", "figure", "one", "two", "size"),
+    [
+        ({"option": 'timestep="0.004"'}, "settings", "timestep", 0.002, 0.004, 0.002),
+        ({"option": 'cone="elliptic"'}, "settings", "cone", "pyramidal", "elliptic", None),
+        ({"option": 'gravity="0 0 -1"'}, "settings", "gravity", (0, 0, -9.81), (0, 0, -1), 8.81),
+        ({"joint": 'armature="0.02"'}, "armature", "", 0, 0.02, 0.02),
+        ({"joint": 'stiffness="3"'}, "spring", "stiffness", 0, 3, 3),
+        ({"joint": 'range="-1 1"'}, "limits", "range", "none", (-1, 1), None),
+        ({"geom": 'friction="0.5"'}, "contact", "friction", (1, 0.005, 0.0001), None, 0.5),
+        ({"geom": 'condim="6"'}, "contact", "condim", (3,), (6,), 3),
+        ({"gains": 'kp="60" kv="1"'}, "drive", "kp", 50, 60, 10),
+        ({"gains": 'kp="50" kv="3"'}, "drive", "kv", 1, 3, 2),
+        ({"gains": 'kp="50" kv="1" ctrlrange="-1 1"'}, "drive", "ctrlrange", "none", (-1, 1), None),
+        ({"drive": "motor", "gains": ""}, "drive", "drive", "position", "motor", None),
+        ({"kind": "slide"}, "places", "kind", "hinge", "slide", None),
+    ],
+)
+def test_each_difference_between_two_mjcf(
+    tmp_path: Path,
+    change: dict[str, str],
+    subject: str,
+    figure: str,
+    one: object,
+    two: object,
+    size: float | None,
+) -> None:
+    (found,) = _pendula(tmp_path, **change)
+    assert (found.subject, found.figure) == (subject, figure)
+    assert found.one == pytest.approx(one) if not isinstance(one, str) else found.one == one
+    if two is not None:
+        assert found.two == pytest.approx(two) if not isinstance(two, str) else found.two == two
+    assert found.size == (None if size is None else pytest.approx(size))
+
+
+def test_what_a_difference_does_is_a_closed_form(tmp_path: Path) -> None:
+    """A mass of 2 kg at 0.5 m, 0.1 kg m² about itself: M = 0.6 kg m², load 9.81 N·m."""
+    (found,) = _pendula(tmp_path, joint='armature="0.4"')
+    assert found.share == pytest.approx(0.4 / 1.0)
+    assert found.effect == "40.0% of M_ii"
+    (found,) = _pendula(tmp_path, joint='damping="3"')
+    assert found.effect == "never / 200 ms"
+    (found,) = _pendula(tmp_path, gains='kp="100" kv="1"')
+    sags = [math.degrees(9.81 / kp) for kp in (50, 100)]
+    assert found.effect == f"sags {sags[0]:.2g}° / sags {sags[1]:.2g}°"
+    (found,) = _pendula(tmp_path, gains='kp="50" kv="5"')
+    ratios = [kv / (2 * math.sqrt(50 * 0.6)) for kv in (1, 5)]
+    assert found.effect == f"damping ratio {ratios[0]:.2g} / damping ratio {ratios[1]:.2g}"
+    (found,) = _pendula(tmp_path, inertia="0.1 0.16 0.1")  # about the axis of the joint
+    assert found.share == pytest.approx(0.06 / 0.66)
+    assert found.effect == "9.09% of M_ii"
+    (found,) = _pendula(tmp_path, inertia="0.16 0.1 0.1")  # about another: the joint feels nothing
+    assert found.share == pytest.approx(0.0, abs=1e-12)
+
+
+def test_an_effort_of_a_servo_is_what_it_can_exert(tmp_path: Path) -> None:
+    limited = 'kp="50" kv="1" forcerange="-4 4" gear="2"'
+    found = {d.figure: d for d in _pendula(tmp_path, gains=limited)}
+    assert (found[""].one, found[""].two) == ("unlimited", 8.0)
+    assert found["forcerange"].two == (-4.0, 4.0)
+    assert found["gear"].size == 1.0
