@@ -648,6 +648,31 @@ def test_what_never_differs_is_drawn_too(compared: tuple[Trace, Trace, Any]) -> 
     assert "they part" not in _texts(drawn(figure, "svg"))
 
 
+@pytest.mark.parametrize("what", ["compared", "recorded", "alone"])
+def test_nothing_is_cut_off_at_the_edges(compared: tuple[Trace, Trace, Any], what: str) -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.text import Text
+
+    from statemachine.report.plot import _SETTINGS
+    from statemachine.report.plot_draw import draw
+
+    one, two, found = compared
+    if what == "recorded":
+        one = Trace(dataclasses.replace(one.header, recorded=True, defaults="engine"), one.columns)
+    figure = plot_trace(two) if what == "alone" else plot(one, two, found)
+    with matplotlib.rc_context(_SETTINGS):
+        canvas = draw(figure)
+        pen = FigureCanvasAgg(canvas)
+        pen.draw()
+        width, height = canvas.bbox.width, canvas.bbox.height
+        for text in canvas.findobj(Text):
+            if text.get_visible() and text.get_text().strip():
+                box = text.get_window_extent(pen.get_renderer())
+                inside = (-1 <= box.x0 <= box.x1 <= width + 1, -1 <= box.y0 <= box.y1 <= height + 1)
+                assert inside == (True, True), text.get_text()
+
+
 def test_one_trace_alone(compared: tuple[Trace, Trace, Any]) -> None:
     pytest.importorskip("matplotlib")
     _, two, _ = compared

@@ -23,6 +23,7 @@ _WIDTH, _LEFT, _RIGHT, _BETWEEN = 80.0, 9.5, 2.0, 9.5
 _VALUES, _LOWER, _TITLE, _GAP = 11.0, 7.5, 3.6, 1.2
 _ROW = 3.4  # of the touches
 _SMALL, _TINY = 5.6, 5.2
+_SAMPLE, _LETTER = 9.5, 1.25  # of a label: the line before it, and one letter
 _DECADES = 6  # at most, of a difference
 
 
@@ -100,7 +101,7 @@ def _tall(row: Sequence[Panel], times: bool) -> float:
 
 def _legend_rows(figure: Figure) -> list[list[str]]:
     """Labels in one row if there is room, else each in its own."""
-    if sum(len(label) + 8 for label in figure.labels) <= 62:
+    if sum(_SAMPLE + _LETTER * len(label) + 5 for label in figure.labels) <= _WIDTH:
         return [list(figure.labels)]
     return [[label] for label in figure.labels]
 
@@ -120,8 +121,8 @@ def _head(place: _Places, figure: Figure) -> None:
             level = 1 - (y + 1.6) / place.height
             ends = [x / _WIDTH, (x + 8) / _WIDTH]
             place.canvas.add_artist(Line2D(ends, [level, level], **STYLES[number]))
-            place.text(x + 9.5, y + 0.3, label, size=6.5, color=_INK)
-            x += 9.5 + 1.25 * len(label) + 5
+            place.text(x + _SAMPLE, y + 0.3, label, size=6.5, color=_INK)
+            x += _SAMPLE + _LETTER * len(label) + 5
             number += 1
         y += 4.2
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compare import Agreement, Comparison, Series, default_tip, series
+from ..compare.tolerances import COUNT
 from ..records import Array, JointType
 from ..traces import Header, Trace
 from .figures_of import quantity, scale_of, short_time
@@ -28,7 +29,7 @@ class Panel:
         unit: Of the values, as shown.
         curves: One for each side, by its place among the figure's labels.
         apart: The differences, or None.
-        tolerance: Of them.
+        tolerance: Of them; the values' axis spans some of it at least.
         verdict: In a word, or "".
         wide: Whether it has a row of its own.
     """
@@ -125,11 +126,15 @@ def of_trace(trace: Trace) -> Figure:
         if kind in (int(JointType.HINGE), int(JointType.SLIDE))
     ]
     for joint in joints[:MOST]:
-        scale, unit = scale_of("joint" if header.jnt_type[joint] == JointType.HINGE else "slide")
+        hinge = header.jnt_type[joint] == JointType.HINGE
+        scale, unit = scale_of("joint" if hinge else "slide")
+        # What the robot itself would not notice is not blown up to the height of a panel.
+        small = scale * COUNT if hinge else None
         curves = [(0, (time, scale * trace.qpos[:, header.jnt_qposadr[joint]]))]
         if joint in told:
             curves.append((1, (time, scale * trace.ctrl[:, told[joint]])))
-        panels.append(Panel(header.joints[joint] or f"joint {joint}", unit.strip(), curves))
+        title = header.joints[joint] or f"joint {joint}"
+        panels.append(Panel(title, unit.strip(), curves, tolerance=small))
     if "energy" in trace and np.isfinite(trace["energy"]).all():
         panels.append(Panel("energy", "J", [(0, (time, trace["energy"].sum(axis=1)))]))
     notes = ["Dashed: the command."] if told else []
@@ -150,7 +155,7 @@ def of_trace(trace: Trace) -> Figure:
 def _panel(curve: Series, found: Agreement | None, wide: bool = False) -> Panel:
     scale, unit = scale_of(curve.kind)
     values = [(k, (curve.time, scale * side)) for k, side in enumerate(_values(curve))]
-    title = curve.name.removesuffix(", position")
+    title = curve.name.removesuffix(", position").removeprefix(", ")  # a joint without a name
     if curve.kind in ("tip", "body"):
         title += ", from its start"
     verdict = ""
