@@ -439,6 +439,7 @@ def test_what_draws_is_chosen_by_what_works(monkeypatch: pytest.MonkeyPatch) -> 
         (("--film", "a.webp", "--slow", "-1"), "--slow is from"),
         (("--film", "a.webp", "--size", "7x9"), "width of a film is even"),
         (("--film", "a.webp", "--size", "large"), "a size reads like 640x480"),
+        (("--film", "a.webp", "--why"), "go without it"),
     ],
 )
 def test_what_cannot_be_drawn_is_said_before_anything_runs(

@@ -45,6 +45,12 @@ def add(commands: Any) -> None:
         metavar="KIND=VALUE",
         help="another tolerance, such as joint=0.5deg, tip=2mm, energy=0.1J",
     )
+    parser.add_argument(
+        "--why", action="store_true", help="which difference explains how much of the gap"
+    )
+    parser.add_argument(
+        "--quantity", default=None, metavar="NAME", help="of --why: what the gap is measured in"
+    )
     pictures.add(parser)
     _compare_models.add_options(parser)
     add_json(parser)
@@ -95,6 +101,8 @@ def request_of(options: argparse.Namespace) -> Any:
 
 def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
+    if options.models and (options.why or options.quantity):
+        raise BadInputError("--models compares files: --why and --quantity are of an experiment")
     if options.models:
         return _compare_models.run(options)
     _compare_models.refuse_alone(options)
@@ -103,6 +111,18 @@ def run(options: argparse.Namespace) -> int:
             f"compare what? An experiment ({', '.join(EXPERIMENTS)}) or traces: "
             f"{PROGRAM} compare hold"
         )
+    if options.quantity and not options.why:
+        raise BadInputError("--quantity belongs to --why")
+    if options.why:
+        from ._compare_why import run as run_why
+
+        if options.tolerance:
+            raise BadInputError(
+                "--why takes no --tolerance: it explains the gap, whatever its size"
+            )
+        if options.plot or options.film:
+            raise BadInputError("--why runs many times: --plot and --film go without it")
+        return run_why(request_of(options), options.quantity, options.json)
     from ..compare import compare, parse_tolerances, sides_of, witness
     from ..report import compare as report
     from ..report.progress import progress

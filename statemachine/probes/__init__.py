@@ -7,8 +7,9 @@ looking at the emulation. A probe loads the model as the engine's own users do.
 from __future__ import annotations
 
 import importlib
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, cast
+from typing import Any, Protocol, cast
 
 from ..interface import Model
 
@@ -86,3 +87,32 @@ def probe(model: Model) -> Probe | None:
     """What looks at the raw engine of a Model; None where the interface is the engine's own."""
     name = _PROBES.get(model.backend)
     return cast("Probe", importlib.import_module(f".{name}", __name__)) if name else None
+
+
+class Dials(Protocol):
+    """What can be set in an engine's own way or in the model's; see `pybullet_dials`."""
+
+    model: Model
+    emulated: Model
+    with_servo: tuple[str, ...]
+
+    def build(self, dials: Mapping[str, Any], values: Mapping[str, Any]) -> Model:
+        """A Model with some of them turned."""
+        ...
+
+
+_DIALS = {"pybullet": "pybullet_dials"}
+
+
+def dials_of(model: Model, options: Mapping[str, Any]) -> Dials | None:
+    """The dials of a Model of an engine as it comes; None of any other Model."""
+    name = _DIALS.get(model.backend)
+    if not name:
+        return None
+    return cast("Dials | None", importlib.import_module(f".{name}", __name__).dials(model, options))
+
+
+def frictionless(model: Model) -> Model | None:
+    """A Model whose surfaces have no friction, turned in the engine; None if we cannot."""
+    name = _DIALS.get(model.backend)
+    return importlib.import_module(f".{name}", __name__).frictionless(model) if name else None

@@ -27,6 +27,8 @@ _ASCII = str.maketrans(
         "²": "^2",
         "✓": "yes",
         "✗": "NO",
+        "→": "->",
+        "█": "#",
     }
 )
 # What would make a terminal do something instead of showing it (a student's text may hold it).

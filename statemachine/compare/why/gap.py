@@ -1,0 +1,176 @@
+"""How far apart two runs are, in one number for each quantity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import BadInputError, DivergedError
+from ...interface import Model
+from ...records import Array, JointType
+from ...traces import Trace
+from ...verbs import forward, make_data
+
+_SAME = 1e-6  # of a timestep: two moments nearer than this are one
+_FEW = 20  # common moments below which rows are interpolated instead
+
+
+@dataclass(frozen=True)
+class Gap:
+    """How far apart two runs are in one quantity.
+
+    Attributes:
+        unit: Of the distances: "rad" or "m".
+        worst: The largest distance at any moment; at: when [s].
+        rms: Root of the mean square over the moments.
+        end: At the last moment.
+    """
+
+    unit: str
+    worst: float
+    at: float
+    rms: float
+    end: float
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """One run, as the quantities that runs are compared by.
+
+    Attributes:
+        of: By quantity, an array (n, k): for each moment k numbers, in the unit.
+    """
+
+    of: dict[str, Array]
+
+
+class Ruler:
+    """What all runs of one attribution are measured by: the same moments and quantities.
+
+    Attributes:
+        time: (n,) moments since the start [s].
+        between: Whether rows had to be interpolated, for want of common moments.
+        units: Unit of each quantity.
+    """
+
+    def __init__(self, model: Model, one: Trace, two: Trace) -> None:
+        """Of two runs as they come; `model` is what poses are computed with."""
+        if (model.nq, model.joint_names) != (two.header.nq, two.header.joints):
+            raise BadInputError("the two models have other joints: there is nothing to attribute")
+        times = [trace.time - trace.time[0] for trace in (one, two)]
+        slack = _SAME * min(one.header.timestep, two.header.timestep)
+        near = times[1][np.argmin(np.abs(times[1][None] - times[0][:, None]), axis=1)]
+        common = times[0][np.abs(near - times[0]) <= slack + 1e-9]
+        self.between = len(common) < min(_FEW, len(one), len(two))
+        end = min(times[0][-1], times[1][-1])
+        self.time = times[0][times[0] <= end + slack] if self.between else common
+        self._model = model
+        kinds, places = model.jnt_type, model.jnt_qposadr
+        self._hinges = places[kinds == int(JointType.HINGE)]
+        self._slides = places[kinds == int(JointType.SLIDE)]
+        self._free = model.jnt_bodyid[kinds == int(JointType.FREE)]
+        names = list(model.site_names)
+        tips = [names.index("gripperframe")] if "gripperframe" in names else range(len(names))[-1:]
+        self._tip = next(iter(tips), None)
+        self.units = {}
+        if len(self._hinges):
+            self.units["joints"] = "rad"
+        if len(self._slides):
+            self.units["slides"] = "m"
+        if self._tip is not None:
+            self.units[self._tip_name] = "m"
+        for body in self._free:
+            self.units[model.body_names[body]] = "m"
+            if self._tip is not None:
+                self.units[self._in_hand(body)] = "m"
+
+    @property
+    def _tip_name(self) -> str:
+        assert self._tip is not None
+        return self._model.site_names[self._tip] or f"site {self._tip}"
+
+    def _in_hand(self, body: int) -> str:
+        return f"{self._model.body_names[body]} in the hand"
+
+    def curves(self, trace: Trace) -> Curves | None:
+        """A run at the moments of the ruler; None if it ended before the last of them."""
+        time = trace.time - trace.time[0]
+        if trace.header.ended or time[-1] < self.time[-1] - _SAME * trace.header.timestep - 1e-9:
+            return None
+        qpos = _rows(time, trace.qpos, self.time, trace.header.timestep)
+        found: dict[str, Array] = {}
+        if len(self._hinges):
+            found["joints"] = qpos[:, self._hinges]
+        if len(self._slides):
+            found["slides"] = qpos[:, self._slides]
+        if self._tip is None and not len(self._free):
+            return Curves(found)
+        try:
+            found |= self._poses(qpos)
+        except DivergedError:
+            return None
+        return Curves(found)
+
+    def _poses(self, qpos: Array) -> dict[str, Array]:
+        model, tip = self._model, self._tip
+        sites, turns, bodies = [], [], []
+        with make_data(model) as data:
+            for row in qpos:
+                data.qpos = row
+                forward(model, data)
+                bodies.append(data.xpos[self._free].copy())
+                if tip is not None:
+                    sites.append(data.site_xpos[tip].copy())
+                    turns.append(data.site_xmat[tip].reshape(3, 3).copy())
+        where = np.array(bodies)
+        found = {}
+        if tip is not None:
+            found[self._tip_name] = np.array(sites)
+        for k, body in enumerate(self._free):
+            found[model.body_names[body]] = where[:, k]
+            if tip is not None:  # along the axes of the hand
+                apart = where[:, k] - np.array(sites)
+                found[self._in_hand(body)] = np.einsum("nij,ni->nj", np.array(turns), apart)
+        return found
+
+    def held(self, trace: Trace, touching: frozenset[str]) -> str:
+        """The quantity that an experiment is about: what is in the hand, else the joints."""
+        for body in self._free:
+            name = self._in_hand(body)
+            if self._model.body_names[body] in touching and name in self.units:
+                return name
+        return next(iter(self.units))
+
+    def distances(self, quantity: str, one: Curves, two: Curves) -> Array:
+        """(n,) how far apart: the worst joint, or the length of the way between."""
+        apart = one.of[quantity] - two.of[quantity]
+        if quantity in ("joints", "slides"):
+            return np.abs(apart).max(axis=1)
+        return np.sqrt((apart**2).sum(axis=1))
+
+    def gap(self, quantity: str, one: Curves, two: Curves) -> Gap:
+        """In one quantity."""
+        far = self.distances(quantity, one, two)
+        return Gap(
+            unit=self.units[quantity],
+            worst=float(far.max()),
+            at=float(self.time[far.argmax()]),
+            rms=float(np.sqrt((far**2).mean())),
+            end=float(far[-1]),
+        )
+
+    def gaps(self, one: Curves, two: Curves) -> dict[str, Gap]:
+        """In every quantity."""
+        return {name: self.gap(name, one, two) for name in self.units}
+
+
+def _rows(time: Array, values: Array, wanted: Array, timestep: float) -> Array:
+    """Rows at moments: of the run itself where it has them, else between two of them."""
+    near = np.clip(np.searchsorted(time, wanted), 0, len(time) - 1)
+    near -= (near > 0) & (np.abs(time[near - 1] - wanted) < np.abs(time[near] - wanted))
+    found = values[near].copy()
+    off = np.flatnonzero(np.abs(time[near] - wanted) > _SAME * timestep + 1e-9)
+    if len(off):
+        found[off] = np.column_stack([np.interp(wanted[off], time, column) for column in values.T])
+    return found

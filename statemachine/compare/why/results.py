@@ -1,0 +1,123 @@
+"""What an attribution found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from ...experiments._common import Provenance
+from .gap import Gap
+
+Way = Literal["parity", "off", "one side", "alike", "none"]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One factor brought to the same, alone or on top of others, and what became of the gap.
+
+    Attributes:
+        factor: Its name.
+        way: "parity": two takes one's setting, or one two's; "off": left out on both;
+            "one side": tried on one alone, since the other has nothing to set; "alike":
+            the same engine with the same setting, nothing to bring; "none": it cannot be.
+        had: What one and two had, in a few words.
+        did: What was done, in a few words.
+        gaps: The gap in each quantity after it; empty if there is none.
+        worst: Of these, that of the attribution's quantity; None if there is none.
+        explains: The part of the first gap that it took away: below zero if it made it wider;
+            None where nothing was run, or in a rung that stands only with the next.
+        moved: How far one's own motion is then from its motion as it comes; above the gap,
+            the experiment has become another.
+        put_back: The gap if all is as at the end of the settings of the ladder, and this
+            factor alone (with what cannot be without it) is as it came; None where nothing
+            was set.
+        note: Why there is no gap, or what else is to be said.
+    """
+
+    factor: str
+    way: Way
+    had: tuple[str, str]
+    did: str
+    gaps: dict[str, Gap]
+    worst: float | None
+    explains: float | None
+    moved: float | None
+    put_back: float | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Touch:
+    """The first contact of the robot, and how far apart the runs were until then.
+
+    Attributes:
+        time: Since the start [s].
+        what: What touched what.
+        before: The gap of the runs as they come, at the moments until then.
+        moments: How many these are.
+    """
+
+    time: float
+    what: str
+    before: float
+    moments: int
+
+
+@dataclass(frozen=True)
+class Attribution:
+    """How much of the gap between two simulations each of their differences explains.
+
+    Attributes:
+        experiment, says, seconds: What was run.
+        one, two: The sides; two is brought to one. names: what they are called for short.
+        quantity: What the gap is measured in; unit: of it.
+        first: The gap in each quantity, as they come.
+        alone: Each factor by itself; empty where the gap is rounding.
+        ladder: All of them, one on top of the other; what is left telescopes to `left`.
+        left: What stays unexplained, in `unit`.
+        negligible: Gaps below this are taken for rounding, in `unit`.
+        extent: How far one moves from where it starts, in `unit`.
+        touch: The first contact of the robot; None without one, or with one from the start.
+        moments: How many moments the runs are compared at; between: whether rows had to be
+            interpolated there.
+        order: How the ladder was ordered, and why.
+        runs: How many runs it took.
+    """
+
+    experiment: str
+    says: str
+    seconds: float
+    one: str
+    two: str
+    names: tuple[str, str]
+    quantity: str
+    unit: str
+    first: dict[str, Gap]
+    alone: tuple[Trial, ...]
+    ladder: tuple[Trial, ...]
+    left: float
+    negligible: float
+    extent: float
+    touch: Touch | None
+    moments: int
+    between: bool
+    order: tuple[str, str]
+    runs: int
+    provenance: tuple[Provenance, Provenance]
+
+    @property
+    def gap(self) -> float:
+        """The gap as they come, in `unit`."""
+        return self.first[self.quantity].worst
+
+    @property
+    def settings_same(self) -> float:
+        """The gap where all settings are the same and nothing is left out."""
+        rungs = [trial for trial in self.ladder if trial.way == "parity"]
+        known = [trial.worst for trial in rungs if trial.worst is not None]
+        return known[-1] if known else self.gap
+
+    @property
+    def unexplained(self) -> float:
+        """The part of it that nothing took away."""
+        return self.left / self.gap if self.gap else 0.0
