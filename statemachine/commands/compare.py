@@ -7,6 +7,7 @@ from typing import Any
 
 from ..errors import BadInputError
 from . import _compare_models
+from . import _compare_pictures as pictures
 from ._common import PROGRAM, add_json, add_menagerie, complain, show
 
 
@@ -50,6 +51,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--quantity", default=None, metavar="NAME", help="of --why: what the gap is measured in"
     )
+    pictures.add(parser)
     _compare_models.add_options(parser)
     add_json(parser)
     parser.set_defaults(run=run)
@@ -118,6 +120,8 @@ def run(options: argparse.Namespace) -> int:
             raise BadInputError(
                 "--why takes no --tolerance: it explains the gap, whatever its size"
             )
+        if options.plot or options.film:
+            raise BadInputError("--why runs many times: --plot and --film go without it")
         return run_why(request_of(options), options.quantity, options.json)
     from ..compare import compare, parse_tolerances, sides_of, witness
     from ..report import compare as report
@@ -125,6 +129,7 @@ def run(options: argparse.Namespace) -> int:
 
     tolerances = parse_tolerances(options.tolerance)
     request = request_of(options)
+    wanted = pictures.checked(options)
     with progress("compare") as told:
         (one, two), said = sides_of(request, told)
     found = compare(one, two, tolerances=tolerances)
@@ -133,4 +138,6 @@ def run(options: argparse.Namespace) -> int:
             complain(line, 0)
     asked = witness(one, two)
     page = report.page(found, one.header.says, said, asked)
-    return show(page, {"comparison": found, "witness": asked}, options.json)
+    code = show(page, {"comparison": found, "witness": asked}, options.json)
+    pictures.write(wanted, options, one, two, found)
+    return code
