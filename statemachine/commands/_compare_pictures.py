@@ -23,6 +23,11 @@ def add(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--film", default=None, metavar="FILE", help="write a film of both sides: .webp or .mp4"
     )
+    add_film(group)
+
+
+def add_film(group: Any) -> None:
+    """How a film is made."""
     group.add_argument(
         "--fps", type=float, default=30.0, metavar="N", help="of the film (default 30)"
     )
@@ -83,14 +88,16 @@ def checked(options: argparse.Namespace) -> Pictures:
     return Pictures(plot, film, options.fps, options.slow, options.size, renderer)
 
 
-def write(pictures: Pictures, options: Any, one: Any, two: Any, comparison: Any) -> None:
+def write(
+    pictures: Pictures, options: Any, one: Any, two: Any = None, comparison: Any = None
+) -> None:
     """Write what was asked for; a line for each file on standard error.
 
     Args:
         pictures: From `checked`.
         options: Their `model` and `menagerie` say what the film shows, if not the traces.
-        one: The traces.
-        two: See one.
+        one: A trace.
+        two: The other one; None for pictures of one trace.
         comparison: Of the two.
     """
     from ..report.progress import progress
@@ -99,12 +106,13 @@ def write(pictures: Pictures, options: Any, one: Any, two: Any, comparison: Any)
         from ..report import plot as plots
 
         with progress("figure"):
-            size = plots.write_plot(plots.plot(one, two, comparison), pictures.plot)
+            figure = plots.plot_trace(one) if two is None else plots.plot(one, two, comparison)
+            size = plots.write_plot(figure, pictures.plot)
         complain(f"{pictures.plot}: a figure, {_bytes(size)}", 0)
     if pictures.film is not None:
         from ..report import film as films
 
-        models = _models(options, one, two)
+        models = _models(options, *(trace for trace in (one, two) if trace is not None))
         with progress("film") as told:
             film = films.write_film(
                 pictures.film,
@@ -135,7 +143,7 @@ def _models(options: Any, *traces: Any) -> Any:
         known = trace.header.provenance
         name = options.model or known.model_file
         try:
-            model = load(name, menagerie=options.menagerie if options.model else None)
+            model = load(name, menagerie=options.menagerie)
         except (ModelFileError, UnknownNameError) as error:
             raise ModelFileError(f"a film needs the model: {error}; name it with --model") from None
         if provenance(model).model_sha256 != known.model_sha256:
