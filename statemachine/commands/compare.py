@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from ..errors import BadInputError
-from . import _compare_models
+from . import _compare_html, _compare_models
 from ._common import PROGRAM, add_json, add_menagerie, complain, show
 
 
@@ -50,6 +50,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--quantity", default=None, metavar="NAME", help="of --why: what the gap is measured in"
     )
+    _compare_html.add_options(parser)
     _compare_models.add_options(parser)
     add_json(parser)
     parser.set_defaults(run=run)
@@ -99,6 +100,7 @@ def request_of(options: argparse.Namespace) -> Any:
 
 def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
+    _compare_html.check(options)
     if options.models:
         return _compare_models.run(options)
     _compare_models.refuse_alone(options)
@@ -107,9 +109,9 @@ def run(options: argparse.Namespace) -> int:
             f"compare what? An experiment ({', '.join(EXPERIMENTS)}) or traces: "
             f"{PROGRAM} compare hold"
         )
-    if options.quantity and not options.why:
+    if options.quantity and not (options.why or options.html):
         raise BadInputError("--quantity belongs to --why")
-    if options.why:
+    if options.why and not options.html:
         from ._compare_why import run as run_why
 
         if options.tolerance:
@@ -130,5 +132,7 @@ def run(options: argparse.Namespace) -> int:
         for line in said:
             complain(line, 0)
     asked = witness(one, two)
+    if options.html:
+        _compare_html.write(options, request, found, (one, two), said, asked)
     page = report.page(found, one.header.says, said, asked)
     return show(page, {"comparison": found, "witness": asked}, options.json)
