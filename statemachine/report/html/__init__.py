@@ -9,7 +9,8 @@ The script, ours and without a library, draws both runs in WebGL and moves the c
 
 from __future__ import annotations
 
-from .page import SUFFIXES, check_target, report, write_report
+from .page import report
 from .scene import Look
+from .writing import SUFFIXES, check_target, write_report
 
 __all__ = ["SUFFIXES", "Look", "check_target", "report", "write_report"]

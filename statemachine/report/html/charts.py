@@ -13,7 +13,6 @@ from ...records import Array, Ints
 from ..figures_of import figure, quantity, scale_of, short_time
 from .markup import Html, joined, tag
 
-_POINTS = 600  # of a curve; more are thinned, extremes kept
 _ROWS = 21  # of the table under a chart
 
 
@@ -26,7 +25,7 @@ class Curve:
     label: str = ""
 
 
-def difference_chart(curve: Series, found: Agreement) -> Html:
+def difference_chart(curve: Series, found: Agreement, points: int = 600) -> Html:
     """How far apart over time, with the tolerance as a band."""
     scale = scale_of(curve.kind)[0]
     top = 1.08 * max(float(curve.difference.max()), found.tolerance) * scale
@@ -42,10 +41,11 @@ def difference_chart(curve: Series, found: Agreement) -> Html:
         (0.0, top),
         said,
         band=found.tolerance * scale,
+        points=points,
     )
 
 
-def values_chart(curve: Series, labels: tuple[str, str]) -> Html | None:
+def values_chart(curve: Series, labels: tuple[str, str], points: int = 600) -> Html | None:
     """Both sides over time; None for a quantity that has no values of its own."""
     if not curve.one.size:
         return None
@@ -70,7 +70,7 @@ def values_chart(curve: Series, labels: tuple[str, str]) -> Html | None:
         f"{ends[1]}{unit} on {labels[1]}."
     )
     floor = low if curve.kind == "force" else low - pad
-    return _plot(curve.time, curves, (floor, high + pad), said)
+    return _plot(curve.time, curves, (floor, high + pad), said, points=points)
 
 
 def data_table(curve: Series, found: Agreement, labels: tuple[str, str]) -> Html:
@@ -121,6 +121,7 @@ def _plot(
     span: tuple[float, float],
     said: str,
     band: float | None = None,
+    points: int = 600,
 ) -> Html:
     """Curves in a box of 1000 × 100 that is stretched to its place; ticks are text beside it."""
     until = float(time[-1]) or 1.0
@@ -138,7 +139,7 @@ def _plot(
         for t in ticks
     ]  # fmt: skip
     marks += [
-        tag("path", d=_path(time / until, curve.y, low, high), class_=f"curve {curve.look}")
+        tag("path", d=_path(time / until, curve.y, low, high, points), class_=f"curve {curve.look}")
         for curve in sorted(curves, key=lambda each: each.look)
     ]
     svg = tag("svg", *marks, viewBox="0 0 1000 100", preserveAspectRatio="none", focusable="false")
@@ -201,20 +202,20 @@ def _up(value: float, low: float, high: float) -> float:
     return 100.0 * (1.0 - (value - low) / (high - low)) if high > low else 50.0
 
 
-def _path(x: Array, y: Array, low: float, high: float) -> str:
-    rows = _thinned(y)
+def _path(x: Array, y: Array, low: float, high: float, most: int) -> str:
+    rows = _thinned(y, most)
     points = [f"{1000 * float(x[k]):.1f} {_up(float(y[k]), low, high):.2f}" for k in rows.tolist()]
     if len(points) == 1:  # a run of one row is a dash
         points.append("1000 " + points[0].split()[1])
     return "M" + "L".join(points)
 
 
-def _thinned(y: Array) -> Ints:
+def _thinned(y: Array, most: int) -> Ints:
     """Rows that show the same curve: of each stretch its lowest and its highest."""
     n = len(y)
-    if n <= _POINTS:
+    if n <= most:
         return np.arange(n)
-    edges = np.linspace(0, n, _POINTS // 2 + 1).astype(int)
+    edges = np.linspace(0, n, most // 2 + 1).astype(int)
     rows = {0, n - 1}
     for start, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         part = y[start:stop]

@@ -14,7 +14,6 @@ from ...drawing import Drawing, Part
 from ...records import Array
 from ...traces import Trace
 
-MOST = 24_000  # triangles of a drawing; 2 MB hold two such drawings and the rest
 _CREASE = np.cos(np.radians(35.0))  # faces that meet at less than this are one round surface
 
 
@@ -36,7 +35,7 @@ class Mesh:
     simplified: int
 
 
-def mesh_of(drawing: Drawing, most: int = MOST) -> Mesh:
+def mesh_of(drawing: Drawing, most: int = 24_000) -> Mesh:
     """All parts of a drawing but endless planes, with at most so many triangles.
 
     Too many triangles are made fewer by snapping points to a grid, as fine as will do.

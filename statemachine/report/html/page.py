@@ -4,25 +4,21 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import os
 import re
 from collections.abc import Sequence
 from importlib import resources
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ... import __version__
 from ...compare import Comparison, Series, Witness, default_tip, series
-from ...errors import BadInputError
 from ...page import Page, Verdict
 from ...traces import Trace
-from ...traces.files import replace_file
-from ..figures_of import scale_of
 from . import sections
-from .charts import data_table, difference_chart, values_chart
-from .finding import headline, in_words, leading, parting
+from .budget import Budget
+from .curves import curves_section
+from .finding import headline, in_words, leading
 from .geometry import packed
 from .markup import Html, data_of, escaped, joined, kept, tag
 from .scene import Look, scene_of
@@ -33,45 +29,9 @@ from .timeline import Frames, events_of, frames_of
 if TYPE_CHECKING:
     from ...compare.why import Attribution
 
-SUFFIXES = (".html", ".htm")
 _SCRIPTS = ("gl.js", "scene.js", "page.js")
+LIMIT = 2_000_000  # bytes of a page
 _NO_LOOK = Look(None, "no model was given")
-
-
-def check_target(path: str | os.PathLike[str]) -> Path:
-    """Where a report is to be written, checked before anything is run.
-
-    Raises:
-        BadInputError: It is no name of a page, or its folder is not there or not to be written.
-    """
-    target = Path(path)
-    if target.suffix.lower() not in SUFFIXES:
-        raise BadInputError(f"a report is a file .html; got {target.name!r}")
-    if target.is_dir():
-        raise BadInputError(f"{target} is a folder; name a file in it")
-    folder = target.parent
-    if not folder.is_dir():
-        raise BadInputError(f"there is no folder {folder} to write {target.name} into")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise BadInputError(f"the folder {folder} cannot be written into")
-    return target
-
-
-def write_report(path: str | os.PathLike[str], text: str) -> Path:
-    """Write a report; it is there whole or not at all.
-
-    Raises:
-        BadInputError: See `check_target`.
-        OSError: It cannot be written.
-    """
-    target = check_target(path)
-    data = text.encode("utf-8", errors="replace")
-
-    def fill(out: BinaryIO) -> None:
-        out.write(data)
-
-    replace_file(target, fill)
-    return target
 
 
 def report(
@@ -102,12 +62,53 @@ def report(
         said: What stood in for a run, line by line.
         command: What makes the page again.
         witness: How far the fingertip is from where a third party puts it, if asked.
+
+    Returns:
+        HTML of at most 2 MB: what would be more is drawn with less detail, which is said.
     """
+    text = ""
+    for share in (1.0, 0.5, 0.25, 0.1):
+        text = _report(
+            comparison,
+            one,
+            two,
+            looks=looks,
+            tip=tip,
+            attribution=attribution,
+            why_not=why_not,
+            models=models,
+            said=said,
+            command=command,
+            witness=witness,
+            budget=Budget(share),
+        )
+        if len(text.encode("utf-8", errors="replace")) <= LIMIT:
+            break
+    return text
+
+
+def _report(
+    comparison: Comparison,
+    one: Trace,
+    two: Trace,
+    *,
+    looks: Sequence[Look],
+    tip: str | None,
+    attribution: Attribution | None,
+    why_not: str,
+    models: Page | None,
+    said: Sequence[str],
+    command: str,
+    witness: Witness | None,
+    budget: Budget,
+) -> str:
+    """The page, with a budget of details."""
     site = default_tip(one.header, two.header) if tip is None else tip
     curves = series(one, two, tip)
+    drawn = [curve for curve in curves if np.isfinite(curve.difference).all()]
     events = events_of(comparison, one, two)
-    frames = frames_of(one, two, _moments(comparison))
-    scene = scene_of(one, two, frames, looks, site)
+    frames = frames_of(one, two, _moments(comparison), budget.frames(one, two))
+    scene = scene_of(one, two, frames, looks, site, budget)
     start = _start(comparison, frames)
     text = headline(comparison, events, attribution)
     labels = comparison.one.label, comparison.two.label
@@ -116,19 +117,17 @@ def report(
     words = in_words(comparison, events, attribution)
     data = {
         "time": packed(frames.time, "f8"),
-        "compared": packed(curves[0].time[frames.compared], "f8"),
+        "compared": packed(drawn[0].time[frames.compared], "f8"),
         "until": comparison.until,
         "start": start,
-        "labels": list(labels),
-        "parting": parting(comparison),
-        "quantities": [quantity_data(c, comparison, frames) for c in curves],
-        "lead": _lead(comparison, curves),
+        "quantities": [quantity_data(c, comparison, frames) for c in drawn],
+        "lead": _lead(comparison, drawn),
         "scene": scene.data,
     }
     still = sketch(scene, one, two, frames, start, labels)
     parts: list[object] = [
         _head(comparison, one, labels, text, words),
-        stage(comparison, curves, events, frames, start, labels, still),
+        stage(comparison, drawn, events, frames, start, labels, still),
     ]
     if attribution is not None:
         parts.append(_section("why", "What causes it", sections.attribution_section(attribution)))
@@ -138,7 +137,7 @@ def report(
         _section(
             "curves",
             "How far apart, over time",
-            _curves(comparison, curves, labels),
+            curves_section(comparison, drawn, labels, budget.points(len(drawn))),
         ),
         _section(
             "figures",
@@ -224,52 +223,6 @@ def _head(
         tag("p", f"{says} " if says else "", kept(shown), class_="says"),
         *(tag("p", kept(line)) for line in words),
     )  # fmt: skip
-
-
-def _curves(comparison: Comparison, curves: Sequence[Series], labels: tuple[str, str]) -> Html:
-    """A row of charts for each quantity, those that differ first."""
-    by_name = {found.name: found for found in comparison.agreements}
-    shown: dict[str, list[tuple[float, Html]]] = {"differs": [], "settles": [], "agrees": []}
-    for curve in curves:
-        found = by_name[curve.name]
-        chart = values_chart(curve, labels)
-        unit = scale_of(curve.kind)[1].strip()
-        row = tag(
-            "section",
-            tag("h3", tag("span", curve.name, class_="quantity"),
-                sections.verdict_badge(found.verdict)),
-            tag(
-                "div",
-                tag("figure", tag("figcaption", f"how far apart, {unit}; shaded: within tolerance"),
-                    difference_chart(curve, found)),
-                tag("figure", tag("figcaption", f"both sides, {unit}"), chart) if chart else None,
-                class_="charts",
-            ),
-            tag("details", tag("summary", f"The figures of {curve.name}"),
-                data_table(curve, found, labels), class_="data"),
-            class_="quantity-row",
-        )  # fmt: skip
-        shown[found.verdict].append((-found.max / found.tolerance, row))
-    beyond = [row for v in ("differs", "settles") for _, row in sorted(shown[v], key=_first)]
-    within = [row for _, row in sorted(shown["agrees"], key=_first)]
-    key = tag(
-        "p",
-        tag("i", class_="key one"), f" {labels[0]}, full line ",
-        tag("i", class_="key two"), f" {labels[1]}, broken line ",
-        class_="legend",
-    )  # fmt: skip
-    if not beyond:
-        return joined((key, *within))
-    more = tag("details", tag("summary", _agreeing(len(within))), *within) if within else None
-    return joined([part for part in (key, *beyond, more) if part is not None])
-
-
-def _first(pair: tuple[float, Html]) -> float:
-    return pair[0]
-
-
-def _agreeing(count: int) -> str:
-    return f"The {count} that agree" if count > 1 else "The one that agrees"
 
 
 def _models(page: Page) -> Html:

@@ -11,13 +11,13 @@ import numpy as np
 from ...drawing import Drawing
 from ...records import Array
 from ...traces import Trace
-from .geometry import MOST, bones_of, mesh_as_data, mesh_of, packed, quantised
+from .budget import Budget
+from .geometry import bones_of, mesh_as_data, mesh_of, packed, quantised
 from .timeline import Frames
 
 _FAR = 8.0  # extents of the model beyond which nothing is drawn
 OPENING = 0.6  # of the camera from top to bottom [rad]
 ASPECT = 1.45  # width of the picture through its height
-_CONTACTS = 48  # of one side at one moment
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,9 @@ class Scene:
     camera: tuple[Array, float, float, float] | None = None
 
 
-def scene_of(one: Trace, two: Trace, frames: Frames, looks: Sequence[Look], tip: str = "") -> Scene:
+def scene_of(
+    one: Trace, two: Trace, frames: Frames, looks: Sequence[Look], tip: str, budget: Budget
+) -> Scene:
     """Both runs at the moments that are shown.
 
     Args:
@@ -61,13 +63,14 @@ def scene_of(one: Trace, two: Trace, frames: Frames, looks: Sequence[Look], tip:
         frames: The moments.
         looks: What each side is drawn as; the same object twice if both are of one model.
         tip: The site whose way is drawn; "" for none.
+        budget: How much detail there may be.
     """
     traces = (one, two)
     if any("xpos" not in t or "xquat" not in t for t in traces):
         return Scene(None, ("The traces tell no poses of the bodies: there is nothing to draw.",))
     notes, drawings = _drawings(traces, looks)
     shared = drawings[0] is drawings[1]
-    most = MOST if shared else MOST // 2
+    most = budget.triangles // (1 if shared else 2)
     meshes = [mesh_of(drawing, most) for drawing in drawings[: 1 if shared else 2]]
     for mesh in meshes:
         if mesh.simplified:
@@ -94,6 +97,7 @@ def scene_of(one: Trace, two: Trace, frames: Frames, looks: Sequence[Look], tip:
     tips = _tips(one, two, frames, tip)
     camera = _camera([pos for pos, _ in poses], tips, extent)
     sides = []
+    few = max(2, budget.contacts // len(frames))
     for k, (trace, (pos, quat)) in enumerate(zip(traces, poses, strict=True)):
         rows = frames.one if k == 0 else frames.two
         sides.append(
@@ -103,9 +107,13 @@ def scene_of(one: Trace, two: Trace, frames: Frames, looks: Sequence[Look], tip:
                 "pos": packed(quantised(_held(pos), low, span), "u2"),
                 "quat": packed(np.round(np.clip(quat, -1, 1) * 32767), "i2"),
                 "tip": packed(tips[k], "f4") if tips else "",
-                "contacts": _contacts(trace, rows),
+                "contacts": _contacts(trace, rows, few),
             }
         )
+    if any(_most_at_once(trace) > few for trace in traces):
+        notes.append(f"Of the contacts of a moment the {few} strongest are drawn.")
+    if any("contact_row" in trace and len(trace["contact_row"]) for trace in traces):
+        notes.append("The arrow of a contact grows with the square root of its force.")
     target, distance, azimuth, elevation = camera
     data = {
         "moving": [int(_moves(one, two, body)) for body in range(len(two.header.bodies))],
@@ -189,19 +197,31 @@ def _tips(one: Trace, two: Trace, frames: Frames, tip: str) -> tuple[Array, Arra
     return ways if all(np.isfinite(way).all() for way in ways) else None
 
 
-def _contacts(trace: Trace, rows: Any) -> dict[str, str]:
-    """Where contacts are at each moment, and the force on the second of the two [N]."""
+def _contacts(trace: Trace, rows: Any, most: int) -> dict[str, str]:
+    """Where contacts are at each moment, the strongest first, and the force on the second [N]."""
     if "contact_row" not in trace:
         return {"count": "", "at": ""}
     start = np.searchsorted(trace["contact_row"], rows)
-    end = np.minimum(np.searchsorted(trace["contact_row"], rows, side="right"), start + _CONTACTS)
-    picked = np.concatenate([np.arange(a, b) for a, b in zip(start, end, strict=True)])
-    picked = picked.astype(np.int64)
+    end = np.searchsorted(trace["contact_row"], rows, side="right")
+    strength = np.linalg.norm(np.nan_to_num(trace["contact_force"]), axis=1)
+    picked, counts = [np.empty(0, np.int64)], []
+    for a, b in zip(start.tolist(), end.tolist(), strict=True):
+        strongest = a + np.argsort(-strength[a:b], kind="stable")[: min(most, 255)]
+        picked.append(strongest)
+        counts.append(len(strongest))
+    chosen = np.concatenate(picked)
     # Rows of a contact frame are its axes; the force on the second geom is along them.
-    axes = trace["contact_frame"][picked].reshape(-1, 3, 3)
-    force = np.einsum("cij,ci->cj", axes, trace["contact_force"][picked])
-    where = np.nan_to_num(np.hstack([trace["contact_pos"][picked], force]))
-    return {"count": packed(end - start, "u1"), "at": packed(where, "f4")}
+    axes = trace["contact_frame"][chosen].reshape(-1, 3, 3)
+    force = np.einsum("cij,ci->cj", axes, trace["contact_force"][chosen])
+    where = np.nan_to_num(np.hstack([trace["contact_pos"][chosen], force]))
+    return {"count": packed(counts, "u1"), "at": packed(where, "f4")}
+
+
+def _most_at_once(trace: Trace) -> int:
+    """How many contacts there are at one moment, at most."""
+    if "contact_row" not in trace or not len(trace["contact_row"]):
+        return 0
+    return int(np.bincount(trace["contact_row"]).max())
 
 
 def _moves(one: Trace, two: Trace, body: int) -> bool:

@@ -12,7 +12,6 @@ from ...compare.align import common_moments
 from ...records import Array, Ints
 from ...traces import Trace
 
-_MOST = 1200  # moments that the page can show
 _SMOOTH = 1 / 60  # seconds between two pictures that look like motion
 
 
@@ -41,13 +40,14 @@ class Frames:
         return len(self.time)
 
 
-def frames_of(one: Trace, two: Trace, must: tuple[float, ...] = ()) -> Frames:
+def frames_of(one: Trace, two: Trace, must: tuple[float, ...] = (), most: int = 1200) -> Frames:
     """Moments to be shown: those that were compared, unless they are too few to look like motion.
 
     Args:
         one: A trace.
         two: The other.
         must: Moments that have to be among them [s].
+        most: How many others there may be.
     """
     common = common_moments(one, two)
     n = len(common.time)
@@ -59,7 +59,7 @@ def frames_of(one: Trace, two: Trace, must: tuple[float, ...] = ()) -> Frames:
         elapsed = one.time - one.time[0]
         rows = np.flatnonzero(elapsed <= common.time[-1] + 1e-9)
         time = elapsed[rows]
-    keep = np.arange(0, len(time), -(-len(time) // _MOST))
+    keep = np.arange(0, len(time), -(-len(time) // most))
     wanted = np.searchsorted(time, np.array(must) - 1e-9) if must else np.empty(0, int)
     keep = np.union1d(keep, np.append(np.clip(wanted, 0, len(time) - 1), len(time) - 1))
     rows, time = rows[keep], time[keep]
