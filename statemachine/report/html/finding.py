@@ -28,6 +28,9 @@ def headline(
     if subject is None:
         return "The two runs differ"
     parts = [_apart(subject)]
+    names = comparison.one.backend, comparison.two.backend
+    if names[0] != names[1]:
+        parts[0] += f" on {names[0]} and {names[1]}"
     at = parting(comparison)
     if at is not None:
         clause = f"the runs part at {short_time(at)}" if at > 0 else "the runs part from the start"
@@ -142,10 +145,12 @@ def _left(attribution: Attribution) -> str:
     if len(counted) != 1:
         return conclusion(attribution)[0]
     trial = counted[0]
+    how = f"with {title(trial.factor)} brought to the same ({trial.did})"
+    if trial.way == "off":
+        how = f"without {title(trial.factor)} ({trial.did})"
     return (
-        f"Run again with {title(trial.factor)} brought to the same ({trial.did}), the largest "
-        f"difference {_of(attribution)} is {amount(attribution, trial.worst)} instead of "
-        f"{amount(attribution, attribution.gap)}."
+        f"Run again {how}, the largest difference {_of(attribution)} is "
+        f"{amount(attribution, trial.worst)} instead of {amount(attribution, attribution.gap)}."
     )
 
 

@@ -248,13 +248,15 @@ class Scene {
     gl.uniform3fv(made.at('span'), mesh.span);
     gl.bindVertexArray(built.array);
     for (const [body, first, count, r, g, b] of mesh.parts) {
-      // What never moves is the same on both sides, and drawn once.
-      if (side === 1 && this.show.solid && !this.data.moving[body]) continue;
+      // What never moves is the same on both sides: drawn once, it only hides what is behind it.
+      const seen = !(side === 1 && this.show.solid && !this.data.moving[body]);
+      gl.colorMask(seen, seen, seen, seen);
       if (colours) gl.uniform3fv(made.at('colour'), colours(r, g, b));
       gl.uniformMatrix4fv(made.at('pose'), false,
         pose(run.place(this.row, body), run.turn(this.row, body)));
       gl.drawElements(gl.TRIANGLES, count, built.kind, first * built.width);
     }
+    gl.colorMask(true, true, true, true);
   }
 
   draw_solid(paper) {
