@@ -697,6 +697,9 @@ def test_timesteps_that_differ_are_drawn_between_and_it_is_said(tmp_path: Path) 
         assert "taken between two of its rows" in tab.locator("#origin").inner_text()
         go(tab, 7)
         assert "last compared moment, 0.025 s" in tab.locator("#now").inner_text()
+        cell = tab.locator("#readout tr", has_text="elbow_flex").locator("td").last.inner_text()
+        apart = abs(one.qpos[5, 2] - two.qpos[6, 2])  # rows of 5 ms and of 1/240 s
+        assert float(cell.strip("● °")) == pytest.approx(np.degrees(apart), rel=0.01)
         tab.nothing_wrong()
 
 
