@@ -13,7 +13,7 @@ from statemachine.engines import ENGINES, require
 
 from .conftest import REQUIRED, ROOT
 
-HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "xml.etree")
+HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "viser", "xml.etree")
 
 
 @pytest.mark.parametrize(
@@ -26,7 +26,9 @@ HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "xml.
         ("from statemachine.cli import main; main(['lesson', 'gravity', '--help'])", set()),
         ("from statemachine.cli import main; main(['fingertip', '--help'])", set()),
         ("from statemachine.cli import main; main(['conventions', '--help'])", set()),
+        ("from statemachine.cli import main; main(['audit', '--help'])", set()),
         ("from statemachine.cli import main; main(['check', '--help'])", set()),
+        ("from statemachine.cli import main; main(['view', '--help'])", set()),
         ("import statemachine.interface, statemachine.verbs", {"numpy"}),
         ("import statemachine.staleness", {"numpy"}),
         ("import statemachine.backends, statemachine.conformance", {"numpy", "xml.etree"}),

@@ -6,7 +6,7 @@ default `run` takes the parsed options and returns the exit code.
 
 from __future__ import annotations
 
-from . import check, compare, conventions, doctor, fingertip, lesson, trace
+from . import audit, check, compare, conventions, doctor, fingertip, lesson, trace, view
 
 # In the order in which --help shows them.
-COMMANDS = (lesson, check, conventions, fingertip, compare, trace, doctor)
+COMMANDS = (lesson, check, conventions, audit, fingertip, compare, trace, view, doctor)

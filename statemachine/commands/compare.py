@@ -101,6 +101,8 @@ def request_of(options: argparse.Namespace) -> Any:
 def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
     _compare_html.check(options)
+    if options.models and (options.why or options.quantity):
+        raise BadInputError("--models compares files: --why and --quantity are of an experiment")
     if options.models:
         return _compare_models.run(options)
     _compare_models.refuse_alone(options)

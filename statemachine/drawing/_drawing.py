@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,13 +53,27 @@ class Drawing:
     Attributes:
         parts: Its visual geoms.
         center: (3,) middle of the model [m], and extent: its size [m], as the file has them.
+        azimuth: Where MuJoCo's viewer looks from at first, about z [degrees]: 0 looks along x,
+            90 along y. elevation: the same above the horizontal; below 0 looks down.
         left_out: What it has and is not drawn, in words.
     """
 
     parts: tuple[Part, ...]
     center: tuple[float, float, float]
     extent: float
+    azimuth: float
+    elevation: float
     left_out: tuple[str, ...] = ()
+
+    def eye(self, distance: float) -> tuple[float, float, float]:
+        """Where the camera is that looks at the centre from so far away [m]."""
+        around, up = math.radians(self.azimuth), math.radians(self.elevation)
+        x, y, z = self.center
+        return (
+            x - distance * math.cos(up) * math.cos(around),
+            y - distance * math.cos(up) * math.sin(around),
+            z - distance * math.sin(up),
+        )
 
     @property
     def vertices(self) -> int:
@@ -118,7 +133,15 @@ def drawing_of(model: Model) -> Drawing:
             )
         )
     x, y, z = raw.stat.center.tolist()
-    return Drawing(tuple(parts), (x, y, z), float(raw.stat.extent), tuple(left_out))
+    at = raw.vis.global_
+    return Drawing(
+        parts=tuple(parts),
+        center=(x, y, z),
+        extent=float(raw.stat.extent),
+        azimuth=float(at.azimuth),
+        elevation=float(at.elevation),
+        left_out=tuple(left_out),
+    )
 
 
 def _shape(raw: Any, geom: int, kind: str) -> Shape | None:

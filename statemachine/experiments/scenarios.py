@@ -110,7 +110,7 @@ SCENARIOS = {
         ),
         Scenario(
             "fall",
-            "The servos are off and nothing can touch anything: the arm falls to its limits.",
+            "The servos are off and nothing can touch anything: the arm falls.",
             "so101/scene",
             2.0,
             _untouched,

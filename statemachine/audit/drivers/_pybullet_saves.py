@@ -1,0 +1,120 @@
+"""PyBullet's own ways to save and restore a world, and what else decides its future."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ...interface import Data
+from ...records import Array
+from ...silence import silence
+from ._driver import Restore
+
+
+@dataclass
+class Client:
+    """A world, and what its user knows of it that the engine does not tell.
+
+    Attributes:
+        data: Holds the world; none of its verbs is called.
+        time: Simulated time [s]: the engine has no clock.
+        targets: (nu,) what the motors aim at; None where they are off.
+    """
+
+    data: Data
+    time: float = 0.0
+    targets: Array | None = None
+
+    @property
+    def world(self) -> Any:
+        """The bodies and their ids."""
+        return self.data.raw
+
+    @property
+    def id(self) -> int:
+        """What the engine's functions want as physicsClientId."""
+        return self.world.client
+
+
+def bases(machine: Client) -> list[int]:
+    """PyBullet's ids of the free bodies."""
+    return [tree.body for tree in machine.world.trees if tree.free]
+
+
+def solids(machine: Client) -> list[tuple[int, int]]:
+    """PyBullet's body and link of all that can touch."""
+    return [(body, link) for body, link, _ in machine.world.solids()]
+
+
+def written(pb: Any, machine: Client) -> Iterator[Restore]:
+    """What can be read of positions and velocities is written back."""
+    joints = [
+        pb.getJointStates(tree.body, tree.joints, machine.id) if tree.joints else ()
+        for tree in machine.world.trees
+    ]
+    poses = [
+        (pb.getBasePositionAndOrientation(b, machine.id), pb.getBaseVelocity(b, machine.id))
+        for b in bases(machine)
+    ]
+
+    def restore(other: Client) -> None:
+        for tree, states in zip(other.world.trees, joints, strict=True):
+            for index, state in zip(tree.joints, states, strict=False):
+                pb.resetJointState(tree.body, index, state[0], state[1], other.id)
+        for body, (pose, rates) in zip(bases(other), poses, strict=True):
+            pb.resetBasePositionAndOrientation(body, *pose, other.id)
+            pb.resetBaseVelocity(body, *rates, other.id)
+
+    yield restore
+
+
+def in_memory(pb: Any, machine: Client) -> Iterator[Restore]:
+    """The engine's saveState: for the world that it was made in."""
+    state = pb.saveState(machine.id)
+    try:
+        yield lambda other: pb.restoreState(state, physicsClientId=other.id)
+    finally:
+        pb.removeState(state, physicsClientId=machine.id)
+
+
+def in_a_file(pb: Any, machine: Client) -> Iterator[Restore]:
+    """The engine's file, which another world of the same bodies takes too."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = os.fspath(Path(folder) / "world.bullet")
+        with silence():
+            pb.saveBullet(file, physicsClientId=machine.id)
+
+        def restore(other: Client) -> None:
+            with silence():
+                pb.restoreState(fileName=file, physicsClientId=other.id)
+
+        yield restore
+
+
+def taken_apart(pb: Any, machine: Client) -> Iterator[Restore]:
+    """Every body is taken far away and brought back, which leaves no memory of contacts."""
+    qpos, qvel = _in_our_words(pb, machine)
+    yield lambda other: other.world.place(qpos, qvel)
+
+
+def _in_our_words(pb: Any, machine: Client) -> tuple[Array, Array]:
+    """The state as `World.place` wants it."""
+    qpos, qvel = machine.data.qpos.copy(), machine.data.qvel.copy()
+    for tree in machine.world.trees:
+        if tree.joints:
+            states = pb.getJointStates(tree.body, tree.joints, machine.id)
+            qpos[tree.qpos], qvel[tree.qvel] = [s[0] for s in states], [s[1] for s in states]
+        if tree.free:
+            qpos[tree.qpos], qvel[tree.qvel] = machine.world.read_free(tree)
+    return qpos, qvel
+
+
+def let_pass(pb: Any, machine: Client) -> None:
+    """Nothing touches anything any more."""
+    for body, link in solids(machine):
+        pb.setCollisionFilterGroupMask(body, link, 0, 0, machine.id)
+    pb.performCollisionDetection(machine.id)

@@ -1,0 +1,124 @@
+"""Our own interface, on any backend: the seven verbs and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import cached_property
+
+import numpy as np
+
+from ...errors import UnsupportedError
+from ...interface import Data
+from ...model import Model
+from ...records import DERIVED, INPUTS, Array, State
+from ...verbs import forward, get_state, make_data, reset, set_state, step
+from ..findings import Layout, layout_of
+from ..points import Point
+from ._driver import Driver, Look, Restore, Seen, Way
+
+
+class InterfaceDriver(Driver):
+    """The interface to an engine."""
+
+    layer = "interface"
+    legend = (
+        "'qpos qvel …' are written into the arrays of a Data; get_state and set_state are the "
+        "two verbs."
+    )
+
+    def __init__(self, model: Model, seed: int) -> None:
+        super().__init__(model, seed)
+        self.name = f"this interface on {model.backend}"
+
+    @cached_property
+    def layout(self) -> Layout:
+        return layout_of(self.model)
+
+    def fresh(self, point: Point) -> Data:
+        return make_data(point.model)
+
+    def close(self, machine: Data) -> None:
+        machine.close()
+
+    def reset(self, machine: Data) -> None:
+        reset(machine.model, machine)
+
+    def start(self, machine: Data, point: Point) -> None:
+        machine.qpos, machine.qvel, machine.ctrl = point.qpos, point.qvel, point.ctrl
+
+    def command(self, machine: Data, ctrl: Array) -> None:
+        machine.ctrl[:] = ctrl
+
+    def advance(self, machine: Data, nstep: int = 1) -> None:
+        step(machine.model, machine, nstep)
+
+    def read(self, machine: Data) -> Array:
+        return np.concatenate((machine.qpos, machine.qvel))
+
+    def time(self, machine: Data) -> float:
+        return machine.time
+
+    def _see(self, point: Point) -> Seen:
+        with self.at(point) as machine:
+            forward(machine.model, machine)
+            speed = float(np.abs(machine.qvel).max(initial=0.0))
+            contacts = len(machine.contacts)
+            return Seen(point.name, point.how, machine.time, contacts, None, speed)
+
+    def ways(self, point: Point) -> tuple[Way, ...]:
+        exact = point.model.capabilities.exact_restore
+        return (
+            _written("qpos", "qvel"),
+            _written("qpos", "qvel", "ctrl", "time"),
+            Way("get_state, set_state", _state, promised=exact, agree=True),
+        )
+
+    def looks(self, point: Point) -> tuple[Look, ...]:
+        def ask(machine: Data) -> None:
+            forward(machine.model, machine)
+            _read_all(machine)
+
+        return (
+            Look("forward", lambda machine: forward(machine.model, machine)),
+            Look("reading what is derived", _read_all),
+            Look("forward, then reading", ask),
+            Look("get_state", lambda machine: get_state(machine.model, machine)),
+        )
+
+    def state(self, point: Point) -> State:
+        """The State at a save point, to be put into a Data elsewhere."""
+        with self.at(point) as machine:
+            return get_state(machine.model, machine)
+
+    def future(self, point: Point, state: State, steps: int) -> Array:
+        """What follows from a State in a new Data."""
+        with self.new(point) as machine:
+            set_state(machine.model, machine, state)
+            return self.drive(machine, point, steps)
+
+
+def _written(*names: str) -> Way:
+    @contextmanager
+    def save(machine: Data) -> Iterator[Restore]:
+        kept = {name: np.array(getattr(machine, name)) for name in names}
+
+        def restore(other: Data) -> None:
+            for name, value in kept.items():
+                setattr(other, name, value if name in INPUTS else float(value))
+
+        yield restore
+
+    return Way(" ".join(names), save)
+
+
+@contextmanager
+def _state(machine: Data) -> Iterator[Restore]:
+    kept = get_state(machine.model, machine)
+    yield lambda other: set_state(other.model, other, kept)
+
+
+def _read_all(machine: Data) -> None:
+    for name in (*DERIVED, "contacts"):
+        with suppress(UnsupportedError):
+            getattr(machine, name)

@@ -1,0 +1,209 @@
+"""MuJoCo itself: MjModel, MjData, mj_step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property, partial
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from ...engines import require
+from ...model import Model
+from ...records import Array
+from ..findings import Layout, layout_of
+from ..points import Point
+from ._driver import ONLY, Driver, Look, Restore, Seen, Way
+
+# What another past may have left in them, as a part of the weight or inertia that it acts on.
+_PUSH = 0.1
+_SEVERAL, _THREADS = 3, 2  # simulations, and threads, of the engine's own pools
+
+
+@dataclass
+class Simulation:
+    """An MjData and the MjModel that it belongs to."""
+
+    model: Any
+    data: Any
+
+
+class MujocoDriver(Driver):
+    """The engine through its own functions."""
+
+    layer = "engine"
+    legend = (
+        "Names are those of mj_getState and mj_setState. 'all but' is mjSTATE_INTEGRATION with "
+        "one component left out, each that this model has; 'only those that matter' are the "
+        "components whose absence showed."
+    )
+
+    def __init__(self, model: Model, seed: int) -> None:
+        super().__init__(model, seed)
+        self.name = f"MuJoCo {model.engine_version} itself"
+        self.mj: Any = require("mujoco")
+        state = self.mj.mjtState
+        self.whole = int(state.mjSTATE_INTEGRATION)
+        # Every component that this model has, by the engine's own name for it.
+        self.fields = {
+            name.removeprefix("mjSTATE_").lower(): int(bit)
+            for name, bit in state.__members__.items()
+            if name != "mjNSTATE"
+            and int(bit).bit_count() == 1
+            and self.mj.mj_stateSize(model.raw, int(bit))
+        }
+
+    @cached_property
+    def layout(self) -> Layout:
+        return layout_of(self.model)
+
+    def fresh(self, point: Point) -> Simulation:
+        return Simulation(point.model.raw, self.mj.MjData(point.model.raw))
+
+    def close(self, machine: Simulation) -> None:
+        machine.data = None
+
+    def reset(self, machine: Simulation) -> None:
+        self.mj.mj_resetData(machine.model, machine.data)
+
+    def start(self, machine: Simulation, point: Point) -> None:
+        data = machine.data
+        data.qpos[:], data.qvel[:], data.ctrl[:] = point.qpos, point.qvel, point.ctrl
+
+    def command(self, machine: Simulation, ctrl: Array) -> None:
+        machine.data.ctrl[:] = ctrl
+
+    def advance(self, machine: Simulation, nstep: int = 1) -> None:
+        self.mj.mj_step(machine.model, machine.data, nstep)
+
+    def read(self, machine: Simulation) -> Array:
+        return np.concatenate((machine.data.qpos, machine.data.qvel))
+
+    def time(self, machine: Simulation) -> float:
+        return float(machine.data.time)
+
+    def soil(self, machine: Simulation, point: Point) -> None:
+        """Every component that stepping does not change is left at something else."""
+        model, data = machine.model, machine.data
+        rng = np.random.default_rng(self.seed + 2)
+        around = partial(rng.uniform, -_PUSH, _PUSH)
+        data.time += 1.0
+        data.qfrc_applied[:] += around(size=model.nv) * model.dof_M0
+        data.xfrc_applied[:, :3] += around(size=(model.nbody, 3)) * model.body_mass[:, None] * 9.81
+        data.xfrc_applied[:, 3:] += around(size=(model.nbody, 3)) * model.body_inertia
+        data.mocap_pos[:] += around(size=data.mocap_pos.shape)
+        data.userdata[:] += 1.0
+        data.eq_active[:] = 1 - data.eq_active
+
+    def _see(self, point: Point) -> Seen:
+        with self.at(point) as machine:
+            self.mj.mj_forward(machine.model, machine.data)
+            data, kind = machine.data, self.mj.mjtConstraint
+            return Seen(
+                point.name,
+                point.how,
+                float(data.time),
+                int(data.ncon),
+                int(np.isin(data.efc_type, (int(kind.mjCNSTR_LIMIT_JOINT),)).sum()),
+                float(np.abs(data.qvel).max(initial=0.0)),
+            )
+
+    def ways(self, point: Point) -> tuple[Way, ...]:
+        """Parts of the integration state, then all of it but one component."""
+        state = self.mj.mjtState
+        qpos, qvel = int(state.mjSTATE_QPOS), int(state.mjSTATE_QVEL)
+        ctrl, full = int(state.mjSTATE_CTRL), int(state.mjSTATE_FULLPHYSICS)
+        candidates = {
+            "qpos qvel": qpos | qvel,
+            "qpos qvel ctrl": qpos | qvel | ctrl,
+            "qpos qvel ctrl time": qpos | qvel | ctrl | int(state.mjSTATE_TIME),
+            "mjSTATE_PHYSICS": int(state.mjSTATE_PHYSICS),
+            "mjSTATE_FULLPHYSICS": full,
+            "FULLPHYSICS + USER": full | int(state.mjSTATE_USER),
+            "mjSTATE_INTEGRATION": self.whole,
+        }
+        return (
+            *(self.way(name, spec) for name, spec in candidates.items()),
+            Way("mj_copyData", self._copied),
+            *(
+                self.way(f"INTEGRATION without {name}", self.whole & ~bit, name)
+                for name, bit in self.fields.items()
+            ),
+        )
+
+    def only(self, fields: tuple[str, ...]) -> Way:
+        return self.way(ONLY, sum(self.fields[name] for name in fields))
+
+    def way(self, name: str, spec: int, left_out: str = "") -> Way:
+        """The candidate of a mask of components."""
+
+        @contextmanager
+        def save(machine: Simulation) -> Iterator[Restore]:
+            kept = self.saved(machine, spec)
+            yield lambda other: self.mj.mj_setState(other.model, other.data, kept, spec)
+
+        return Way(name, save, left_out)
+
+    def saved(self, machine: Simulation, spec: int) -> Array:
+        """The components of a mask, as the engine gives them."""
+        kept = np.empty(self.mj.mj_stateSize(machine.model, spec))
+        self.mj.mj_getState(machine.model, machine.data, kept, spec)
+        return kept
+
+    @contextmanager
+    def _copied(self, machine: Simulation) -> Iterator[Restore]:
+        kept = self.mj.MjData(machine.model)
+        self.mj.mj_copyData(kept, machine.model, machine.data)
+        yield lambda other: self.mj.mj_copyData(other.data, other.model, kept)
+
+    def looks(self, point: Point) -> tuple[Look, ...]:
+        mj = self.mj
+
+        def halves(machine: Simulation) -> None:
+            mj.mj_step1(machine.model, machine.data)
+            mj.mj_step2(machine.model, machine.data)
+
+        # The engine's manual keeps the two halves for integrators of one stage.
+        one_stage = int(point.model.raw.opt.integrator) != int(mj.mjtIntegrator.mjINT_RK4)
+        return (
+            Look("mj_forward", lambda m: mj.mj_forward(m.model, m.data)),
+            Look("mj_inverse", lambda m: mj.mj_inverse(m.model, m.data), promised=False),
+            Look("mj_getState", lambda m: self.saved(m, self.whole)),
+            Look("mj_step1, mj_step2 for mj_step", halves, promised=one_stage, instead=True),
+        )
+
+    def pools(self) -> dict[str, Callable[[Point, int], list[Array]]]:
+        """The engine's own ways to run several simulations at once, on threads."""
+        on = f"{_THREADS} threads"
+        return {f"mujoco.rollout, {on}": self._rollout, f"mujoco.batch, {on}": self._batch}
+
+    def _rollout(self, point: Point, steps: int) -> list[Array]:
+        state, user = self.mj.mjtState, int(self.mj.mjtState.mjSTATE_USER)
+        model = point.model.raw
+        with self.at(point) as machine:
+            start = self.saved(machine, int(state.mjSTATE_FULLPHYSICS))
+            inputs = self.saved(machine, user)
+            warm, first = np.array(machine.data.qacc_warmstart), self.read(machine)
+        out, _ = import_module("mujoco.rollout").rollout(
+            model,
+            [self.mj.MjData(model) for _ in range(_THREADS)],
+            np.tile(start, (_SEVERAL, 1)),
+            np.tile(inputs, (_SEVERAL, steps, 1)),
+            control_spec=user,
+            initial_warmstart=np.tile(warm, (_SEVERAL, 1)),
+        )
+        before = self.mj.mj_stateSize(model, int(state.mjSTATE_TIME))
+        width = len(first)
+        return [np.vstack((first, each[:, before : before + width])) for each in out]
+
+    def _batch(self, point: Point, steps: int) -> list[Array]:
+        batch = import_module("mujoco.batch").Batch(point.model.raw, _SEVERAL, _THREADS)
+        with self.at(point) as machine:
+            batch.state[:] = self.saved(machine, self.whole)
+            first = self.read(machine)
+        out = batch.rollout(steps, record=["qpos", "qvel"])
+        futures = np.concatenate((out["qpos"], out["qvel"]), axis=2)
+        return [np.vstack((first, each)) for each in futures]

@@ -1,0 +1,246 @@
+"""PyBullet itself: a client, stepSimulation, its own motors and its own ways to save.
+
+The bodies are those that the backend loads (`data.raw`): frictions, masses and filters are the
+model's. From then on only the engine's own functions are called. Its joints are driven as its
+users drive them, by POSITION_CONTROL; the backend's servo has no part in this.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from ...engines import require
+from ...model import Model
+from ...records import Array, JointType
+from ...verbs import make_data
+from ..findings import Layout
+from ..points import Point
+from . import _pybullet_saves as saves
+from ._driver import Driver, Hiding, Look, Restore, Save, Seen, Way
+from ._pybullet_saves import Client
+
+_RETARGET = 0.2  # what a target is changed by, to see whether a restore brings it back [rad or m]
+_PUSH = 5.0  # of a force that waits for the next step [N]
+_BEST = "written + targets"  # all that can be read and written
+_SLIPPERY = 0.05  # a friction that the model does not have
+
+
+class PybulletDriver(Driver):
+    """The engine through its own functions."""
+
+    layer = "engine"
+    legend = (
+        "'written' is what getJointStates and getBase… gave, put back by resetJointState and "
+        "resetBase…; '+ targets' commands the motors once more, and the caller sets the clock "
+        "back that it keeps itself; 'taken apart' moves every body far away before it is written. "
+        "saveState stays in the world that it was made in."
+    )
+    several = False  # stepSimulation takes one step
+    resets = False  # resetSimulation empties the world; `conventions` tries it
+
+    def __init__(self, model: Model, seed: int) -> None:
+        super().__init__(model, seed)
+        self.name = f"PyBullet {model.engine_version} itself"
+        self.pb: Any = require("pybullet")
+        # Where each servo's joint has its degree of freedom; one that drives no joint is left out.
+        self._servos = {
+            int(model.jnt_dofadr[joint]): servo
+            for servo, joint in enumerate(model.actuator_jntid.tolist())
+            if joint >= 0
+        }
+
+    def lacks(self, point: Point) -> str:
+        limits = point.model.capabilities.behaviours["joint limits"]
+        if not point.at_limit or limits.support == "native":
+            return ""
+        return f"joint limits are {limits.support} ({limits.note})"
+
+    @cached_property
+    def layout(self) -> Layout:
+        """Joints, tree by tree; then position and quaternion of each free base."""
+        model = self.model
+        slides = set(model.jnt_dofadr[model.jnt_type == int(JointType.SLIDE)].tolist())
+        angles: list[int] = []
+        lengths: list[int] = []
+        quats = []
+        at = 0
+        with make_data(model) as data:
+            machine = Client(data)
+            for tree in machine.world.trees:
+                for dof in tree.dofs.tolist() if tree.joints else ():
+                    (lengths if dof in slides else angles).append(at)
+                    at += 1
+            for _ in saves.bases(machine):
+                lengths += range(at, at + 3)
+                quats.append(at + 3)
+                at += 7
+        return Layout(tuple(angles), tuple(lengths), tuple(quats))
+
+    def fresh(self, point: Point) -> Client:
+        return Client(make_data(point.model))
+
+    def close(self, machine: Client) -> None:
+        machine.data.close()
+
+    def start(self, machine: Client, point: Point) -> None:
+        machine.world.put(point.qpos, point.qvel)
+        if point.powered:
+            self.command(machine, point.ctrl)
+
+    def command(self, machine: Client, ctrl: Array) -> None:
+        machine.targets = np.clip(ctrl, *self.model.actuator_ctrlrange.T)
+        for tree in machine.world.trees:
+            for index, dof in zip(tree.joints, tree.dofs.tolist(), strict=False):
+                if dof in self._servos:
+                    self.pb.setJointMotorControl2(
+                        tree.body,
+                        index,
+                        self.pb.POSITION_CONTROL,
+                        targetPosition=float(machine.targets[self._servos[dof]]),
+                        physicsClientId=machine.id,
+                    )
+
+    def advance(self, machine: Client, nstep: int = 1) -> None:
+        for _ in range(nstep):
+            self.pb.stepSimulation(machine.id)
+            machine.time += self.model.timestep
+
+    def read(self, machine: Client) -> Array:
+        places, speeds = [], []
+        for joint in self._joints(machine):
+            places.append(joint[0])
+            speeds.append(joint[1])
+        for body in saves.bases(machine):
+            pos, quat = self.pb.getBasePositionAndOrientation(body, machine.id)
+            linear, angular = self.pb.getBaseVelocity(body, machine.id)
+            places += (*pos, *quat)
+            speeds += (*linear, *angular)
+        return np.array(places + speeds)
+
+    def _joints(self, machine: Client) -> Iterator[Any]:
+        for tree in machine.world.trees:
+            if tree.joints:
+                yield from self.pb.getJointStates(tree.body, tree.joints, machine.id)
+
+    def time(self, machine: Client) -> float:
+        return machine.time
+
+    def _see(self, point: Point) -> Seen:
+        with self.at(point) as machine:
+            speeds = self.read(machine)[self.layout.width :]
+            points = self.pb.getContactPoints(physicsClientId=machine.id)
+            return Seen(
+                point.name,
+                point.how,
+                machine.time,
+                sum(each[8] <= 0 for each in points),
+                None,
+                float(np.abs(speeds).max(initial=0.0)),
+            )
+
+    def ways(self, point: Point) -> tuple[Way, ...]:
+        """The engine's ways with and without what its user must add: targets and time."""
+        return (
+            Way("written", self._way(saves.written, known=False)),
+            Way(_BEST, self._way(saves.written)),
+            Way("saveState + targets", self._way(saves.in_memory), travels=False),
+            Way("saveBullet + targets", self._way(saves.in_a_file)),
+            Way("taken apart + targets", self._way(saves.taken_apart)),
+        )
+
+    def _way(self, save: Callable[[Any, Client], Iterator[Restore]], known: bool = True) -> Save:
+        """A way to save; `known`: with what the user knows and the engine does not tell."""
+
+        @contextmanager
+        def whole(machine: Client) -> Iterator[Restore]:
+            time = machine.time
+            targets = None if machine.targets is None else machine.targets.copy()
+            with contextmanager(save)(self.pb, machine) as restore:
+
+                def back(other: Client) -> None:
+                    restore(other)
+                    if known:
+                        other.time = time
+                        if targets is not None:
+                            self.command(other, targets)
+
+                yield back
+
+        return whole
+
+    def hides(self, point: Point) -> Hiding:
+        """What the engine's ways forget, each way without what its user must add."""
+        ways = {
+            "written": self._way(saves.written, known=False),
+            "saveState": self._way(saves.in_memory, known=False),
+            "saveBullet": self._way(saves.in_a_file, known=False),
+        }
+        best = Way(_BEST, self._way(saves.written))
+        return Hiding(ways, self._changes(point), partial(saves.let_pass, self.pb), best)
+
+    def _changes(self, point: Point) -> dict[str, Callable[[Client], None]]:
+        pb = self.pb
+
+        def motor_targets(machine: Client) -> None:
+            self.command(machine, point.ctrl - _RETARGET)
+
+        def waiting_force(machine: Client) -> None:
+            for body, link in saves.solids(machine):
+                pb.applyExternalForce(
+                    body, link, (_PUSH, 0, 0), (0, 0, 0), pb.LINK_FRAME, physicsClientId=machine.id
+                )
+
+        def friction(machine: Client) -> None:
+            for body, link in saves.solids(machine):
+                pb.changeDynamics(body, link, lateralFriction=_SLIPPERY, physicsClientId=machine.id)
+
+        found: dict[str, Callable[[Client], None]] = {
+            "motor targets": motor_targets,
+            "a waiting force": waiting_force,
+            "collision masks": partial(saves.let_pass, pb),
+            "frictions": friction,
+        }
+        if not point.powered or not self._servos:
+            found.pop("motor targets")
+        return found
+
+    def looks(self, point: Point) -> tuple[Look, ...]:
+        pb = self.pb
+
+        def links(machine: Client) -> None:
+            for tree in machine.world.trees:
+                for index in range(pb.getNumJoints(tree.body, machine.id)):
+                    pb.getLinkState(
+                        tree.body, index, computeForwardKinematics=1, physicsClientId=machine.id
+                    )
+
+        def dynamics(machine: Client) -> None:
+            for tree in machine.world.trees:
+                if tree.joints and not tree.free:
+                    places = [s[0] for s in pb.getJointStates(tree.body, tree.joints, machine.id)]
+                    none = [0.0] * len(places)
+                    pb.calculateInverseDynamics(
+                        tree.body, places, none, none, physicsClientId=machine.id
+                    )
+                    pb.calculateMassMatrix(tree.body, places, physicsClientId=machine.id)
+
+        def save(machine: Client) -> None:
+            state = pb.saveState(machine.id)
+            pb.removeState(state, physicsClientId=machine.id)
+
+        return (
+            Look("getLinkState, forward kinematics", links),
+            Look("getContactPoints", lambda m: pb.getContactPoints(physicsClientId=m.id)),
+            Look("inverse dynamics, mass matrix", dynamics),
+            Look("saveState", save),
+            Look(
+                "performCollisionDetection",
+                lambda m: pb.performCollisionDetection(m.id),
+                promised=False,
+            ),
+        )

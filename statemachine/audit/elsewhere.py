@@ -1,0 +1,93 @@
+"""The same in another process: everything from the start, and from a pickled State."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import EngineError
+from ..model import Model
+from ..records import Array, State
+from .drivers import Driver, Run
+from .drivers.interface_driver import InterfaceDriver
+from .findings import Finding, gap
+
+PROCESS, PICKLED = "process", "pickled State"
+_PATIENCE = 300.0  # seconds
+
+# By layer and point: what a driver read along a run.
+Traces = dict[tuple[str, str], Array]
+
+
+@dataclass(frozen=True)
+class Job:
+    """What the other process is to do."""
+
+    model: Model
+    seed: int
+    steps: int
+    states: dict[str, State]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What it did: runs from the start, and futures of the States by point."""
+
+    runs: Traces
+    futures: dict[str, Array]
+
+
+def run(job: Job) -> Answer:
+    """Do a job in a fresh Python, whose strings hash otherwise; nothing of it is left.
+
+    Raises:
+        EngineError: The process did not come to its end.
+    """
+    package = Path(__file__).resolve().parents[2]
+    paths = [os.fspath(package), *(path for path in sys.path if path)]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "PYTHONHASHSEED": "1"}
+    with tempfile.TemporaryDirectory() as folder:
+        asked, answered = Path(folder) / "job", Path(folder) / "answer"
+        asked.write_bytes(pickle.dumps(job))
+        child = f"{__package__}._child"
+        command = [sys.executable, "-P", "-m", child, os.fspath(asked), os.fspath(answered)]
+        try:
+            done = subprocess.run(
+                command,
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,  # engines greet there
+                stderr=subprocess.PIPE,
+                timeout=_PATIENCE,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            raise EngineError(f"a fresh process did not end in {_PATIENCE:g} s") from None
+        if done.returncode:
+            said = done.stderr.decode(errors="replace").strip().splitlines()
+            last = said[-1] if said else f"exit code {done.returncode}"
+            raise EngineError(f"a fresh process failed: {last}")
+        return pickle.loads(answered.read_bytes())
+
+
+def findings(answer: Answer, driver: Driver, runs: Sequence[Run]) -> Iterator[Finding]:
+    """The other process's runs against those of this one."""
+    for run in runs:
+        off = driver.gap(run, answer.runs[driver.layer, run.point.name])
+        yield driver.found(PROCESS, run, "a fresh process", "this process", off)
+
+
+def pickled(
+    answer: Answer, driver: InterfaceDriver, runs: Sequence[Run], states: dict[str, State]
+) -> Iterator[Finding]:
+    """The future of a State that was pickled to another process, against its future here."""
+    for run in runs:
+        here = driver.future(run.point, states[run.point.name], run.steps)
+        off = gap(here, answer.futures[run.point.name], driver.layout)
+        yield driver.found(PICKLED, run, "a pickled State, in a fresh one", "in this process", off)

@@ -1,0 +1,107 @@
+"""Save, go on, restore, go on: is it the same future? Which state vector suffices?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from itertools import combinations
+
+from ..records import Array
+from .drivers import Driver, Machine, Restore, Run, Save, Way
+from .findings import EACH_OTHER, Finding, gap, worst
+
+RESTORE, WITHOUT, FORGETS, NO_CONTACTS = "restore", "leave one out", "forgets", "contacts off"
+# What is restored.
+ITSELF, FRESH, USED = "the run itself", "a fresh one", "a used one"
+NOT_RESTORED = "not restored"
+AGAIN = "the run itself, again"  # where nothing else can be
+
+
+def ask(driver: Driver, run: Run) -> Iterator[Finding]:
+    """Each way to save, restored into the run itself, a fresh machine and a used one."""
+    for way in driver.ways(run.point):
+        yield from _tried(driver, run, way)
+
+
+def smallest(driver: Driver, runs: Sequence[Run], findings: Sequence[Finding]) -> Iterator[Finding]:
+    """Only the components without which something differed, tried at each point."""
+    broke = [each.case for each in findings if each.experiment == WITHOUT and not each.gap.exact]
+    way = driver.only(tuple(dict.fromkeys(broke)))
+    if way is not None:
+        for run in runs:
+            yield from _tried(driver, run, way)
+
+
+def _tried(driver: Driver, run: Run, way: Way) -> Iterator[Finding]:
+    """One way to save, against the future of the run that was saved, and against itself."""
+    experiment, case = (WITHOUT, way.left_out) if way.left_out else (RESTORE, way.name)
+    futures = _futures(driver, run, way)
+    for into, future in futures.items():
+        off = driver.gap(run, future)
+        yield driver.found(experiment, run, case, into, off, way.promised)
+    among = worst([gap(*pair, driver.layout) for pair in combinations(futures.values(), 2)])
+    yield driver.found(experiment, run, case, EACH_OTHER, among, way.agree)
+
+
+def _futures(driver: Driver, run: Run, way: Way) -> dict[str, Array]:
+    """What follows from a restore, by what was restored."""
+    point, found = run.point, {}
+    with driver.at(point) as machine, way.save(machine) as restore:
+        driver.drive(machine, point, run.steps)
+        for into in (ITSELF,) if way.travels else (ITSELF, AGAIN):
+            restore(machine)
+            found[into] = driver.drive(machine, point, run.steps)
+        for into, other in ((FRESH, driver.new), (USED, driver.used)) if way.travels else ():
+            with other(point) as target:
+                restore(target)
+                found[into] = driver.drive(target, point, run.steps)
+    return found
+
+
+def forgets(driver: Driver, runs: Sequence[Run]) -> Iterator[Finding]:
+    """What is changed after a save, and is still changed after the restore.
+
+    Against the same without the change, so that nothing else can make the difference; and, to
+    know whether the change shows at all, without a restore. At the point with most contacts:
+    where nothing touches, nobody would miss a friction.
+    """
+    run = max(runs, key=lambda each: driver.see(each.point).contacts, default=None)
+    hiding = driver.hides(run.point) if run else None
+    if run is None or hiding is None:
+        return
+
+    def future(save: Save | None, change: Callable[[Machine], None] | None) -> Array:
+        with driver.at(run.point) as machine, (save or _nothing)(machine) as restore:
+            if change:
+                change(machine)
+            restore(machine)
+            return driver.drive(machine, run.point, run.steps)
+
+    ways = {NOT_RESTORED: None, **hiding.ways}
+    for name, save in ways.items():
+        unchanged = future(save, None)
+        for what, change in hiding.changes.items():
+            off = gap(unchanged, future(save, change), driver.layout)
+            yield driver.found(FORGETS, run, what, name, off, promised=False)
+
+
+@contextmanager
+def _nothing(_machine: Machine) -> Iterator[Restore]:
+    """The way that neither saves nor restores."""
+    yield lambda _other: None
+
+
+def contacts_off(driver: Driver, run: Run) -> Iterator[Finding]:
+    """How far off the best that can be written is where nothing touches any more."""
+    hiding = driver.hides(run.point)
+    if hiding is None:
+        return
+    with driver.at(run.point) as machine, hiding.best.save(machine) as restore:
+        hiding.let_pass(machine)
+        alone = driver.drive(machine, run.point, run.steps)
+        with driver.new(run.point) as other:
+            restore(other)
+            hiding.let_pass(other)
+            future = driver.drive(other, run.point, run.steps)
+    off = gap(alone, future, driver.layout)
+    yield driver.found(NO_CONTACTS, run, hiding.best.name, FRESH, off, promised=False)

@@ -1,0 +1,175 @@
+"""`statemachine view`: a running simulation in the browser, to look at and to touch."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import socket
+import sys
+from contextlib import suppress
+from typing import Any
+
+from ..errors import BadInputError, TraceError
+from ._common import PROGRAM, add_backend, add_menagerie
+
+_PORT = 8080
+_MODEL = "so101/scene_box"
+
+
+def add(commands: Any) -> None:
+    """The subparser."""
+    parser = commands.add_parser(
+        "view",
+        help="a running simulation in the browser, with sliders",
+        description="Show a simulation in the browser at the pace of the clock, with a slider "
+        "for each actuator; the other engine beside it as a ghost. Ctrl-C ends it.",
+    )
+    parser.add_argument(
+        "traces", nargs="*", metavar="TRACE", help="play this recording; a second one is the ghost"
+    )
+    parser.add_argument(
+        "--model",
+        metavar="NAME|FILE",
+        help=f"the model (default {_MODEL}; of a recording, its own)",
+    )
+    add_backend(parser, everyone=False)
+    parser.add_argument(
+        "--ghost", metavar="NAME", help="another engine, under the same commands, seen through"
+    )
+    parser.add_argument(
+        "--keyframe",
+        metavar="NAME|N",
+        help="where to start; 'default' is the default state (default: the first keyframe)",
+    )
+    parser.add_argument(
+        "--site", metavar="NAME", help="the fingertip (default gripperframe, else the last site)"
+    )
+    parser.add_argument("--speed", type=float, default=1.0, metavar="X", help="times real time (1)")
+    parser.add_argument("--paused", action="store_true", help="let time stand at the start")
+    parser.add_argument(
+        "--port", type=int, default=_PORT, metavar="N", help=f"or the next free one ({_PORT})"
+    )
+    parser.add_argument(
+        "--host",
+        default="127.0.0.1",
+        metavar="ADDR",
+        help="listen there, for whoever reaches it (default: this machine only)",
+    )
+    parser.add_argument("--open", action="store_true", help="open the page in a browser here")
+    parser.add_argument("--seconds", type=float, metavar="S", help="end after so long")
+    add_menagerie(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Serve until Ctrl-C."""
+    from ..view.pace import checked_speed
+    from ..view.server import free_port, require_viser
+
+    require_viser()
+    checked_speed(options.speed)
+    if options.seconds is not None and not 0 < options.seconds < float("inf"):
+        raise BadInputError(f"seconds must be above 0; got {options.seconds:g}")
+    port = free_port(options.host, options.port)
+    return (_play if options.traces else _simulate)(options, port)
+
+
+def _simulate(options: argparse.Namespace, port: int) -> int:
+    """A session on one engine or two."""
+    from ..backends import load
+    from ..drawing import drawing_of
+    from ..view.session import Session
+
+    name = options.model or _MODEL
+    backends = [options.backend, *([options.ghost] if options.ghost else [])]
+    models = [load(name, backend=backend, menagerie=options.menagerie) for backend in backends]
+    keyframe = _keyframe(options.keyframe, models[0])
+    engines = " and ".join(f"{model.backend} {model.engine_version}" for model in models)
+    with Session(models, keyframe, options.site) as session:
+        _serve(options, session, drawing_of(models[0]), keyframe, port, f"{name} on {engines}")
+    return 0
+
+
+def _play(options: argparse.Namespace, port: int) -> int:
+    """One recording or two."""
+    from ..backends import load
+    from ..drawing import drawing_of
+    from ..traces import read
+    from ..view.recording import Recording
+
+    if len(options.traces) > 2:
+        raise BadInputError(f"view shows one trace or two; got {len(options.traces)}")
+    for name in ("ghost", "keyframe", "site"):
+        if getattr(options, name) is not None:
+            raise BadInputError(f"--{name} is for a simulation, and a trace is a recording")
+    recording = Recording([read(path) for path in options.traces])
+    header = recording.header
+    name = options.model or header.provenance.model_file.removesuffix(".xml")
+    model = load(name, menagerie=options.menagerie)
+    if model.body_names != header.bodies:
+        raise TraceError(f"the trace is of another model than {name}: say which with --model")
+    what = f"{header.experiment or 'a run'} of {name}, recorded on {' and '.join(recording.labels)}"
+    _serve(options, recording, drawing_of(model), None, port, what)
+    return 0
+
+
+def _keyframe(asked: str | None, model: Any) -> int | None:
+    """Number of the keyframe to start from."""
+    if asked is None:
+        return 0 if model.keyframes else None
+    if asked == "default":
+        return None
+    return model.key_id(int(asked) if asked.isdecimal() else asked)
+
+
+def _serve(
+    options: argparse.Namespace,
+    session: Any,
+    drawing: Any,
+    keyframe: int | None,
+    port: int,
+    what: str,
+) -> None:
+    """Show a session until it is interrupted: the ordinary end of a server, no failure."""
+    from ..view import server as serving
+    from ..view.frames import Run
+    from ..view.live import Live
+    from ..view.viser_front import ViserFront
+
+    server = None
+    try:
+        server = serving.serve(options.host, port, f"{PROGRAM} view")
+        front = ViserFront(server, session, drawing, options.speed, keyframe)
+        _announce(options, server.get_port(), what, drawing)
+        if not options.paused:
+            session.apply(Run())
+        Live(session, front, options.speed).run(options.seconds)
+    except KeyboardInterrupt:
+        if sys.stdout.isatty():
+            print()  # after the terminal's ^C
+    finally:
+        if server is not None:
+            with suppress(KeyboardInterrupt):  # a second one
+                serving.stop(server)
+
+
+def _announce(options: argparse.Namespace, port: int, what: str, drawing: Any) -> None:
+    everywhere = options.host in ("0.0.0.0", "::")
+    here = everywhere or options.host in ("127.0.0.1", "::1", "localhost")
+    host = f"[{options.host}]" if ":" in options.host else options.host
+    address = f"http://{'localhost' if here else host}:{port}"
+    if options.port not in (0, port):
+        print(f"port {options.port} is taken, so it is {port}")
+    print(f"{address} shows {what}; Ctrl-C ends it")
+    if everywhere or not here:
+        print(f"whoever reaches port {port} of this machine can move the sliders")
+    else:
+        machine = socket.gethostname() if os.environ.get("SSH_CONNECTION") else "HOST"
+        print(f"from another machine: ssh -L {port}:localhost:{port} {machine}, then {address}")
+    for left_out in drawing.left_out:
+        print(f"not drawn: {left_out}")
+    sys.stdout.flush()  # a pipe is read while this runs
+    if options.open:
+        import webbrowser
+
+        webbrowser.open(address)

@@ -1,0 +1,130 @@
+"""What follows from an audit, in sentences, and its figures as words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ..audit import Audited
+from ..audit.conclusions import Conclusion, Missing
+from ..audit.findings import Gap, worst
+from ..audit.repeat import AGAIN
+
+_SAME = "same"
+
+
+def sentences(one: Audited) -> list[str]:
+    """What follows, in sentences; all of it from the findings."""
+    said, of = [], one.conclusion
+    points = [seen.point for seen in one.points]
+    if of.suffice:
+        said.append(
+            f"{one.name}: the state that suffices: {' or '.join(of.suffice)}: the same bytes at "
+            f"{_all(points)}, whatever it was restored in."
+        )
+    else:
+        said.append(
+            f"{one.name}: no candidate suffices: none has the same bytes at {_all(points)}, "
+            "whatever it is restored in."
+        )
+    said += _what_breaks(one.name, of, points)
+    if of.not_read_back:
+        where = [f"{name} (at {listed(at)})" for name, at in of.not_read_back.items()]
+        said.append(
+            f"{one.name}: before any step, not every byte reads back as it was saved: "
+            f"{listed(where)}."
+        )
+    if of.in_contact:
+        sizes = [of.touching[point] for point in of.in_contact]
+        said.append(
+            f"{one.name}: what cannot be written acts through contacts: at "
+            f"{listed(of.in_contact)} the future is off by {cell(worst([s for s, _ in sizes]))} "
+            f"as it stands, and by {cell(worst([off for _, off in sizes]))} where the contacts "
+            "are switched off."
+        )
+    for what in dict.fromkeys(of.forgotten.values()):
+        ways = [way for way, forgotten in of.forgotten.items() if forgotten == what]
+        if what:
+            said.append(f"{one.name}: not brought back by {listed(ways)}: {listed(what)}.")
+    agree = [name for name in of.agree if name not in of.suffice]
+    if agree:
+        said.append(
+            f"{one.name}: all restores of one state have one future, though not that of the "
+            f"run: {listed(agree)}."
+        )
+    again = [each for each in one.findings if each.experiment == AGAIN]
+    if not of.suffice and again and all(each.gap.exact for each in again):
+        said.append(
+            f"{one.name}: what did bring every future back is a new one, and the whole past "
+            "once more: here the state is the history."
+        )
+    return said
+
+
+def _what_breaks(name: str, of: Conclusion, points: Sequence[str]) -> list[str]:
+    if not of.missing:
+        return []
+    lines = []
+    itself = [each for each in of.missing if each.itself]
+    others = [each for each in of.missing if not each.itself]
+    alone = {None: "", True: " These alone suffice, tried.", False: " These alone do not suffice."}
+    text = f"{name}: back in the run itself it needs {listed(_with(itself, points))}"
+    if others:
+        text += f"; in one with another past also {listed([each.field for each in others])}"
+    lines.append(f"{text}.{alone[of.smallest]}")
+    lines.append(
+        f"{name}: what breaks a smaller one: "
+        + "; ".join(
+            f"{each.field}, left out, differs from step {each.gap.first}, by {cell(each.gap)} "
+            f"at the worst"
+            for each in of.missing
+        )
+        + "."
+    )
+    if of.idle:
+        lines.append(f"{name}: without {listed(of.idle)} nothing differed.")
+    return lines
+
+
+def _with(missing: Sequence[Missing], points: Sequence[str]) -> list[str]:
+    """Fields, and where they matter, if not everywhere."""
+    found = []
+    for each in missing:
+        at = each.itself
+        few = len(at) <= len(points) / 2
+        where = (
+            f"only at {listed(at)}"
+            if few
+            else "not at " + listed([point for point in points if point not in at])
+        )
+        found.append(each.field if len(at) == len(points) else f"{each.field} ({where})")
+    return found
+
+
+def _all(points: Sequence[str]) -> str:
+    return f"all of {len(points)} save points" if len(points) > 1 else "the one save point"
+
+
+def listed(words: Sequence[str]) -> str:
+    """Words in a row."""
+    return ", ".join(words)
+
+
+def cell(off: Gap) -> str:
+    """The larger of angle and length, or that every byte is the same."""
+    if off.exact:
+        return _SAME
+    if not off.size:  # of a velocity, or a 0 that became -0
+        return "bytes"
+    if off.angle >= off.length:
+        return f"{number(math.degrees(off.angle))}°"
+    return f"{number(off.length * 1e3)} mm"
+
+
+def number(value: float) -> str:
+    """A size: two digits, or its order of magnitude where it is tiny."""
+    if not math.isfinite(value):
+        return "beyond all"
+    if value >= 100:
+        return f"{value:.0f}"
+    return f"{value:.2g}" if value >= 1e-3 or value == 0 else f"{value:.0e}"

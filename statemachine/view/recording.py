@@ -1,0 +1,160 @@
+"""Recorded traces behind a viewer: the same commands and frames as a session, and no engine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import BadInputError, TraceError
+from ..records import Array
+from ..traces import Header, Trace
+from .frames import (
+    Command,
+    Control,
+    Frame,
+    Gap,
+    Pause,
+    Pose,
+    Reset,
+    Run,
+    Seek,
+    Step,
+    gap_between,
+)
+
+_NEEDED = ("xpos", "xquat")
+_EQUAL = 1e-6  # seconds between moments that count as the same
+
+
+class Recording:
+    """One or two traces of one model, row by row.
+
+    Attributes: those of a `Session`; it has no sliders, and the only place is its start.
+    """
+
+    controls: tuple[Control, ...] = ()
+    places: tuple[str, ...] = ()
+
+    def __init__(self, traces: Sequence[Trace]) -> None:
+        """Put them to their start; paused.
+
+        Args:
+            traces: One, or two of the same model: the second is the ghost.
+
+        Raises:
+            TraceError: A trace has no poses, or the two do not fit.
+        """
+        first = traces[0]
+        for trace in traces:
+            for column in _NEEDED:
+                if column not in trace or not np.isfinite(trace[column]).all():
+                    raise TraceError(f"{trace!r} has no {column}: it cannot be drawn")
+        for other in traces[1:]:
+            if (other.header.bodies, other.header.nq) != (first.header.bodies, first.header.nq):
+                raise TraceError(f"{other!r} is of another model than {first!r}")
+        self._traces = tuple(traces)
+        self.timestep = first.header.timestep
+        ends = [float(trace.time[-1] - trace.time[0]) for trace in traces]
+        self.length: float | None = min(ends)
+        self._rows = int(np.searchsorted(first.time - first.time[0], min(ends) + _EQUAL))
+        self.names = tuple(_name(trace.header) for trace in traces)
+        sites = first.header.sites if all("site_xpos" in trace for trace in traces) else ()
+        usual = "gripperframe" if "gripperframe" in sites else (sites[-1] if sites else "")
+        self.tip = usual
+        self._site = sites.index(usual) if sites else None
+        self._row, self._running, self._resets = 0, False, 1
+
+    @property
+    def header(self) -> Header:
+        """Of the first trace."""
+        return self._traces[0].header
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """What made each of them."""
+        return tuple(trace.header.label.removesuffix(", recorded") for trace in self._traces)
+
+    @property
+    def running(self) -> bool:
+        """Whether it plays."""
+        return self._running
+
+    def apply(self, command: Command) -> None:
+        """Do what was asked for.
+
+        Raises:
+            BadInputError: It is nothing that a recording can do; nothing is changed then.
+        """
+        match command:
+            case Run():
+                if self._row == self._rows - 1:
+                    self._jump(0)
+                self._running = self._rows > 1
+            case Pause():
+                self._running = False
+            case Step(count):
+                self._running = False
+                self.advance(count)
+                self._jump(self._row)
+            case Reset():
+                self._jump(0)
+            case Seek(time):
+                if not math.isfinite(time):
+                    raise BadInputError(f"there is no row at {time} s")
+                self._row = min(max(0, round(time / self.timestep)), self._rows - 1)
+            case _:
+                raise BadInputError("a recording has no sliders: nothing runs here")
+
+    def _jump(self, row: int) -> None:
+        """Go to a row that the slider did not ask for."""
+        self._row = row
+        self._resets += 1
+
+    def advance(self, count: int = 1) -> None:
+        """Go on by so many rows; it stops at the last."""
+        self._row = min(self._row + max(count, 0), self._rows - 1)
+        if self._row == self._rows - 1 and self._running:
+            self._running = False
+            self._jump(self._row)
+
+    def frame(self) -> Frame:
+        """This row of the first trace, and what the other has nearest to its time."""
+        first = self._traces[0]
+        since = first.time[self._row] - first.time[0]
+        rows = [int(np.abs(trace.time - trace.time[0] - since).argmin()) for trace in self._traces]
+        poses = []
+        for trace, name, row in zip(self._traces, self.names, rows, strict=True):
+            tip = None if self._site is None else trace["site_xpos"][row, self._site]
+            poses.append(Pose(name, trace["xpos"][row], trace["xquat"][row], tip))
+        gap = None
+        if len(rows) > 1:
+            other = self._traces[1]
+            # Moments that are not the same say nothing about the engines.
+            if abs(other.time[rows[1]] - other.time[0] - since) < _EQUAL:
+                gap = self._gap((poses[0], poses[1]), (first.qpos[rows[0]], other.qpos[rows[1]]))
+        return Frame(
+            time=float(first.time[self._row]),
+            steps=self._row,
+            running=self._running,
+            ctrl=first.ctrl[self._row],
+            resets=self._resets,
+            poses=tuple(poses),
+            gap=gap,
+            trouble="",
+        )
+
+    def _gap(self, poses: tuple[Pose, Pose], qpos: tuple[Array, Array]) -> Gap:
+        header = self.header
+        return gap_between(
+            header.joints,
+            header.jnt_type,
+            header.jnt_qposadr,
+            qpos,
+            (poses[0].tip, poses[1].tip),
+        )
+
+
+def _name(header: Header) -> str:
+    return header.backend + (", engine defaults" if header.defaults == "engine" else "")

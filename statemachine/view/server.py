@@ -1,0 +1,109 @@
+"""A quiet viser server that listens where it is told to and asks nobody for anything."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import io
+import logging
+import os
+import socket
+from types import ModuleType
+from typing import Any
+
+from ..errors import BadInputError, MissingEngineError
+
+LOOPBACK = "127.0.0.1"
+_PORTS = 100  # tried one after another
+
+
+def require_viser() -> ModuleType:
+    """The package viser.
+
+    Raises:
+        MissingEngineError: It is not installed; the message names the extra.
+    """
+    try:
+        import viser
+    except ImportError as error:
+        raise MissingEngineError(
+            f"view needs viser ({error}): pip install 'statemachine-sim[view]'", engine="viser"
+        ) from None
+    return viser
+
+
+def free_port(host: str, port: int) -> int:
+    """The first free port from this one on; 0 stands for any.
+
+    Raises:
+        BadInputError: It is no port, the host is no address of this machine, or all near it
+            are taken.
+    """
+    if not 0 <= port <= 65535:
+        raise BadInputError(f"port must be from 0 to 65535; got {port}")
+    if not host.strip():  # which would mean everywhere
+        raise BadInputError("host must be an address; 127.0.0.1 is this machine alone")
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+    except (OSError, UnicodeError) as error:
+        raise BadInputError(f"host {host!r} is no address: {error}") from None
+    last: OSError | None = None
+    for candidate in range(port, min(port + _PORTS, 65536)):
+        with socket.socket(family, kind, protocol) as trial:
+            if os.name == "posix":  # elsewhere this would take a port from its owner
+                trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                trial.bind((address[0], candidate, *address[2:]))
+            except OSError as error:
+                last = error
+                if isinstance(error, PermissionError) or not _is_taken(error):
+                    break
+            else:
+                return int(trial.getsockname()[1])
+    raise BadInputError(f"cannot listen on {host}, port {port}: {last}")
+
+
+def _is_taken(error: OSError) -> bool:
+    # Windows says WSAEADDRINUSE.
+    return error.errno in (errno.EADDRINUSE, 10048)
+
+
+def serve(host: str, port: int, label: str) -> Any:
+    """A viser server on a port that is free, without its banner and without its tunnel.
+
+    Raises:
+        MissingEngineError: viser is not installed.
+    """
+    viser = require_viser()
+    # Who connects and says nothing, as browsers do to be quick, is no news for a terminal.
+    logging.getLogger("websockets").addHandler(logging.NullHandler())
+    with _hush(), _without("_VISER_PORT_OVERRIDE"):
+        server = viser.ViserServer(host=host, port=port, label=label, verbose=False)
+    # A tab can ask viser to open a tunnel to a server of its makers: not from here.
+    server.request_share_url = lambda verbose=True: None
+    server.disconnect_share_url = lambda: None
+    return server
+
+
+def stop(server: Any) -> None:
+    """Close the connections and free the port; nothing is printed."""
+    with _hush():
+        server.stop()
+
+
+@contextlib.contextmanager
+def _hush() -> Any:
+    with contextlib.redirect_stdout(io.StringIO()):
+        yield
+
+
+@contextlib.contextmanager
+def _without(name: str) -> Any:
+    value = os.environ.pop(name, None)
+    try:
+        yield
+    finally:
+        if value is not None:
+            os.environ[name] = value

@@ -1,0 +1,200 @@
+"""The simulation behind a viewer: commands in, frames out; no clock, no thread, no screen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import TracebackType
+
+import numpy as np
+
+from ..errors import BadInputError, StateMachineError
+from ..interface import Data, Model
+from ..verbs import forward, make_data, reset, step
+from .frames import (
+    Command,
+    Frame,
+    Gap,
+    Pause,
+    Pose,
+    Reset,
+    Run,
+    SetCtrl,
+    Step,
+    controls_of,
+    gap_between,
+    tip_of,
+)
+
+_STEPS_MOST = 100_000  # of one press of a button
+
+
+class Session:
+    """One or two engines under the same commands, at the same steps.
+
+    Whoever makes it is the only one to touch its Data: what other threads want comes as
+    commands through a queue of theirs.
+
+    Attributes:
+        names: Of the engines.
+        controls: A slider for each actuator.
+        places: Where `Reset` can go: names of the keyframes, by number.
+        timestep: Simulated time of a step [s].
+        tip: The site that stands for the fingertip, or "".
+        length: Simulated time from first to last [s]; None: a simulation has no end.
+    """
+
+    length: float | None = None
+
+    def __init__(
+        self, models: Sequence[Model], keyframe: int | str | None = None, site: str | None = None
+    ) -> None:
+        """Make a Data on each engine and put it to its start; paused.
+
+        Args:
+            models: One Model, or the same file on two engines: the second is the ghost.
+            keyframe: Where to start; None for the default state.
+            site: What stands for the fingertip; see `tip_of`.
+
+        Raises:
+            UnknownNameError: There is no such keyframe or site.
+            BadInputError: The two are not the same model at the same timestep.
+        """
+        first = models[0]
+        for other in models[1:]:
+            if (other.nq, other.nu, other.nbody) != (first.nq, first.nu, first.nbody):
+                raise BadInputError(f"{other!r} is another model than {first!r}")
+            if other.timestep != first.timestep:
+                raise BadInputError(
+                    f"the timesteps differ: {first.timestep:g} s on {first.backend}, "
+                    f"{other.timestep:g} s on {other.backend}"
+                )
+        self.timestep = first.timestep
+        self.names = tuple(model.backend for model in models)
+        self.controls = controls_of(first)
+        self.places = tuple(k.name or f"keyframe {n}" for n, k in enumerate(first.keyframes))
+        self._site = tip_of(first, site)
+        self.tip = "" if self._site is None else first.site_names[self._site]
+        start = None if keyframe is None else first.key_id(keyframe)
+        self._arms: list[tuple[Model, Data]] = []
+        self._poses: tuple[Pose, ...] = ()
+        self._gap: Gap | None = None
+        self._time = 0.0
+        self._running, self._trouble, self._steps, self._resets = False, "", 0, 0
+        try:
+            for model in models:
+                self._arms.append((model, make_data(model)))
+            self._reset(start)
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def running(self) -> bool:
+        """Whether time is to go on by itself."""
+        return self._running
+
+    def apply(self, command: Command) -> None:
+        """Do what was asked for.
+
+        Raises:
+            BadInputError: A value is no number, or out of bounds; nothing is changed then.
+        """
+        match command:
+            case SetCtrl(index, value):
+                if not 0 <= index < len(self.controls) or not np.isfinite(value):
+                    raise BadInputError(f"actuator {index} cannot be set to {value}")
+                for _, data in self._arms:
+                    data.ctrl[index] = value
+            case Run():
+                self._running = not self._trouble
+            case Pause():
+                self._running = False
+            case Step(count):
+                if not 1 <= count <= _STEPS_MOST:
+                    raise BadInputError(f"steps must be from 1 to {_STEPS_MOST}; got {count}")
+                self._running = False
+                self.advance(count)
+            case Reset(keyframe):
+                self._reset(keyframe)
+            case _:
+                raise BadInputError(f"a simulation cannot do {command!r}")
+
+    def advance(self, count: int = 1) -> None:
+        """Take steps on every engine; one that fails stops them all until a reset."""
+        if self._trouble:
+            return
+        for model, data in self._arms:
+            try:
+                step(model, data, count)
+            except StateMachineError as error:
+                self._stop(model, error)
+        if not self._trouble:
+            self._steps += count
+
+    def frame(self) -> Frame:
+        """This moment; after an engine failed, the last one that was good.
+
+        Looking changes nothing: the run goes on as if nobody had looked.
+        """
+        if not self._trouble:
+            self._look()
+        return Frame(
+            time=self._time,
+            steps=self._steps,
+            running=self._running,
+            ctrl=np.array(self._arms[0][1].ctrl),
+            resets=self._resets,
+            poses=self._poses,
+            gap=self._gap,
+            trouble=self._trouble,
+        )
+
+    def _look(self) -> None:
+        poses = []
+        for model, data in self._arms:
+            try:
+                forward(model, data)
+            except StateMachineError as error:
+                self._stop(model, error)
+                return
+            tip = None if self._site is None else np.array(data.site_xpos[self._site])
+            poses.append(Pose(model.backend, np.array(data.xpos), np.array(data.xquat), tip))
+        self._poses = tuple(poses)
+        model, data = self._arms[0]
+        self._time = data.time
+        if len(self._arms) > 1:
+            self._gap = gap_between(
+                model.joint_names,
+                model.jnt_type.tolist(),
+                model.jnt_qposadr.tolist(),
+                (data.qpos, self._arms[1][1].qpos),
+                (poses[0].tip, poses[1].tip),
+            )
+
+    def _reset(self, keyframe: int | None) -> None:
+        if keyframe is not None and not 0 <= keyframe < len(self.places):
+            raise BadInputError(f"there is no keyframe {keyframe}")
+        for model, data in self._arms:
+            reset(model, data, keyframe)
+        self._trouble, self._steps = "", 0
+        self._resets += 1
+
+    def _stop(self, model: Model, error: StateMachineError) -> None:
+        self._running = False
+        self._trouble = self._trouble or f"{model.backend}: {error}"
+
+    def close(self) -> None:
+        """Give back what the engines hold. Idempotent."""
+        for _, data in self._arms:
+            data.close()
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()

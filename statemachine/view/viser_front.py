@@ -1,0 +1,303 @@
+"""The page: viser's scene and its sliders, fed by the loop. The only module that knows viser."""
+
+from __future__ import annotations
+
+import html
+import queue
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..drawing import Drawing, Part
+from . import words
+from .frames import Command, Frame, Pause, Reset, Run, Seek, SetCtrl, SetSpeed, Step
+from .live import Pace, Show
+from .pace import FASTEST, SLOWEST
+
+_GHOST = (0.20, 0.45, 0.95)  # the second engine, seen through
+_OPACITY = 0.45
+_THINNER = 1e-3  # of the extent: a ghost inside its twin is not seen where the two agree
+_DISTANCE = 1.1  # of the camera, in extents
+_ROUND = ("sphere", "capsule", "ellipsoid", "cylinder")  # shaded smoothly
+_SPAN = 0.1  # seconds between two readouts
+_HELD = 0.3  # seconds for which a slider is still in somebody's hand
+_DEFAULT = "default state"
+_DIM = "opacity:.65;padding-right:.8em;vertical-align:top"
+
+
+class ViserFront:
+    """A `Front` on a viser server. Tabs may come and go; all of them show the same."""
+
+    def __init__(
+        self,
+        server: Any,
+        session: Show,
+        drawing: Drawing,
+        speed: float = 1.0,
+        keyframe: int | None = None,
+    ) -> None:
+        """Build the scene and the controls.
+
+        Args:
+            server: From `server.serve`.
+            session: What will be shown.
+            drawing: What its model looks like.
+            speed: What the speed control starts with.
+            keyframe: Where the session began, by number.
+        """
+        self._server, self._session = server, session
+        # Callbacks come from viser's own thread: all they do is put a command in here.
+        self._asked: queue.SimpleQueue[Command] = queue.SimpleQueue()
+        self._frames: list[dict[int, Any]] = []
+        self._moved: dict[str, Any] = {}
+        self._resets, self._said, self._when, self._dragged = 0, "", 0.0, 0.0
+        with server.atomic():
+            self._build_scene(drawing)
+            self._build_panel(speed, keyframe)
+
+    def commands(self) -> Sequence[Command]:
+        """What was asked for since the last time."""
+        found: list[Command] = []
+        while True:
+            try:
+                found.append(self._asked.get_nowait())
+            except queue.Empty:
+                return found
+
+    def show(self, frame: Frame, pace: Pace, note: str) -> None:
+        """Move the bodies, and what stands beside them."""
+        with self._server.atomic():
+            for bodies, pose in zip(self._frames, frame.poses, strict=True):
+                for body, handle in bodies.items():
+                    self._place(handle, pose.xpos[body], pose.xquat[body])
+            if frame.resets != self._resets:
+                self._resets = frame.resets
+                self._follow(frame)
+            self._switch(frame)
+            self._say(frame, pace, note)
+
+    def _place(self, handle: Any, position: Any, turn: Any) -> None:
+        """Tell the tabs where a body is, if it moved."""
+        where = (position.tobytes(), turn.tobytes())
+        if self._moved.get(handle.name) != where:
+            self._moved[handle.name] = where
+            handle.position, handle.wxyz = position, turn
+
+    # The scene
+
+    def _build_scene(self, drawing: Drawing) -> None:
+        scene = self._server.scene
+        self._extent = drawing.extent
+        scene.world_axes.visible = False
+        scene.configure_default_lights(enabled=True, cast_shadow=True)
+        camera = self._server.initial_camera
+        camera.look_at = drawing.center
+        camera.position = drawing.eye(_DISTANCE * drawing.extent)
+        camera.up = (0.0, 0.0, 1.0)
+        for part in drawing.parts:
+            if part.body == 0:
+                self._add_fixed(part)
+        for number, name in enumerate(self._session.names):
+            root = f"/{_plain(name)}" + (" ghost" if number else "")
+            bodies = {}
+            for body in drawing.bodies:
+                if body:
+                    bodies[body] = scene.add_frame(f"{root}/{body}", show_axes=False)
+            for part in drawing.parts:
+                if part.body:
+                    self._add_part(part, f"{root}/{part.body}/{part.geom}", number > 0)
+            self._frames.append(bodies)
+
+    def _add_fixed(self, part: Part) -> None:
+        name = f"/world/{part.geom}"
+        if not part.endless or np.ptp(part.vertices[:, 2]) > 1e-6:
+            self._add_part(part, name, False)
+            return
+        cell = float(10.0 ** np.floor(np.log10(self._extent) - 0.5))
+        self._server.scene.add_grid(
+            name,
+            infinite_grid=True,
+            cell_size=cell,
+            section_size=10 * cell,
+            cell_thickness=0.6,
+            section_thickness=1.0,
+            fade_distance=20 * self._extent,
+            plane_color=_bytes(part.rgba),
+            plane_opacity=1.0,
+            position=(0.0, 0.0, float(part.vertices[0, 2])),
+        )
+
+    def _add_part(self, part: Part, name: str, ghost: bool) -> None:
+        opacity = _OPACITY if ghost else part.rgba[3]
+        vertices = thinner(part, _THINNER * self._extent) if ghost else part.vertices
+        self._server.scene.add_mesh_simple(
+            name,
+            vertices,
+            part.faces,
+            color=_bytes(_GHOST if ghost else part.rgba),
+            opacity=None if opacity >= 1 else opacity,
+            flat_shading=part.kind not in _ROUND,
+            cast_shadow=not ghost,
+            receive_shadow=not ghost,
+        )
+
+    # What stands beside it
+
+    def _build_panel(self, speed: float, keyframe: int | None) -> None:
+        gui, session = self._server.gui, self._session
+        gui.configure_theme(
+            show_logo=False, show_share_button=False, control_width="medium", dark_mode=False
+        )
+        self._readout = gui.add_html("")
+        self._switch_button = gui.add_button("Run", color="blue")
+        self._on_click(self._switch_button, self._toggle)
+        self._count = gui.add_number("steps", 1, min=1, max=100_000, step=1)
+        self._on_click(gui.add_button("Step"), lambda: Step(int(self._count.value)))
+        start = _DEFAULT if keyframe is None else session.places[keyframe]
+        places = (*session.places, _DEFAULT) if session.length is None else ("start",)
+        start = start if start in places else places[0]
+        self._places = gui.add_dropdown("to", places, initial_value=start)
+        self._on_click(gui.add_button("Reset"), self._reset)
+        self._speed = gui.add_number("speed ×", float(speed), min=SLOWEST, max=FASTEST, step=0.05)
+        self._on_update(self._speed, lambda: SetSpeed(float(self._speed.value)))
+        self._ghost: Any = None
+        if len(session.names) > 1:
+            self._ghost = gui.add_checkbox(f"ghost: {session.names[1]}", True)
+            self._on_update(self._ghost, self._show_ghost)
+        self._sliders: list[Any] = []
+        self._seek: Any = None
+        if session.length:
+            self._seek = gui.add_slider(
+                "seek [s]", 0.0, float(session.length), float(session.timestep), 0.0
+            )
+            self._on_update(self._seek, self._sought)
+        if session.controls:
+            with gui.add_folder("ctrl"):
+                for index in range(len(session.controls)):
+                    self._add_slider(index)
+
+    def _add_slider(self, index: int) -> None:
+        control = self._session.controls[index]
+        span = control.high - control.low
+        step = float(10 ** np.floor(np.log10(span / 500))) if span > 0 else 1.0
+        # Round figures to read; what they stand for stays in the range.
+        low, high = (_round(value, step) for value in (control.low, control.high))
+        label = f"{control.name} [{control.unit}]" if control.unit else control.name
+        slider = self._server.gui.add_slider(label, low, high, step, min(max(0.0, low), high))
+
+        def asked() -> Command:
+            value = min(max(float(slider.value), control.low), control.high)
+            return SetCtrl(index, value * control.scale)
+
+        self._on_update(slider, asked)
+        self._sliders.append(slider)
+
+    def _follow(self, frame: Frame) -> None:
+        """Put the sliders to commands that did not come from them."""
+        for index, slider in enumerate(self._sliders):
+            scale = self._session.controls[index].scale
+            shown = _round(float(frame.ctrl[index]) / scale, slider.step)
+            slider.value = min(max(shown, slider.min), slider.max)
+        self._follow_time(frame)
+
+    def _follow_time(self, frame: Frame) -> None:
+        # Not out of the hand of someone who drags it.
+        if self._seek is not None and time.monotonic() - self._dragged > _HELD:
+            self._seek.value = min(frame.steps * self._session.timestep, self._seek.max)
+
+    def _switch(self, frame: Frame) -> None:
+        label = "Pause" if frame.running else "Run"
+        if self._switch_button.label != label:
+            self._switch_button.label = label
+        if frame.running:
+            self._follow_time(frame)
+
+    def _say(self, frame: Frame, pace: Pace, note: str) -> None:
+        now = time.monotonic()
+        if frame.running and now - self._when < _SPAN:
+            return  # nobody reads faster
+        text = _page(words.rows(frame, pace, self._session.tip), words.warning(frame, note))
+        if text != self._said:
+            self._said, self._when = text, now
+            self._readout.content = text
+
+    # What comes back
+
+    def _toggle(self) -> Command:
+        return Pause() if self._switch_button.label == "Pause" else Run()
+
+    def _reset(self) -> Command:
+        place = self._places.value
+        places = self._session.places
+        return Reset(places.index(place) if place in places else None)
+
+    def _sought(self) -> Command:
+        self._dragged = time.monotonic()
+        return Seek(float(self._seek.value))
+
+    def _show_ghost(self) -> None:
+        for handle in self._frames[1].values():
+            handle.visible = bool(self._ghost.value)
+
+    def _on_click(self, button: Any, command: Callable[[], Command]) -> None:
+        # As coroutines they run one after another, in the order in which they came.
+        async def put(_event: Any) -> None:
+            self._asked.put(command())
+
+        button.on_click(put)
+
+    def _on_update(self, handle: Any, command: Callable[[], Command | None]) -> None:
+        async def put(event: Any) -> None:
+            if event.client_id is not None:  # not by `_follow`
+                asked = command()
+                if asked is not None:
+                    self._asked.put(asked)
+
+        handle.on_update(put)
+
+
+def _page(rows: Sequence[tuple[str, str]], warning: str) -> str:
+    cells = "".join(
+        f"<tr><td style='{_DIM}'>{html.escape(name)}</td><td>{html.escape(value)}</td></tr>"
+        for name, value in rows
+    )
+    trouble = (
+        f"<p role='alert' style='color:#b3261e;margin:.4em 0 0'>{html.escape(warning)}</p>"
+        if warning
+        else ""
+    )
+    return (
+        "<div style='padding:.5em .7em;font-size:.8em;line-height:1.5'>"
+        f"<table style='font-variant-numeric:tabular-nums;border-spacing:0'>{cells}</table>"
+        f"{trouble}</div>"
+    )
+
+
+def _bytes(rgb: Sequence[float]) -> tuple[int, int, int]:
+    r, g, b = (round(255 * min(max(value, 0.0), 1.0)) for value in rgb[:3])
+    return r, g, b
+
+
+def _round(value: float, step: float) -> float:
+    """The nearest multiple of a step that is a power of ten."""
+    return round(round(value / step) * step, 12)
+
+
+def thinner(part: Part, by: float) -> NDArray[np.float32]:
+    """The vertices (v, 3) of a part, moved inward along the normals of its faces [m]."""
+    corners = part.vertices[part.faces].astype(float)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sums = np.zeros((len(part.vertices), 3))
+    for corner in range(3):
+        np.add.at(sums, part.faces[:, corner], normals)
+    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
+    sums /= np.where(lengths > 0, lengths, 1)
+    return (part.vertices - by * sums).astype(np.float32)
+
+
+def _plain(name: str) -> str:
+    """A name for viser's tree, where slashes part."""
+    return name.replace("/", " ")

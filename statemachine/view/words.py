@@ -1,0 +1,58 @@
+"""What stands beside the picture: rows of a name and a value, free of how they are shown."""
+
+from __future__ import annotations
+
+import math
+
+from .frames import Frame
+from .live import Pace
+
+
+def rows(frame: Frame, pace: Pace, tip: str) -> list[tuple[str, str]]:
+    """The readout of one moment.
+
+    Args:
+        frame: The moment.
+        pace: How fast it goes.
+        tip: Name of the site that stands for the fingertip, or "".
+    """
+    found = [
+        ("time", f"{frame.time:.3f} s"),
+        ("steps", f"{frame.steps:,}"),
+        ("pace", _pace(frame, pace)),
+    ]
+    if tip:
+        found.append(("tip", tip))
+    for pose in frame.poses:
+        if pose.tip is not None:
+            where = "  ".join(f"{1000 * value:.1f}" for value in pose.tip)
+            found.append((f"on {pose.name}", f"{where} mm"))
+    if frame.gap is not None:
+        if frame.gap.tip is not None:
+            found.append(("tips apart", f"{1000 * frame.gap.tip:.3f} mm"))
+        if frame.gap.angle is not None:
+            far = (
+                f"{1000 * frame.gap.angle:.3f} mm"
+                if frame.gap.slide
+                else f"{math.degrees(frame.gap.angle):.3f}°"
+            )
+            found.append(("joints apart", f"{far}, {frame.gap.joint}"))
+    return found
+
+
+def _pace(frame: Frame, pace: Pace) -> str:
+    if not frame.running:
+        return "paused"
+    if pace.reached is None:
+        return "…"
+    text = f"{pace.reached:.2f} × real time"
+    if pace.late:
+        text += f"; {pace.asked:g} × is more than this machine gives"
+    return text
+
+
+def warning(frame: Frame, note: str) -> str:
+    """What is wrong, or ""."""
+    if frame.trouble:
+        return f"{frame.trouble}. Reset to go on."
+    return note

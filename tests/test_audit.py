@@ -1,0 +1,666 @@
+"""The audit: what is known of the engines' state, and faults that it must find."""
+
+from __future__ import annotations
+
+import dataclasses
+import gc
+import io
+import json
+import math
+import tempfile
+import threading
+import warnings
+from collections.abc import Callable, Iterable
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.cells import cell_len
+
+import statemachine as sm
+from statemachine import audit
+from statemachine.audit import apart, elsewhere, look, repeat, restore
+from statemachine.audit.conclusions import conclude
+from statemachine.audit.drivers import Driver, Run, drivers
+from statemachine.audit.drivers.mujoco_driver import MujocoDriver
+from statemachine.audit.findings import Finding, Gap, Layout, gap
+from statemachine.audit.points import points
+from statemachine.backends import mujoco_backend
+from statemachine.backends.mujoco_backend import MujocoData
+from statemachine.cli import main
+from statemachine.engines import require
+from statemachine.errors import BadInputError
+from statemachine.report import audit as report
+
+from .conftest import Cli, need_engine, registered
+
+SCENE = "so101/scene_box"
+Patch = Callable[[pytest.MonkeyPatch], None]
+
+
+# Gaps, against closed forms.
+
+HINGE, FREE = Layout((0,), (), ()), Layout((), (0, 1, 2), (3,))
+
+
+def test_what_is_compared_are_bytes() -> None:
+    zero = np.zeros((4, 2))
+    other = zero.copy()
+    assert gap(zero, other, HINGE).exact
+    other[2, 1] = -0.0
+    assert gap(zero, other, HINGE) == Gap(3, 2, 0.0, 0.0)
+    other[2, 1] = 5e-324  # the last bit
+    assert gap(zero, other, HINGE).first == 2
+    lost = np.full((4, 2), math.nan)
+    assert gap(lost, lost, HINGE).exact
+    assert gap(zero, lost, HINGE).angle == math.inf
+
+
+def test_the_first_row_is_before_any_step() -> None:
+    one, other = np.zeros((3, 2)), np.ones((3, 2))
+    assert gap(one, other, HINGE).first == 0
+    assert gap(one, other, HINGE, np.array([0, 7, 8])) == Gap(8, 0, 1.0, 0.0)
+    other[0] = 0
+    assert gap(one, other, HINGE, np.array([0, 7, 8])).first == 7
+
+
+@pytest.mark.parametrize("angle", [1e-9, 0.3, 3.0])
+def test_quaternions_are_apart_by_their_angle(angle: float) -> None:
+    one = np.array([[0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0]])
+    other = one.copy()
+    other[0, 3:] = math.cos(angle / 2), 0.0, math.sin(angle / 2), 0.0
+    assert gap(one, other, FREE).angle == pytest.approx(angle, rel=1e-6)
+    other[0, 3:] *= -1
+    off = gap(one, other, FREE)
+    assert off.angle == pytest.approx(angle, rel=1e-6)
+    assert off.length == 0
+    other = one.copy()
+    other[0, 1] += 0.25
+    assert gap(one, other, FREE).length == pytest.approx(0.25)
+
+
+# What is known of the engines.
+
+
+@pytest.fixture(scope="module")
+def of_mujoco() -> audit.Audit:
+    return audit.run(sm.load(SCENE), steps=40)
+
+
+@pytest.fixture(scope="module")
+def of_pybullet() -> audit.Audit:
+    need_engine("pybullet")
+    return audit.run(sm.load(SCENE, backend="pybullet"), steps=40)
+
+
+def test_mujoco_needs_its_warm_start_in_contact(of_mujoco: audit.Audit) -> None:
+    engine, interface = of_mujoco.audited
+    found = engine.conclusion
+    assert found.suffice == ("mjSTATE_INTEGRATION", "mj_copyData")
+    assert interface.conclusion.suffice == ("get_state, set_state",)
+    missing = {each.field: each for each in found.missing}
+    assert set(missing) == {
+        "time",
+        "qpos",
+        "qvel",
+        "warmstart",
+        "ctrl",
+        "qfrc_applied",
+        "xfrc_applied",
+    }
+    assert found.smallest is True
+    assert found.idle == ()
+    assert missing["warmstart"].points == ("default", "keyframe", "limp", "limit", "clock")
+    assert missing["warmstart"].gap.first == 1
+    assert 0 < missing["warmstart"].gap.size < 1e-6
+    # Only where a controller reads it.
+    assert missing["time"].points == ("clock",)
+    # What only others write into is there again, in the run itself.
+    assert {name for name, each in missing.items() if each.itself} == {
+        "time",
+        "qpos",
+        "qvel",
+        "warmstart",
+    }
+
+
+def test_mujoco_is_tried_where_it_should_be(of_mujoco: audit.Audit) -> None:
+    seen = {each.point: each for each in of_mujoco.audited[0].points}
+    assert seen["default"].speed < 1e-6
+    assert seen["motion"].contacts == 0
+    assert seen["motion"].speed > 1
+    assert seen["keyframe"].contacts > 0
+    assert seen["limp"].contacts > 0
+    assert seen["limit"].limits
+    assert of_mujoco.without == ()
+    assert of_mujoco.holds
+
+
+@pytest.mark.slow
+def test_pybullet_forgets_its_contacts(of_pybullet: audit.Audit) -> None:
+    engine, interface = of_pybullet.audited
+    found = engine.conclusion
+    assert found.suffice == ()
+    assert set(found.agree) == {"saveState + targets", "taken apart + targets"}
+    assert set(found.in_contact) >= {"keyframe"}
+    assert "motion" not in found.in_contact
+    for way in ("written", "saveState", "saveBullet"):
+        assert "motor targets" in found.forgotten[way]
+        assert "a waiting force" in found.forgotten[way]
+    exact = {
+        each.point
+        for each in engine.findings
+        if each.experiment == restore.RESTORE
+        and each.case == "saveState + targets"
+        and each.gap.exact
+    }
+    assert "motion" in exact
+    assert [line.partition(":")[0] for line in of_pybullet.without] == ["limit"]
+    assert interface.conclusion.suffice == ()
+    assert "get_state, set_state" in interface.conclusion.agree
+    assert of_pybullet.holds
+
+
+COMMON = {"again", "look", "two at once", "restore", "threads", "process"}
+
+
+def _experiments(one: audit.Audited) -> set[str]:
+    assert all(each.gap.steps > 0 for each in one.findings)
+    return {each.experiment for each in one.findings}
+
+
+def test_everything_is_asked_of_mujoco(of_mujoco: audit.Audit) -> None:
+    engine, interface = of_mujoco.audited
+    assert _experiments(engine) == COMMON | {"reset", "step(n)", "pools", "leave one out"}
+    assert _experiments(interface) == COMMON | {"reset", "step(n)", "pickled State"}
+
+
+@pytest.mark.slow
+def test_everything_is_asked_of_pybullet(of_pybullet: audit.Audit) -> None:
+    engine, interface = of_pybullet.audited
+    assert _experiments(engine) == COMMON | {"forgets", "contacts off"}
+    assert _experiments(interface) == COMMON | {"reset", "step(n)", "pickled State"}
+
+
+MODELS = {
+    "a box": '<freejoint/><geom type="box" size=".05 .06 .07"/>',
+    "a ball joint": '<joint type="ball"/><geom type="capsule" fromto="0 0 0 .3 0 0" size=".03"/>',
+    "a hinge": '<joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 .3 0 0" size=".03"/>',
+}
+
+
+@pytest.mark.parametrize("body", MODELS)
+def test_any_model_has_save_points(body: str, tmp_path: Path) -> None:
+    file = tmp_path / "model.xml"
+    file.write_text(
+        '<mujoco><worldbody><geom type="plane" size="3 3 1"/><body pos="0 0 .5">'
+        f"{MODELS[body]}</body></worldbody></mujoco>"
+    )
+    result = audit.run(sm.load(file), steps=20)
+    assert result.holds
+    assert {each.point for each in result.audited[0].points} == {"default", "motion"}
+    assert {line.partition(":")[0] for line in result.without} == {
+        "keyframe",
+        "limp",
+        "limit",
+        "clock",
+    }
+    assert "mjSTATE_INTEGRATION" in result.audited[0].conclusion.suffice
+    assert result.audited[0].conclusion.smallest is True
+
+
+def test_components_of_other_models_are_tried(tmp_path: Path) -> None:
+    file = tmp_path / "model.xml"
+    file.write_text(
+        """<mujoco><worldbody><body name="m" mocap="true" pos="1 0 1"><geom size=".05"/></body>
+        <body pos="0 0 1"><joint name="j" axis="0 1 0"/><geom size=".05" pos=".3 0 0"/></body>
+        <body name="f" pos="0 -1 .5"><freejoint/><geom size=".05"/></body></worldbody>
+        <equality><weld body1="f" body2="m"/></equality><actuator>
+        <general joint="j" dyntype="filter" dynprm=".1" gainprm="5"/></actuator></mujoco>"""
+    )
+    found = audit.run(sm.load(file), steps=20).audited[0].conclusion
+    assert {"act", "eq_active", "mocap_pos"} <= {each.field for each in found.missing}
+    assert found.smallest is True
+
+
+def test_a_model_without_anything_that_moves_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "model.xml"
+    file.write_text('<mujoco><worldbody><geom size="1"/></worldbody></mujoco>')
+    with pytest.raises(BadInputError, match="nothing moves"):
+        audit.run(sm.load(file))
+
+
+def test_where_a_run_diverges_it_is_not_saved(tmp_path: Path) -> None:
+    file = tmp_path / "model.xml"
+    file.write_text(
+        """<mujoco><worldbody><body>
+        <joint name="j" axis="0 1 0" stiffness="-3e4" damping="10"/>
+        <geom size=".1" pos=".3 0 0"/></body></worldbody>
+        <actuator><position joint="j" kp="9e4" ctrlrange="-1 1"/></actuator></mujoco>"""
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # nothing is said of it but that
+        result = audit.run(sm.load(file), steps=20)
+    assert result.holds
+    assert {each.point for each in result.audited[0].points} == {"default", "motion", "clock"}
+    assert "limp: the run diverges" in result.without
+
+
+def test_a_backend_without_a_driver_is_audited_through_the_interface() -> None:
+    with registered("hidden", "tests.hidden_world:load") as name:
+        result = audit.run(sm.load(SCENE, backend=name), steps=10)
+    assert [each.layer for each in result.audited] == ["interface"]
+    assert result.holds
+    page = report.page({name: result})
+    assert page.holds
+
+
+# Faults. Each is put into an engine or a backend, and one question must notice it.
+
+QUESTIONS = {
+    "again": repeat.again,
+    "reset": repeat.after_reset,
+    "step(n)": repeat.pieces,
+    "look": look.ask,
+    "two at once": apart.beside,
+    "restore": restore.ask,
+}
+
+
+def asked(
+    question: str, backend: str = "mujoco", only: Iterable[str] = ("keyframe", "limp")
+) -> list[Finding]:
+    """What a question finds of an engine and of the interface to it, in few steps."""
+    model = sm.load(SCENE, backend=backend)
+    places = tuple(point for point in points(model, 0)[0] if point.name in only)
+    found: list[Finding] = []
+    for driver in drivers(model, 0):
+        for point in places:
+            found += QUESTIONS[question](driver, driver.run(point, 30))
+    return found
+
+
+def broken(findings: Iterable[Finding]) -> set[tuple[str, str]]:
+    """Layer and case of all that is promised and does not hold."""
+    return {(each.layer, each.case) for each in findings if not each.holds}
+
+
+def before(name: str, act: Callable[[MujocoData], None]) -> Patch:
+    """A fault in a method of MujocoData: something happens first."""
+
+    def apply(monkeypatch: pytest.MonkeyPatch) -> None:
+        right = getattr(MujocoData, name)
+
+        def faulty(self: MujocoData, *arguments: Any) -> Any:
+            act(self)
+            return right(self, *arguments)
+
+        monkeypatch.setattr(MujocoData, name, faulty)
+
+    return apply
+
+
+def after(name: str, act: Callable[[MujocoData], None]) -> Patch:
+    """A fault in a method of MujocoData: something happens at its end."""
+
+    def apply(monkeypatch: pytest.MonkeyPatch) -> None:
+        right = getattr(MujocoData, name)
+
+        def faulty(self: MujocoData, *arguments: Any) -> Any:
+            result = right(self, *arguments)
+            act(self)
+            return result
+
+        monkeypatch.setattr(MujocoData, name, faulty)
+
+    return apply
+
+
+def nudge(data: Any) -> None:
+    """The smallest change there is, of one velocity."""
+    raw = data.raw if isinstance(data, sm.Data) else data
+    raw.qvel[0] = np.nextafter(raw.qvel[0], 10.0)
+
+
+def forget_warm_start(data: MujocoData) -> None:
+    data.raw.qacc_warmstart[:] = 0
+
+
+def leave_a_force(data: MujocoData) -> None:
+    data.raw.qfrc_applied[1] = 1e-9
+
+
+def forward_of_the_engine_perturbs(monkeypatch: pytest.MonkeyPatch) -> None:
+    mj = require("mujoco")
+    right = mj.mj_forward
+
+    def faulty(model: Any, data: Any) -> None:
+        right(model, data)
+        nudge(data)
+
+    monkeypatch.setattr(mj, "mj_forward", faulty)
+
+
+def bulk_of_the_engine_is_one_short(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = MujocoDriver.advance
+
+    def faulty(self: MujocoDriver, machine: Any, nstep: int = 1) -> None:
+        right(self, machine, max(1, nstep - 1))
+
+    monkeypatch.setattr(MujocoDriver, "advance", faulty)
+
+
+def bulk_is_one_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = mujoco_backend._transition
+
+    def faulty(model: Any, raw: Any) -> Callable[..., None]:
+        step = right(model, raw)
+        return lambda nstep=1: step(nstep + (nstep > 1))
+
+    monkeypatch.setattr(mujoco_backend, "_transition", faulty)
+
+
+def noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Something decides the future that is nobody's state."""
+    hidden = np.random.default_rng()
+    right = MujocoDriver.advance
+
+    def faulty(self: MujocoDriver, machine: Any, nstep: int = 1) -> None:
+        machine.data.qvel[0] += 1e-12 * hidden.random()
+        right(self, machine, nstep)
+
+    monkeypatch.setattr(MujocoDriver, "advance", faulty)
+
+
+def one_disturbs_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever is stepped after another one feels it."""
+    last: list[Any] = [None]
+    right = mujoco_backend._transition
+
+    def faulty(model: Any, raw: Any) -> Callable[..., None]:
+        step = right(model, raw)
+
+        def stepped(nstep: int = 1) -> None:
+            if last[0] is not raw and raw.time > 0.21:  # neither is on its way to the start
+                nudge(raw)
+            last[0] = raw
+            step(nstep)
+
+        return stepped
+
+    monkeypatch.setattr(mujoco_backend, "_transition", faulty)
+
+
+STATE = "get_state, set_state"
+FAULTS: dict[str, tuple[str, Patch, tuple[str, str]]] = {
+    "a restore forgets the warm start": (
+        "restore",
+        after("_set_state", forget_warm_start),
+        ("interface", STATE),
+    ),
+    "a restore leaves a force": (
+        "restore",
+        after("_set_state", leave_a_force),
+        ("interface", STATE),
+    ),
+    "a save perturbs": ("look", after("_get_state", nudge), ("interface", "get_state")),
+    "forward perturbs": ("look", after("_recompute", nudge), ("interface", "forward")),
+    "forward of the engine perturbs": (
+        "look",
+        forward_of_the_engine_perturbs,
+        ("engine", "mj_forward"),
+    ),
+    "forward takes a step": (
+        "look",
+        before("_recompute", lambda data: data._advance()),
+        ("interface", "forward"),
+    ),
+    "a read perturbs": (
+        "look",
+        after("_find_contacts", nudge),
+        ("interface", "reading what is derived"),
+    ),
+    "several steps are one too many": ("step(n)", bulk_is_one_long, ("interface", "step(n)")),
+    "several steps of the engine are one too few": (
+        "step(n)",
+        bulk_of_the_engine_is_one_short,
+        ("engine", "step(n)"),
+    ),
+    "reset leaves a force": (
+        "reset",
+        after("_reset", leave_a_force),
+        ("interface", "a used one, reset"),
+    ),
+    "the engine is not deterministic": ("again", noise, ("engine", "in a new one")),
+    "one Data disturbs another": (
+        "two at once",
+        one_disturbs_the_other,
+        ("interface", "turn by turn with another"),
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_is_found(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    question, apply, finder = FAULTS[fault]
+    apply(monkeypatch)
+    assert finder in broken(asked(question))
+
+
+@pytest.mark.parametrize("question", QUESTIONS)
+def test_without_a_fault_nothing_is_found(question: str, backend: str) -> None:
+    found = asked(question, backend)
+    assert found
+    assert broken(found) == set()
+
+
+def test_an_engine_whose_restore_drops_the_warm_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the engine itself it is a fact; of the interface on it, a broken promise."""
+    mj = require("mujoco")
+    right = mj.mj_setState
+
+    def faulty(model: Any, data: Any, *rest: Any) -> None:
+        right(model, data, *rest)
+        data.qacc_warmstart[:] = 0
+
+    monkeypatch.setattr(mj, "mj_setState", faulty)
+    found = asked("restore")
+    engine = conclude([each for each in found if each.layer == "engine"])
+    assert engine.suffice == ("mj_copyData",)
+    assert "mjSTATE_INTEGRATION" in engine.fail
+    assert broken(found) == {("interface", STATE)}
+
+
+def test_a_restore_of_pybullet_that_depends_on_the_past(monkeypatch: pytest.MonkeyPatch) -> None:
+    need_engine("pybullet")
+    from statemachine.backends._bullet_world import World
+
+    monkeypatch.setattr(World, "place", World.put)
+    found = asked("restore", "pybullet", only=("keyframe",))
+    assert broken(found) == {("interface", STATE)}
+    among = {each.into for each in found if not each.holds}
+    assert among == {"each other"}
+    engine = conclude([each for each in found if each.layer == "engine"])
+    assert "taken apart + targets" not in engine.agree
+
+
+def test_a_read_of_pybullet_that_perturbs(monkeypatch: pytest.MonkeyPatch) -> None:
+    need_engine("pybullet")
+    pb: Any = require("pybullet")
+    right = pb.getContactPoints
+
+    def faulty(**named: Any) -> Any:
+        pb.setGravity(0, 0, -9.80000001, named["physicsClientId"])
+        return right(**named)
+
+    monkeypatch.setattr(pb, "getContactPoints", faulty)
+    assert ("engine", "getContactPoints") in broken(asked("look", "pybullet", only=("limp",)))
+
+
+def test_a_thread_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = MujocoDriver.advance
+
+    def faulty(self: MujocoDriver, machine: Any, nstep: int = 1) -> None:
+        if threading.current_thread() is not threading.main_thread():
+            nudge(machine.data)
+        right(self, machine, nstep)
+
+    def found() -> list[Finding]:
+        driver, runs = _engine()
+        return list(apart.threads(driver, runs))
+
+    assert broken(found()) == set()
+    monkeypatch.setattr(MujocoDriver, "advance", faulty)
+    assert broken(found()) == {("engine", "a pool of 4 threads")}
+
+
+def _engine() -> tuple[Driver, tuple[Run, ...]]:
+    model = sm.load(SCENE)
+    driver = drivers(model, 0)[0]
+    return driver, tuple(
+        driver.run(point, 30) for point in points(model, 0)[0] if point.name == "keyframe"
+    )
+
+
+def test_a_pool_of_the_engine_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
+    driver, runs = _engine()
+    assert broken(apart.pools(driver, runs[0])) == set()
+    right = driver.pools
+
+    def faulty() -> dict[str, Any]:
+        def cold(point: Any, steps: int) -> Any:
+            return [future + 1e-15 for future in right()["mujoco.batch, 2 threads"](point, steps)]
+
+        return {"cold": cold}
+
+    monkeypatch.setattr(driver, "pools", faulty)
+    assert broken(apart.pools(driver, runs[0])) == {("engine", "cold")}
+
+
+def test_another_process_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
+    """This one does, always in the same way: only the other one can tell."""
+    after("_set_state", leave_a_force)(monkeypatch)
+    right = MujocoDriver.start
+
+    def faulty(self: MujocoDriver, machine: Any, point: Any) -> None:
+        right(self, machine, point)
+        machine.data.qfrc_applied[1] = 1e-9
+
+    monkeypatch.setattr(MujocoDriver, "start", faulty)
+    result = audit.run(sm.load(SCENE), steps=10)
+    engine, interface = result.audited
+    assert {each.experiment for each in engine.findings if not each.holds} == {"process"}
+    assert "pickled State" in {each.experiment for each in interface.findings if not each.holds}
+    page = report.page({"mujoco": result})
+    assert not page.holds
+
+
+def test_a_process_that_fails_is_one_line() -> None:
+    job = elsewhere.Job(sm.load(SCENE), -1, 10, {})  # no seed
+    with pytest.raises(sm.errors.EngineError, match="a fresh process failed: ValueError"):
+        elsewhere.run(job)
+
+
+# Conclusions follow from findings, and a page from conclusions.
+
+
+def test_conclusions_follow_from_findings(of_mujoco: audit.Audit) -> None:
+    """Another engine would get other sentences."""
+    engine = of_mujoco.audited[0]
+
+    def without_warm_start(each: Finding) -> Finding:
+        if each.case == "warmstart":
+            return dataclasses.replace(each, gap=Gap(each.gap.steps, None, 0.0, 0.0))
+        return each
+
+    changed = [without_warm_start(each) for each in engine.findings]
+    found = conclude(changed)
+    assert found.idle == ("warmstart",)
+    other = dataclasses.replace(engine, findings=tuple(changed), conclusion=found)
+    texts = _text(dataclasses.replace(of_mujoco, audited=(other,)))
+    assert "without warmstart nothing differed" in texts
+    assert "without warmstart" not in _text(of_mujoco)
+
+
+def _text(result: audit.Audit) -> str:
+    from statemachine.report import terminal
+
+    with redirect_stdout(io.StringIO()) as out:
+        terminal.show(report.page({"x": result}))
+    return " ".join(out.getvalue().split())
+
+
+def test_the_page_says_what_suffices(of_mujoco: audit.Audit) -> None:
+    page = _text(of_mujoco)
+    assert "the state that suffices: mjSTATE_INTEGRATION or mj_copyData" in page
+    assert "warmstart (not at motion)" in page
+    assert "time (only at clock)" in page
+    assert "These alone suffice" in page
+    assert "✗" not in page
+
+
+@pytest.mark.slow
+def test_the_page_says_that_nothing_suffices(of_pybullet: audit.Audit) -> None:
+    page = _text(of_pybullet)
+    assert "itself: no candidate suffices" in page
+    assert "what cannot be written acts through contacts" in page
+    assert "✗" not in page
+
+
+# The command.
+
+
+@pytest.mark.slow
+def test_the_command_fits_the_terminal(cli: Cli, backend: str) -> None:
+    done = cli("audit", "--steps", "10", "--backend", backend)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    lines = done.stdout.splitlines()
+    assert max(map(cell_len, lines)) <= 80
+    assert "nan" not in done.stdout.lower().split()
+    assert backend in lines[2]
+
+
+def test_the_command_speaks_json(cli: Cli) -> None:
+    done = cli("audit", "--steps", "10", "--json", "--seed", "3")
+    assert done.returncode == 0
+    found = json.loads(done.stdout, parse_constant=pytest.fail)["mujoco"]
+    assert found["holds"] is True
+    assert found["provenance"]["seed"] == 3
+    row = found["audited"][0]["findings"][0]
+    assert row.keys() >= {"experiment", "layer", "point", "case", "into", "verdict", "gap"}
+    assert row["gap"].keys() >= {"steps", "first", "angle", "length"}
+
+
+def test_a_broken_promise_is_exit_code_1(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    after("_set_state", forget_warm_start)(monkeypatch)
+    assert main(["audit", "--steps", "10"]) == 1
+    assert "✗ this interface on mujoco: get_state, set_state" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("wrong", [("--steps", "0"), ("--seed=-1",), ("--backend", "mujcoo")])
+def test_bad_input_is_one_line(cli: Cli, wrong: tuple[str, ...]) -> None:
+    done = cli("audit", *wrong)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.slow
+def test_no_file_and_no_world_stay(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    need_engine("pybullet")
+    pb: Any = require("pybullet")
+
+    def worlds() -> set[int]:
+        gc.collect()
+        return {client for client in range(1024) if pb.isConnected(client)}
+
+    before = worlds()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    audit.run(sm.load(SCENE, backend="pybullet"), steps=5)
+    assert worlds() == before
+    assert list(tmp_path.iterdir()) == []

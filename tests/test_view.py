@@ -1,0 +1,717 @@
+"""The viewer without a browser: the session, the clock, the loop, the words, the server."""
+
+from __future__ import annotations
+
+import math
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.errors import BadInputError, TraceError, UnknownNameError
+from statemachine.traces import record, write
+from statemachine.view import frames, words
+from statemachine.view.frames import (
+    Command,
+    Frame,
+    Pause,
+    Reset,
+    Run,
+    Seek,
+    SetCtrl,
+    SetSpeed,
+    Step,
+    controls_of,
+    tip_of,
+)
+from statemachine.view.live import Live, Pace
+from statemachine.view.pace import Pacer
+from statemachine.view.recording import Recording
+from statemachine.view.session import Session
+
+from .conftest import ROOT, Cli, need_engine
+
+SCENE = "so101/scene_box"
+# A hinge and a slide, motors and servos, one with no range anywhere.
+ODD = """
+<mujoco>
+  <option timestep="0.01"/>
+  <worldbody>
+    <body name="a"><joint name="turn" range="-90 90" limited="true"/><geom size=".1" mass="1"/>
+      <body name="b" pos="1 0 0"><joint name="push" type="slide" axis="1 0 0"/>
+        <geom size=".1" mass="1"/><site name="end" pos=".5 0 0"/></body></body>
+  </worldbody>
+  <actuator>
+    <position name="aim" joint="turn" kp="10"/>
+    <position joint="push" kp="10" ctrlrange="-.2 .3"/>
+    <motor name="wild" joint="push" gear="1e200" ctrlrange="-1e150 1e150"/>
+    <motor name="free" joint="turn"/>
+  </actuator>
+</mujoco>
+"""
+
+
+@pytest.fixture
+def odd(tmp_path: Path) -> sm.Model:
+    (tmp_path / "odd.xml").write_text(ODD)
+    return sm.load(tmp_path / "odd.xml")
+
+
+@pytest.fixture
+def session(backend: str) -> Iterator[Session]:
+    with Session([sm.load(SCENE, backend=backend)], "held") as made:
+        yield made
+
+
+# The session
+
+
+def test_a_session_is_the_plain_loop_and_looking_changes_nothing(backend: str) -> None:
+    """Bit by bit, with the box in the jaws, seen after every step and never."""
+    model = sm.load(SCENE, backend=backend)
+    with sm.make_data(model) as plain, Session([model], "held") as session:
+        sm.reset(model, plain, "held")
+        frame = session.frame()
+        for k in range(150):
+            if k == 50:
+                plain.ctrl[0] = 0.3
+                session.apply(SetCtrl(0, 0.3))
+            sm.step(model, plain)
+            session.advance()
+            frame = session.frame()
+        data = session._arms[0][1]
+        for name in ("qpos", "qvel", "ctrl"):
+            np.testing.assert_array_equal(getattr(plain, name), getattr(data, name))
+        sm.forward(model, plain)
+        np.testing.assert_array_equal(frame.poses[0].xpos, plain.xpos)
+        np.testing.assert_array_equal(frame.poses[0].xquat, plain.xquat)
+        tip = frame.poses[0].tip
+        assert tip is not None
+        np.testing.assert_array_equal(tip, plain.site_xpos[model.site_id("gripperframe")])
+        assert (frame.time, frame.steps) == (plain.time, 150)
+
+
+def test_a_frame_is_a_copy(session: Session) -> None:
+    frame = session.frame()
+    before = frame.poses[0].xpos.copy(), frame.ctrl.copy()
+    session.apply(SetCtrl(0, 1.0))
+    session.advance(20)
+    session.frame()
+    np.testing.assert_array_equal(frame.poses[0].xpos, before[0])
+    np.testing.assert_array_equal(frame.ctrl, before[1])
+
+
+def test_commands_do_what_they_say(session: Session) -> None:
+    start = session.frame()
+    assert not start.running
+    assert session.places == ("held", "pickup")
+    assert start.time == 6
+    session.apply(Run())
+    assert session.frame().running
+    session.apply(Step(7))
+    frame = session.frame()
+    assert (frame.running, frame.steps) == (False, 7)
+    assert frame.time == pytest.approx(6 + 7 * session.timestep)
+    session.apply(Run())
+    session.apply(Pause())
+    assert not session.frame().running
+    session.apply(Reset(1))
+    assert session.frame().time == 59.522
+    assert session.frame().steps == 0
+    session.apply(Reset())
+    assert session.frame().time == 0
+    assert session.frame().resets == start.resets + 2
+    np.testing.assert_array_equal(session.frame().ctrl, 0)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        SetCtrl(0, math.nan),
+        SetCtrl(6, 0.0),
+        SetCtrl(-1, 0.0),
+        Step(0),
+        Step(10**9),
+        Reset(2),
+        Reset(-1),
+        Seek(1.0),
+    ],
+)
+def test_what_cannot_be_done_is_refused_and_changes_nothing(command: Command) -> None:
+    with Session([sm.load(SCENE)], "held") as session:
+        session.apply(Run())
+        before = session.frame()
+        with pytest.raises(BadInputError):
+            session.apply(command)
+        after = session.frame()
+        assert (after.time, after.running, after.resets) == (before.time, True, before.resets)
+        np.testing.assert_array_equal(after.ctrl, before.ctrl)
+
+
+def test_the_ghost_gets_the_same_commands_at_the_same_steps() -> None:
+    need_engine("pybullet")
+    models = [sm.load(SCENE, backend=name) for name in ("mujoco", "pybullet")]
+    with Session(models) as session:
+        session.apply(SetCtrl(1, -0.6))
+        session.apply(SetCtrl(2, 1.2))
+        session.advance(300)
+        frame = session.frame()
+        assert [pose.name for pose in frame.poses] == ["mujoco", "pybullet"] == list(session.names)
+        one, two = (data for _, data in session._arms)
+        np.testing.assert_array_equal(one.ctrl, two.ctrl)
+        assert one.time == pytest.approx(two.time)
+        assert one.qpos[2] > 1.0  # it went there, on both
+        gap = frame.gap
+        assert gap is not None
+        assert gap.tip is not None
+        assert gap.angle is not None
+        tips = [pose.tip for pose in frame.poses]
+        assert tips[0] is not None
+        assert tips[1] is not None
+        assert gap.tip == math.dist(tips[0], tips[1])
+        apart = np.abs(one.qpos - two.qpos)[:6]  # what follows is the box
+        assert gap.angle == apart.max()
+        assert gap.joint == models[0].joint_names[int(apart.argmax())]
+        assert gap.angle < math.radians(1)
+
+
+def test_a_ghost_that_falls_is_far_away() -> None:
+    model = sm.load("so101/scene")
+    with Session([model, model.replace(actuation=False)]) as session:
+        session.advance(200)
+        gap = session.frame().gap
+        assert gap is not None
+        assert gap.angle is not None
+        assert gap.joint == "shoulder_lift"
+        assert 20 < math.degrees(gap.angle) < 30  # 23.9°, as the lesson has it
+        assert gap.tip is not None
+        assert gap.tip > 0.1
+
+
+def test_a_divergence_pauses_and_a_reset_recovers(odd: sm.Model) -> None:
+    with Session([odd, odd]) as session:
+        session.advance(3)
+        good = session.frame()
+        session.apply(Run())
+        session.apply(SetCtrl(2, 1e150))
+        session.advance(5)
+        bad = session.frame()
+        assert not bad.running
+        assert bad.trouble.startswith("mujoco: ")
+        assert bad.time == good.time  # the last moment that was good
+        assert bad.steps == good.steps
+        np.testing.assert_array_equal(bad.poses[0].xpos, good.poses[0].xpos)
+        session.apply(Run())
+        assert not session.running
+        session.apply(Step(3))
+        assert session.frame().trouble == bad.trouble
+        session.apply(Reset())
+        session.advance(3)
+        again = session.frame()
+        assert again.trouble == ""
+        assert again.steps == 3
+        np.testing.assert_array_equal(again.poses[0].xpos, good.poses[0].xpos)
+
+
+def test_a_divergence_on_the_ghost_alone_stops_both() -> None:
+    need_engine("pybullet")
+    models = [sm.load("so101/scene", backend=name) for name in ("mujoco", "pybullet")]
+    with Session(models) as session:
+        session._arms[1][1].qvel[0] = math.nan
+        session.apply(Run())
+        session.advance()
+        assert not session.running
+        assert session.frame().trouble.startswith("pybullet: ")
+        session.apply(Reset())
+        session.advance(10)
+        assert session.frame().trouble == ""
+
+
+def test_a_session_refuses_what_does_not_fit(odd: sm.Model) -> None:
+    scene = sm.load("so101/scene")
+    with pytest.raises(BadInputError, match="another model"):
+        Session([scene, odd])
+    with pytest.raises(BadInputError, match="timesteps differ"):
+        Session([scene, scene.replace(timestep=0.001)])
+    with pytest.raises(UnknownNameError, match="hled"):
+        Session([sm.load(SCENE)], "hled")
+    with pytest.raises(UnknownNameError):
+        Session([scene], site="nose")
+
+
+def test_sliders_speak_degrees_where_an_angle_is_asked_for(odd: sm.Model) -> None:
+    arm = controls_of(sm.load("so101"))
+    assert [c.name for c in arm][:2] == ["shoulder_pan", "shoulder_lift"]
+    assert {c.unit for c in arm} == {"°"}
+    assert (arm[1].low, arm[1].high) == pytest.approx((-100, 100), abs=1e-3)
+    assert arm[1].scale * 180 == pytest.approx(math.pi)
+    aim, push, wild, free = controls_of(odd)
+    assert (aim.low, aim.high, aim.unit) == (pytest.approx(-90), pytest.approx(90), "°")
+    assert (push.low, push.high, push.unit) == (pytest.approx(-200), pytest.approx(300), "mm")
+    assert push.name == "actuator 1"
+    assert (wild.high, wild.unit, wild.scale) == (1e150, "", 1)
+    assert (free.low, free.high, free.unit) == (-1, 1, "")
+
+
+def test_the_fingertip_is_the_usual_site_or_the_one_that_was_named(odd: sm.Model) -> None:
+    arm = sm.load("so101")
+    assert tip_of(arm) == arm.site_id("gripperframe")
+    assert tip_of(arm, "baseframe") == arm.site_id("baseframe")
+    assert tip_of(odd) == 0
+
+
+def test_the_gap_of_slides_is_a_length() -> None:
+    gap = frames.gap_between(
+        "ab", [2, 2], [0, 1], (np.zeros(2), np.array([0.1, -0.2])), (None, None)
+    )
+    assert (gap.joint, gap.angle, gap.slide, gap.tip) == ("b", 0.2, True, None)
+    gap = frames.gap_between(
+        "ab", [2, 3], [0, 1], (np.zeros(2), np.array([0.3, -0.2])), (None, None)
+    )
+    assert (gap.joint, gap.angle, gap.slide) == ("b", 0.2, False)
+    free = frames.gap_between("a", [0], [0], (np.zeros(7), np.ones(7)), (None, None))
+    assert free.angle is None
+
+
+# The clock
+
+
+def test_the_pacer_counts_the_steps_of_the_clock() -> None:
+    pacer = Pacer(0.005, 1.0, now=100.0)
+    assert pacer.due(100.0) == 0
+    assert pacer.due(100.0049) == 0
+    assert pacer.due(100.005) == 1
+    assert pacer.due(101.0) == 200
+    pacer.took(200, 101.0)
+    assert pacer.due(101.0) == 0
+    assert pacer.factor(101.0) == pytest.approx(1)
+    pacer.set_speed(0.1, 101.0)
+    assert pacer.due(102.0) == 20
+    assert pacer.lag(102.0) == pytest.approx(1)
+    assert pacer.factor(101.1) is None  # too soon to tell
+    assert pacer.give_up(102.0) == 20
+    assert pacer.due(102.0) == 0
+    for wrong in (0, -1, math.nan, math.inf, 1e9):
+        with pytest.raises(BadInputError):
+            pacer.set_speed(wrong, 103.0)
+    assert pacer.speed == 0.1
+
+
+class Clock:
+    """A clock that only goes on when somebody sleeps or works."""
+
+    def __init__(self) -> None:
+        self.now = 50.0
+
+    def __call__(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        assert seconds > 0
+        self.now += seconds
+
+
+class Hand:
+    """A front: what is put in is asked for at the next turn; it keeps what is shown."""
+
+    def __init__(self) -> None:
+        self.asked: list[Command] = []
+        self.shown: list[tuple[Frame, Pace, str]] = []
+
+    def commands(self) -> Sequence[Command]:
+        taken, self.asked = self.asked, []
+        return taken
+
+    def show(self, frame: Frame, pace: Pace, note: str) -> None:
+        self.shown.append((frame, pace, note))
+
+
+class Slow(Session):
+    """A session whose every step costs some time of a clock."""
+
+    def __init__(self, clock: Clock, cost: float) -> None:
+        super().__init__([sm.load("so101/scene")])
+        self.clock, self.cost = clock, cost
+
+    def __enter__(self) -> Self:
+        return self
+
+    def advance(self, count: int = 1) -> None:
+        super().advance(count)
+        self.clock.now += self.cost * count
+
+
+@contextmanager
+def live(cost: float = 0.0, speed: float = 1.0) -> Iterator[tuple[Slow, Live, Hand, Clock]]:
+    clock, hand = Clock(), Hand()
+    with Slow(clock, cost) as session:
+        yield session, Live(session, hand, speed, clock, clock.sleep), hand, clock
+
+
+@pytest.mark.parametrize("speed", [0.1, 1.0, 3.0])
+def test_time_follows_the_clock(speed: float) -> None:
+    with live(cost=0.0001, speed=speed) as (session, loop, hand, clock):
+        hand.asked.append(Run())
+        began = clock.now
+        loop.run(seconds=2.0)
+        frame, pace, _ = hand.shown[-1]
+        assert frame.time == pytest.approx(speed * (clock.now - began), abs=0.06 * max(1, speed))
+        assert pace.reached == pytest.approx(speed, rel=0.05)
+        assert not pace.late
+        assert 30 <= len(hand.shown) / 2 <= 60  # frames a second
+        assert session.running
+
+
+def test_an_engine_that_is_too_slow_is_said_and_does_not_lag_ever_more() -> None:
+    with live(cost=0.010) as (session, loop, hand, _clock):
+        hand.asked.append(Run())
+        loop.run(seconds=3.0)
+        _, pace, _ = hand.shown[-1]
+        assert pace.reached == pytest.approx(0.5, abs=0.05)  # 5 ms of it in 10 ms
+        assert pace.late
+        gaps = np.diff([shown[0].time for shown in hand.shown])
+        assert gaps.max() < 0.06  # the page is still alive
+        session.cost = 0.0
+        loop.run(seconds=3.0)
+        _, pace, _ = hand.shown[-1]
+        assert pace.reached == pytest.approx(1.0, abs=0.02)
+        assert not pace.late
+        # What it lost is not made up for in a rush: a quarter of a second at most.
+        after = np.diff([shown[0].time for shown in hand.shown])[len(gaps) :]
+        assert after.sum() < 3.0 + 0.26
+
+
+def test_time_that_stood_is_not_owed() -> None:
+    with live() as (_, loop, hand, _clock):
+        loop.run(seconds=5.0)
+        assert hand.shown[-1][0].time == 0
+        assert hand.shown[-1][1].reached is None
+        hand.asked.append(Run())
+        loop.turn()
+        loop.turn()
+        assert hand.shown[-1][0].time <= 0.051
+        hand.asked.append(Step(1))
+        loop.turn()
+        standing = hand.shown[-1][0].time
+        loop.run(seconds=2.0)
+        assert hand.shown[-1][0].time == standing
+        hand.asked.append(Run())
+        loop.turn()
+        loop.turn()
+        assert hand.shown[-1][0].time <= standing + 0.051
+
+
+def test_a_bad_command_is_a_note_until_the_next_one() -> None:
+    with live() as (_, loop, hand, _clock):
+        hand.asked += [SetSpeed(2.0), SetSpeed(-1.0)]
+        loop.turn()
+        _, pace, note = hand.shown[-1]
+        assert "speed" in note
+        assert pace.asked == 2.0
+        hand.asked.append(SetCtrl(0, 0.1))
+        loop.turn()
+        assert hand.shown[-1][2] == ""
+        assert hand.shown[-1][0].ctrl[0] == 0.1
+
+
+def test_commands_are_obeyed_in_their_order() -> None:
+    with live() as (_, loop, hand, _clock):
+        hand.asked += [SetCtrl(0, 0.5), Reset(), SetCtrl(0, 0.2), SetCtrl(0, 0.3)]
+        loop.turn()
+        assert hand.shown[-1][0].ctrl[0] == 0.3
+
+
+# The words
+
+
+def test_the_readout_says_what_the_frame_says() -> None:
+    pose = frames.Pose("mujoco", np.zeros((1, 3)), np.zeros((1, 4)), np.array([0.1, -0.02, 0.3]))
+    ghost = frames.Pose("pybullet", pose.xpos, pose.xquat, np.array([0.1, -0.02, 0.3015]))
+    gap = frames.Gap(0.0015, "elbow", math.radians(2.5))
+    frame = Frame(1.25, 250, True, np.zeros(1), 1, (pose, ghost), gap, "")
+    rows = dict(words.rows(frame, Pace(1.0, 0.997, False), "tip"))
+    assert rows["time"] == "1.250 s"
+    assert rows["steps"] == "250"
+    assert rows["pace"] == "1.00 × real time"
+    assert rows["on mujoco"] == "100.0  -20.0  300.0 mm"
+    assert rows["tips apart"] == "1.500 mm"
+    assert rows["joints apart"] == "2.500°, elbow"
+    late = dict(words.rows(frame, Pace(2.0, 0.5, True), "tip"))["pace"]
+    assert "0.50 ×" in late
+    assert "2 ×" in late
+    assert words.warning(frame, "a note") == "a note"
+    stopped = Frame(1.25, 250, False, np.zeros(1), 1, (pose,), None, "mujoco: it blew up")
+    assert dict(words.rows(stopped, Pace(1, None, False), ""))["pace"] == "paused"
+    assert words.warning(stopped, "") == "mujoco: it blew up. Reset to go on."
+
+
+# Recordings
+
+
+def test_a_recording_is_played_and_sought() -> None:
+    model = sm.load("so101/scene")
+    held = record(model, seconds=1.0)
+    fallen = record(model.replace(actuation=False), seconds=0.5)
+    recording = Recording([held, fallen])
+    assert recording.length == pytest.approx(0.5)  # of the shorter
+    recording.apply(Run())
+    recording.advance(30)
+    frame = recording.frame()
+    assert frame.time == pytest.approx(30 * model.timestep)
+    np.testing.assert_array_equal(frame.poses[0].xpos, held["xpos"][30])
+    np.testing.assert_array_equal(frame.poses[1].xpos, fallen["xpos"][30])
+    assert frame.gap is not None
+    assert frame.gap.angle == np.abs(held.qpos[30] - fallen.qpos[30]).max()
+    recording.advance(10_000)
+    end = recording.frame()
+    assert (end.steps, end.running) == (100, False)
+    recording.apply(Seek(0.2))
+    assert recording.frame().steps == 40
+    recording.apply(Step(2))
+    assert recording.frame().steps == 42
+    recording.apply(Seek(-5))
+    assert recording.frame().steps == 0
+    recording.apply(Seek(1e9))
+    recording.apply(Run())  # from the end, again from the start
+    assert (recording.frame().steps, recording.running) == (0, True)
+    with pytest.raises(BadInputError):
+        recording.apply(SetCtrl(0, 1.0))
+
+
+def test_recordings_that_do_not_fit_are_refused(odd: sm.Model) -> None:
+    one = record(sm.load("so101/scene"), seconds=0.05)
+    with pytest.raises(TraceError, match="another model"):
+        Recording([one, record(odd, seconds=0.05)])
+    with pytest.raises(TraceError, match="cannot be drawn"):
+        Recording([record(sm.load("so101/scene"), seconds=0.05, derive=False)])
+
+
+def test_moments_that_are_not_the_same_are_not_compared() -> None:
+    model = sm.load("so101/scene")
+    one = record(model, seconds=0.1)
+    two = record(model.replace(timestep=1 / 240), seconds=0.1)
+    recording = Recording([one, two])
+    assert recording.frame().gap is not None  # both at 0
+    recording.advance(1)
+    frame = recording.frame()
+    assert frame.gap is None
+    np.testing.assert_array_equal(frame.poses[1].xpos, two["xpos"][1])
+
+
+# The command
+
+VIEW = [sys.executable, "-u", "-m", "statemachine", "view"]
+
+
+def _free_pair() -> int:
+    """A port that is free, and the next one too; another for each test at the same time."""
+    for port in random.SystemRandom().sample(range(18080, 32000), 100):
+        with socket.socket() as one, socket.socket() as two:
+            try:
+                one.bind(("127.0.0.1", port))
+                two.bind(("127.0.0.1", port + 1))
+            except OSError:
+                continue
+            return port
+    raise AssertionError("no two free ports")
+
+
+class Viewer:
+    """The command in a process of its own."""
+
+    def __init__(self, folder: Path, *arguments: str, **environment: str) -> None:
+        self._said = open(folder / "stderr", "w+")  # noqa: SIM115
+        self.process = subprocess.Popen(
+            [*VIEW, *arguments],
+            stdout=subprocess.PIPE,
+            stderr=self._said,
+            text=True,
+            cwd=ROOT,
+            env={**os.environ, **environment},
+        )
+
+    def line(self) -> str:
+        """The next line that it says."""
+        assert self.process.stdout is not None
+        return self.process.stdout.readline()
+
+    def end(self) -> tuple[int, str, str]:
+        """Exit code, the rest of what it said, and its complaints."""
+        assert self.process.stdout is not None
+        rest = self.process.stdout.read()
+        code = self.process.wait(timeout=30)
+        self._said.seek(0)
+        return code, rest, self._said.read()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.process.kill()
+        self.process.wait()
+        self._said.close()
+
+
+def _listening(pid: int) -> set[str]:
+    """Addresses on which a process listens, as the kernel's tables have them."""
+    sockets = set()
+    for name in os.listdir(f"/proc/{pid}/fd"):
+        try:
+            sockets.add(os.readlink(f"/proc/{pid}/fd/{name}"))
+        except OSError:
+            continue
+    found = set()
+    for table in ("tcp", "tcp6"):
+        for line in Path(f"/proc/{pid}/net/{table}").read_text().splitlines()[1:]:
+            words = line.split()
+            if words[3] == "0A" and f"socket:[{words[9]}]" in sockets:
+                found.add(words[1])
+    return found
+
+
+def test_it_listens_on_loopback_alone_and_ctrl_c_ends_it(tmp_path: Path) -> None:
+    pytest.importorskip("viser")
+    port = _free_pair()
+    with Viewer(tmp_path, "--port", str(port)) as viewer:
+        first = viewer.line()
+        assert f"http://localhost:{port}" in first
+        assert "mujoco" in first
+        assert f"ssh -L {port}:localhost:{port}" in viewer.line()
+        # Who connects and says nothing leaves no trace in the terminal.
+        with socket.create_connection(("127.0.0.1", port), timeout=5):
+            pass
+        if sys.platform == "linux":
+            assert _listening(viewer.process.pid) == {f"0100007F:{port:04X}"}
+            with pytest.raises(OSError):  # who listens everywhere listens here too
+                socket.create_connection(("127.0.0.2", port), timeout=5)
+        viewer.process.send_signal(signal.SIGINT)
+        assert viewer.end() == (0, "", "")
+    with socket.socket() as again:
+        again.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        again.bind(("127.0.0.1", port))
+
+
+def test_it_listens_elsewhere_when_asked_to(tmp_path: Path) -> None:
+    """The other side of the test above: what it looks at does show where one listens."""
+    pytest.importorskip("viser")
+    if sys.platform != "linux":
+        pytest.skip("127.0.0.2 is this machine on Linux only")
+    port = _free_pair()
+    with Viewer(tmp_path, "--port", str(port), "--host", "0.0.0.0") as viewer:
+        assert f":{port}" in viewer.line()
+        assert _listening(viewer.process.pid) == {f"00000000:{port:04X}"}
+        with socket.create_connection(("127.0.0.2", port), timeout=5):
+            pass
+
+
+def test_a_taken_port_is_said_and_the_next_one_is_taken(tmp_path: Path) -> None:
+    pytest.importorskip("viser")
+    port = _free_pair()
+    with socket.socket() as holder:
+        holder.bind(("127.0.0.1", port))
+        holder.listen()
+        with Viewer(tmp_path, "--port", str(port), "--seconds", "0.1") as viewer:
+            assert viewer.line() == f"port {port} is taken, so it is {port + 1}\n"
+            assert f"http://localhost:{port + 1}" in viewer.line()
+            code, _, said = viewer.end()
+            assert (code, said) == (0, "")
+
+
+def test_it_says_nothing_but_its_own_lines(tmp_path: Path) -> None:
+    """No banner of viser's, and viser's own variable for the port does not count."""
+    pytest.importorskip("viser")
+    port = _free_pair()
+    taken = {"_VISER_PORT_OVERRIDE": str(port + 1)}
+    with Viewer(tmp_path, "--port", str(port), "--seconds", "0.2", "--paused", **taken) as viewer:
+        code, text, said = viewer.end()
+        assert (code, said) == (0, "")
+        assert len(text.splitlines()) == 2
+        assert "viser" not in text
+        assert f":{port} " in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["--keyframe", "hled"], 2, "Did you mean 'held'"),
+        (["--keyframe", "7"], 2, "7"),
+        (["--port", "70000"], 2, "70000"),
+        (["--host", ""], 2, "must be an address"),
+        (["--host", "192.0.2.1"], 2, "192.0.2.1"),
+        (["--host", "no.such.host.invalid"], 2, "no address"),
+        (["--speed", "0"], 2, "speed"),
+        (["--speed", "nan"], 2, "speed"),
+        (["--site", "nose"], 2, "nose"),
+        (["--ghost", "pybulet"], 2, "pybullet"),
+        (["--model", "so1O1"], 2, "so101"),
+        (["--seconds", "-1"], 2, "seconds"),
+        (["--seconds", "nan"], 2, "seconds"),
+        (["gone.npz"], 2, "gone.npz"),
+        (["gone.npz", "--ghost", "pybullet"], 2, "recording"),
+        (["a.npz", "b.npz", "c.npz"], 2, "one trace or two"),
+    ],
+)
+def test_every_mistake_is_one_line(cli: Cli, arguments: list[str], code: int, words: str) -> None:
+    pytest.importorskip("viser")
+    done = cli("view", "--seconds", "0.1", *arguments)
+    assert done.returncode == code, done.stderr
+    assert words in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert done.stdout == ""
+
+
+def test_a_trace_is_shown_and_no_engine_of_its_own_is_needed(tmp_path: Path) -> None:
+    pytest.importorskip("viser")
+    model = sm.load("so101/scene_box")
+    file = write(record(model, seconds=0.1, keyframe=0, experiment="box"), tmp_path / "box.npz")
+    port = str(_free_pair())
+    with Viewer(tmp_path, str(file), str(file), "--port", port, "--seconds", "0.3") as viewer:
+        code, text, said = viewer.end()
+        assert (code, said) == (0, "")
+        assert "box of so101/scene_box" in text
+        assert f"mujoco {model.engine_version}" in text
+
+
+def test_without_viser_the_extra_is_named(tmp_path: Path) -> None:
+    code = (
+        "import sys; sys.modules['viser'] = None\n"
+        "from statemachine.cli import main; sys.exit(main(['view']))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert done.returncode == 3
+    assert "pip install 'statemachine-sim[view]'" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_nobody_opens_a_tunnel_from_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A tab may ask for a public address; viser would ask its makers' server for one."""
+    viser = pytest.importorskip("viser")
+    from viser import _messages, _viser
+
+    from statemachine.view import server as serving
+
+    opened: list[object] = []
+    monkeypatch.setattr(_viser, "ViserTunnel", lambda *words: opened.append(words))
+    server = serving.serve("127.0.0.1", serving.free_port("127.0.0.1", 0), "t")
+    try:
+        assert isinstance(server, viser.ViserServer)
+        handlers = server._websock_server._incoming_handlers[_messages.ShareUrlRequest]
+        assert handlers
+        for handler in handlers:
+            handler(0, _messages.ShareUrlRequest())
+        server._thread_executor.shutdown(wait=True)
+        assert opened == []
+    finally:
+        serving.stop(server)

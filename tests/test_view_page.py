@@ -1,0 +1,334 @@
+"""The viewer's page, in a real browser: what is seen, what can be moved, what is asked for."""
+
+from __future__ import annotations
+
+import io
+import math
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.drawing import drawing_of
+from statemachine.traces import record
+from statemachine.view import server as serving
+from statemachine.view.frames import Pause, Reset, Run, SetCtrl
+from statemachine.view.live import Live, Pace
+from statemachine.view.recording import Recording
+from statemachine.view.session import Session
+from statemachine.view.viser_front import ViserFront, _page, thinner
+
+from .browser import Tab, browser, tabs
+from .conftest import REQUIRED, need_engine
+from .test_view import Viewer, _free_pair
+
+# The client's own library speaks of its next version; nothing here calls it.
+KNOWN = ("THREE.Clock",)
+PATIENCE = 90.0  # seconds, on a machine that draws without a graphics card and does more
+
+
+@pytest.fixture(autouse=True)
+def _viser() -> None:
+    if "browser" not in REQUIRED:
+        pytest.importorskip("viser")
+
+
+class Stage:
+    """A session on a page, with tabs before it; time passes only in `until`."""
+
+    def __init__(self, session: Session, model: sm.Model, new_tab: Callable[[], Tab]) -> None:
+        self.session, self.new_tab = session, new_tab
+        self.server = serving.serve("127.0.0.1", serving.free_port("127.0.0.1", 0), "page")
+        front = ViserFront(self.server, session, drawing_of(model))
+        self.live = Live(session, front, sleep=lambda seconds: None)
+        self.tab = self.open()
+
+    def open(self) -> Tab:
+        """A new tab with the page, all of it there."""
+        tab = self.new_tab()
+        tab.goto(f"http://127.0.0.1:{self.server.get_port()}")
+        self.until(lambda: tab.get_by_role("slider").count() == 6, tab)
+        return tab
+
+    def until(self, reached: Callable[[], bool], tab: Tab | None = None) -> None:
+        """Turn the loop until something is so."""
+        end = time.monotonic() + PATIENCE
+        while not reached():
+            assert time.monotonic() < end, (tab or self.tab).inner_text("body")
+            self.live.turn()
+            (tab or self.tab).wait_for_timeout(20)
+
+    def says(self, text: str, tab: Tab | None = None) -> None:
+        """Wait until the page says so."""
+        self.until(lambda: (tab or self.tab).get_by_text(text).count() > 0, tab)
+
+    def reset(self) -> None:
+        """Everything to the start, and the time standing."""
+        self.press("Reset")
+        self.until(lambda: self.session.frame().time == 0)
+        self.session.apply(Pause())
+
+    def press(self, name: str) -> None:
+        """A button, by what stands on it."""
+        self.tab.get_by_role("button", name=name, exact=True).click()
+
+    def slider(self, index: int, tab: Tab | None = None) -> float:
+        """What a slider shows."""
+        thumb = (tab or self.tab).get_by_role("slider").nth(index)
+        return float(thumb.get_attribute("aria-valuenow"))
+
+
+@pytest.fixture(scope="module")
+def stage() -> Iterator[Stage]:
+    """The arm, and as its ghost the arm without its servos, which falls."""
+    model = sm.load("so101/scene")
+    with tabs(1000, 640) as new_tab, Session([model, model.replace(actuation=False)]) as session:
+        made = Stage(session, model, new_tab)
+        yield made
+        serving.stop(made.server)
+
+
+def _colours(tab: Tab) -> tuple[int, int]:
+    """Pixels of the arm's yellow, and of the ghost's blue, left of the panel."""
+    from PIL import Image
+
+    picture = Image.open(io.BytesIO(tab.screenshot())).convert("RGB")
+    r, _, b = np.moveaxis(np.asarray(picture)[200:, :650].astype(int), -1, 0)
+    return int(((r > 150) & (r - b > 80)).sum()), int(((b > 150) & (b - r > 80)).sum())
+
+
+def _ctrl(session: Session) -> np.ndarray:
+    return session.frame().ctrl
+
+
+@pytest.mark.slow
+def test_everything_is_on_the_page_and_nothing_is_asked_of_the_network(stage: Stage) -> None:
+    stage.reset()
+    for joint in sm.load("so101").actuator_names:
+        assert stage.tab.get_by_text(f"{joint} [°]").count() == 1
+    for text in ("gripperframe", "tips apart", "joints apart", "paused"):
+        stage.says(text)
+    assert stage.slider(1) == pytest.approx(0)
+    assert stage.tab.get_by_text("Share").count() == 0
+    hosts = {url.split("/")[2] for url in stage.tab.requests if not url.startswith("blob:")}
+    assert hosts == {f"127.0.0.1:{stage.server.get_port()}"}
+    stage.tab.nothing_wrong(*KNOWN)
+
+
+@pytest.mark.slow
+def test_a_slider_moves_the_command_and_the_arm(stage: Stage) -> None:
+    session = stage.session
+    stage.reset()
+    thumb = stage.tab.get_by_role("slider").nth(0)
+    thumb.focus()
+    for _ in range(3):
+        stage.tab.keyboard.press("ArrowRight")
+    stage.until(lambda: _ctrl(session)[0] > math.radians(0.25))
+    assert _ctrl(session)[0] == pytest.approx(math.radians(0.3))
+    typed = stage.tab.locator("input[inputmode=decimal]").nth(2)
+    typed.fill("25")
+    stage.until(lambda: _ctrl(session)[0] == pytest.approx(math.radians(25)))
+    box = thumb.bounding_box()
+    stage.tab.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    stage.tab.mouse.down()
+    stage.tab.mouse.move(box["x"] + 400, box["y"], steps=4)  # beyond its end
+    stage.tab.mouse.up()
+    # Round figures are shown; what they stand for stays in the range.
+    end = sm.load("so101").actuator_ctrlrange[0, 1]
+    stage.until(lambda: _ctrl(session)[0] == end)
+    assert stage.slider(0) == 110
+    before = session.frame().poses[0].tip
+    stage.tab.locator("input[inputmode=decimal]").nth(0).fill("200")
+    stage.press("Step")
+    stage.until(lambda: session.frame().steps == 200)
+    after = session.frame().poses[0].tip
+    assert before is not None
+    assert after is not None
+    assert math.dist(before, after) > 0.3  # a metre's arm would turn by 110°; this is a third
+    stage.says("1.000 s")
+
+
+@pytest.mark.slow
+def test_run_pause_step_and_reset(stage: Stage) -> None:
+    session = stage.session
+    session.apply(SetCtrl(0, 0.5))
+    stage.reset()
+    stage.until(lambda: stage.slider(0) == 0)  # the slider follows
+    stage.press("Run")
+    stage.until(lambda: session.running and session.frame().time > 0.3)
+    stage.until(lambda: stage.tab.get_by_role("button", name="Pause", exact=True).count() == 1)
+    stage.says("real time")
+    stage.press("Pause")
+    stage.until(lambda: not session.running)
+    stage.says("paused")
+    steps = session.frame().steps
+    stage.tab.locator("input[inputmode=decimal]").nth(0).fill("3")
+    stage.press("Step")
+    stage.until(lambda: session.frame().steps == steps + 3)
+    assert not session.running
+    speed = stage.tab.locator("input[inputmode=decimal]").nth(1)
+    for factor in ("0.5", "1"):
+        speed.fill(factor)
+        stage.until(lambda wanted=float(factor): stage.live.speed == wanted)
+    stage.press("Reset")
+    stage.until(lambda: session.frame().steps == 0)
+    stage.tab.nothing_wrong(*KNOWN)
+
+
+@pytest.mark.slow
+def test_both_arms_are_seen_and_the_ghost_can_be_put_away(stage: Stage) -> None:
+    """Where both agree the ghost is inside the arm; once it has fallen it is seen."""
+    session = stage.session
+    stage.reset()
+    for _ in range(40):  # a few frames for the browser to draw
+        stage.live.turn()
+        stage.tab.wait_for_timeout(30)
+    yellow, blue = _colours(stage.tab)
+    assert yellow > 3000
+    assert blue < yellow / 20
+    session.advance(200)
+    gap = session.frame().gap
+    assert gap is not None
+    assert gap.tip is not None
+    stage.says(f"{1000 * gap.tip:.3f} mm")
+    stage.until(lambda: _colours(stage.tab)[1] > 2000)
+    assert _colours(stage.tab)[0] > 3000
+    stage.tab.get_by_label("ghost: mujoco").click()
+    stage.until(lambda: _colours(stage.tab)[1] < 100)
+
+
+@pytest.mark.slow
+def test_two_tabs_show_the_same(stage: Stage) -> None:
+    session = stage.session
+    stage.reset()
+    other = stage.open()
+    try:
+        assert stage.slider(1, other) == stage.slider(1)
+        shown = stage.slider(1) - 0.1
+        other.get_by_role("slider").nth(1).focus()
+        other.keyboard.press("ArrowLeft")
+        stage.until(lambda: _ctrl(session)[1] == pytest.approx(math.radians(shown)), other)
+        session.advance(7)
+        time_now = f"{session.frame().time:.3f} s"
+        stage.says(time_now, other)
+        # A browser draws only the tab that is in front; behind it nothing is lost.
+        stage.tab.bring_to_front()
+        stage.until(lambda: stage.slider(1) == pytest.approx(shown))
+        stage.says(time_now)
+        other.nothing_wrong(*KNOWN)
+    finally:
+        other.close()
+    session.advance(1)
+    stage.says(f"{session.frame().time:.3f} s")  # the one that is left goes on
+
+
+@pytest.mark.slow
+def test_a_divergence_is_a_line_on_the_page_and_reset_recovers(stage: Stage) -> None:
+    session = stage.session
+    stage.reset()
+    stage.press("Run")
+    stage.until(lambda: session.running)
+    session._arms[0][1].qvel[:] = 1e200
+    line = stage.tab.get_by_text("Reset to go on.")
+    stage.until(lambda: line.count() == 1)
+    assert not session.running
+    assert line.inner_text().startswith("mujoco: ")
+    stage.press("Reset")
+    stage.until(lambda: line.count() == 0)
+    stage.press("Run")
+    stage.until(lambda: session.frame().steps > 5)
+    stage.press("Pause")
+    stage.until(lambda: not session.running)
+    stage.tab.nothing_wrong(*KNOWN)
+
+
+@pytest.mark.slow
+def test_the_command_shows_both_engines_to_a_browser(tmp_path: Path) -> None:
+    """End to end: the process, the page, time that passes by itself, and Ctrl-C while watched."""
+    need_engine("pybullet")
+    port = _free_pair()
+    with (
+        Viewer(tmp_path, "--ghost", "pybullet", "--port", str(port)) as viewer,
+        browser() as tab,
+    ):
+        assert "mujoco" in viewer.line()
+        tab.goto(f"http://localhost:{port}")
+        for text in ("on mujoco", "on pybullet", "tips apart", "real time"):
+            tab.get_by_text(text).first.wait_for(timeout=1000 * PATIENCE)
+        tab.nothing_wrong(*KNOWN)
+        viewer.process.send_signal(signal.SIGINT)
+        code, _, said = viewer.end()
+        assert (code, said) == (0, "")
+
+
+def test_the_page_is_told_where_every_body_is_on_each_engine() -> None:
+    need_engine("pybullet")
+    models = [sm.load("so101/scene_box", backend=name) for name in ("mujoco", "pybullet")]
+    drawing = drawing_of(models[0])
+    with Session(models, "held") as session:
+        session.apply(SetCtrl(0, 0.7))
+        session.advance(100)
+        server = serving.serve("127.0.0.1", serving.free_port("127.0.0.1", 0), "t")
+        try:
+            front = ViserFront(server, session, drawing, 1.0, 0)
+            front.show(session.frame(), Pace(1.0, None, False), "")
+            placed = 0
+            for root, (_, data) in zip(("/mujoco", "/pybullet ghost"), session._arms, strict=True):
+                for body in range(1, models[0].nbody):
+                    handle = server.scene.get_handle_by_name(f"{root}/{body}")
+                    # viser sends nothing for what moved by micrometres.
+                    np.testing.assert_allclose(handle.position, data.xpos[body], atol=1e-5)
+                    np.testing.assert_allclose(handle.wxyz, data.xquat[body], atol=1e-5)
+                    placed += 1
+            assert placed == 2 * 9
+            # A keyframe's commands are shown rounded; what is shown is no command.
+            time.sleep(0.2)
+            assert front.commands() == []
+            for part in drawing.parts:
+                if part.body:
+                    mesh = server.scene.get_handle_by_name(f"/mujoco/{part.body}/{part.geom}")
+                    np.testing.assert_array_equal(mesh.vertices, part.vertices)
+                    np.testing.assert_array_equal(mesh.faces, part.faces)
+        finally:
+            serving.stop(server)
+
+
+def test_the_slider_of_a_recording_follows_it() -> None:
+    model = sm.load("so101/scene")
+    recording = Recording([record(model, seconds=0.5)])
+    server = serving.serve("127.0.0.1", serving.free_port("127.0.0.1", 0), "t")
+    try:
+        front = ViserFront(server, recording, drawing_of(model))
+        assert (front._seek.min, front._seek.max) == (0, pytest.approx(0.5))
+        recording.apply(Run())
+        for _ in range(40):
+            recording.advance()
+            front.show(recording.frame(), Pace(1.0, None, False), "")
+        assert front._seek.value == pytest.approx(40 * model.timestep)
+        recording.apply(Reset())
+        front.show(recording.frame(), Pace(1.0, None, False), "")
+        assert front._seek.value == 0
+        time.sleep(0.2)
+        assert front.commands() == []
+    finally:
+        serving.stop(server)
+
+
+def test_what_a_model_is_called_is_no_code_on_the_page() -> None:
+    text = _page([("<b>tip</b>", "<script>x</script>")], "<i>")
+    assert "<script>" not in text
+    assert "<b>" not in text
+    assert "&lt;i&gt;" in text
+
+
+def test_a_ghost_is_thinner_by_what_was_said() -> None:
+    drawing = drawing_of(sm.load("so101/scene_box"))
+    box = next(part for part in drawing.parts if part.kind == "box")
+    corners = thinner(box, 0.003)
+    # Along the diagonal of the three faces that meet there, each wound as two triangles.
+    assert np.linalg.norm(corners - box.vertices, axis=1) == pytest.approx(0.003, rel=1e-4)
+    assert (np.abs(corners) < np.abs(box.vertices)).all()
