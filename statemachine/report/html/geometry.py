@@ -140,7 +140,8 @@ def bones_of(trace: Trace) -> Drawing:
             add(body, (0.0, 0.0, 0.12 * size))
     centre = pos[1:].mean(axis=0) if len(pos) > 1 else np.zeros(3)
     x, y, z = centre.tolist()
-    return Drawing(tuple(parts), (x, y, z), max(size, float(np.ptp(pos, axis=0).max())))
+    extent = max(size, float(np.ptp(pos, axis=0).max()))
+    return Drawing(tuple(parts), (x, y, z), extent, azimuth=-90.0, elevation=-15.0)
 
 
 def _bone(end: Array, thick: float) -> tuple[Any, Any]:
