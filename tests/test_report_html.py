@@ -82,7 +82,10 @@ def open_page(tab: Tab, path: Path) -> None:
 def picture(tab: Tab, where: str = "#scene") -> np.ndarray:
     if where == "#scene":
         tab.mouse.move(0, 0)  # nothing under it is in another colour
-        tab.evaluate("document.activeElement.blur()")
+        # Always at the same place of the screen: else its edges are rounded otherwise.
+        tab.evaluate(
+            "document.activeElement.blur(); document.querySelector('#stage').scrollIntoView()"
+        )
         tab.wait_for_timeout(50)
         tab.wait_for_selector("#scene[data-drawn=fine]")
     return np.asarray(Image.open(io.BytesIO(tab.locator(where).screenshot())).convert("RGB"), int)
