@@ -19,7 +19,7 @@ const slider = $('slider'), stage = $('stage'), play = $('play');
 let row = found.start, playing = 0, touched = false, scene = null;
 
 const moment = (t) => `${t.toFixed(3)} s`;
-const minus = (text) => text.replace('-', '\u2212');
+const minus = (text) => text.replaceAll('-', '\u2212');
 
 // Three significant digits, as in the tables.
 const figure = (value) => {
