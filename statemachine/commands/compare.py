@@ -51,8 +51,8 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--quantity", default=None, metavar="NAME", help="of --why: what the gap is measured in"
     )
-from . import _compare_html, _compare_models
-from . import _compare_pictures as pictures
+    _compare_html.add_options(parser)
+    pictures.add(parser)
     _compare_models.add_options(parser)
     add_json(parser)
     parser.set_defaults(run=run)
