@@ -10,7 +10,7 @@ from typing import Any
 from ..errors import BadInputError
 from . import _compare_pictures as pictures
 from ._common import PROGRAM, SAYS_NO, add_backend, add_json, add_menagerie, complain, show
-from .compare import EXPERIMENTS, add_defaults, add_run
+from .compare import EXPERIMENTS, add_defaults, add_run, experiments
 
 
 def add(commands: Any) -> None:
@@ -73,10 +73,11 @@ def _add_record(named: Any) -> None:
         "record",
         help="record an experiment, or a controller of your own",
         description=(
-            "Run it, then run it again with the recorded commands to read what the engine "
+            "Run it, then run it again with the recorded commands to read what the engine\n"
             "derives: the second run must end in the same bits."
         ),
-        epilog=f"Experiments: {', '.join(EXPERIMENTS)}.",
+        epilog=f"experiments:\n{experiments()}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("what", nargs="?", metavar="EXPERIMENT", help="what to do")
     parser.add_argument(
@@ -245,8 +246,10 @@ def _target(given: str | None, usual: str, suffixes: tuple[str, ...] = ()) -> Pa
 def _written(trace: Any, target: Path) -> int:
     from ..traces import write
 
+    again = " (the file that was there is replaced)" if target.exists() else ""
     path = write(trace, target)
-    print(f"{path}: {len(trace)} rows of {trace.header.experiment} on {trace.header.label}")
+    rows = f"{len(trace)} rows of {trace.header.experiment} on {trace.header.label}"
+    print(f"{path}: {rows}{again}")
     if trace.header.rewritten:
         print(
             f"{trace.header.rewritten} rows do not follow from the step before: the controller "
