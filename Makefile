@@ -94,7 +94,7 @@ notebook: $(VENV)/test.stamp
 
 # make clean        remove what the others made
 clean:
-	rm -rf .venv .venv-newest build dist docs/_build docs/path docs/reference .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-newest build dist docs/_build docs/path docs/reference docs/comparisons .pytest_cache .ruff_cache .hypothesis
 
 CONSTRAINTS ?= -c constraints.txt
 

@@ -23,11 +23,12 @@ exclude_patterns = ["_build"]
 
 
 def _make_pages(_app) -> None:
-    from statemachine.report.site import make_path, make_reference
+    from statemachine.report.site import make_comparisons, make_path, make_reference
 
     backends = os.environ.get("STATEMACHINE_DOCS_BACKENDS", "").split(",")
     make_path(HERE / "path", [name for name in backends if name] or None)
     make_reference(HERE / "reference")
+    make_comparisons(HERE / "comparisons")
 
 
 def setup(app) -> None:

@@ -58,6 +58,8 @@ def resolve(name: str | os.PathLike[str], menagerie: str | os.PathLike[str] | No
             return path.absolute()
         if menagerie is None and text.removesuffix(".xml") in model_names():
             return models_dir() / text  # the name as pages print it
+        if menagerie is not None and (Path(menagerie).expanduser() / text).is_file():
+            return (Path(menagerie).expanduser() / text).absolute()  # the same, of a menagerie
         what = "is a folder, not a file" if path.is_dir() else "does not exist"
         raise ModelFileError(f"model file {text} {what}")
     if menagerie is not None:

@@ -50,6 +50,49 @@ def overlaps_of_silhouettes(one: str | Path, other: str | Path) -> list[float]:
     return json.loads(done.stdout)
 
 
+def silhouettes(
+    model: Path, poses: Sequence[np.ndarray], camera: dict[str, Any], size: Sequence[int], at: Path
+) -> list[np.ndarray]:
+    """Where a model is seen in poses qpos, drawn by MuJoCo's own renderer: boolean masks."""
+    job = {"model": str(model), "poses": [q.tolist() for q in poses], "camera": camera}
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.rendering", json.dumps({**job, "size": list(size)}), str(at)],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        env=rendering_environment(),
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return list(np.load(at / "silhouettes.npy"))
+
+
+def _draw_silhouettes(job: dict[str, Any], at: Path) -> None:
+    import mujoco
+
+    import statemachine as sm
+
+    model, (width, height) = sm.load(job["model"]).raw, job["size"]
+    model.vis.global_.fovy = job["camera"]["fovy"]
+    camera = mujoco.MjvCamera()
+    camera.azimuth, camera.elevation = job["camera"]["azimuth"], job["camera"]["elevation"]
+    camera.distance = job["camera"]["distance"]
+    camera.lookat[:] = job["camera"]["target"]
+    found = []
+    with mujoco.Renderer(model, height, width) as renderer:
+        renderer.enable_segmentation_rendering()
+        for qpos in job["poses"]:
+            data = mujoco.MjData(model)
+            data.qpos[:] = qpos
+            mujoco.mj_forward(model, data)
+            shown = mujoco.MjvOption()
+            shown.sitegroup[:] = 0
+            renderer.update_scene(data, camera, shown)
+            ids = renderer.render()[..., 0]
+            found.append((ids >= 0) & (model.geom_bodyid[ids] > 0))
+    np.save(at / "silhouettes.npy", np.array(found))
+
+
 def _silhouette(model: Any, qpos: Sequence[float], azimuth: float, elevation: float) -> np.ndarray:
     """Where the arm is seen in a picture of 480 × 360, as a boolean mask."""
     import mujoco
@@ -71,7 +114,10 @@ def _silhouette(model: Any, qpos: Sequence[float], azimuth: float, elevation: fl
 
 
 def main() -> None:
-    """Print the overlaps of two models as JSON."""
+    """Print the overlaps of two models as JSON, or do a job of silhouettes."""
+    if sys.argv[1].startswith("{"):
+        _draw_silhouettes(json.loads(sys.argv[1]), Path(sys.argv[2]))
+        return
     import statemachine as sm
 
     models = [sm.load(name).raw for name in sys.argv[1:3]]

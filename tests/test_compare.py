@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ from statemachine.errors import BadInputError, MissingEngineError, TraceError, U
 from statemachine.experiments.scenarios import SCENARIOS
 from statemachine.report import compare as report
 from statemachine.report import terminal
-from statemachine.traces import Trace, record_scenario, write
+from statemachine.traces import Trace, record, record_scenario, write
 
 from .conftest import Cli, need_engine
 
@@ -193,6 +194,23 @@ def test_traces_of_two_robots_share_nothing(hold: Trace) -> None:
     names = tuple(f"other_{name}" for name in hold.header.joints)
     with pytest.raises(TraceError, match="no joint in common"):
         compare(hold, Trace(dataclasses.replace(hold.header, joints=names), hold.columns))
+
+
+def test_joints_without_names_are_each_compared(tmp_path: Path) -> None:
+    file = tmp_path / "nameless.xml"
+    file.write_text(
+        "<mujoco><worldbody><body><joint axis='0 1 0'/><geom size='.1'/><body pos='0 0 -1'>"
+        "<joint axis='0 1 0'/><geom size='.1'/></body></body><body pos='3 0 0'><freejoint/>"
+        "<geom size='.1'/></body></worldbody></mujoco>"
+    )
+    trace = record(sm.load(file), None, 0.2)
+    qpos = trace.qpos.copy()
+    qpos[:, 1] += 0.02
+    qpos[:, 3] += 0.003
+    found = by_name(compare(trace, changed(trace, qpos=qpos)))
+    assert found["joint 0"].max == 0
+    assert found["joint 1"].max == pytest.approx(0.02)
+    assert found["joint 2, position"].max == pytest.approx(0.003)
 
 
 # Tolerances.

@@ -23,7 +23,7 @@ from statemachine.report.figures import svg
 from statemachine.report.notebook import Shown, build, station
 from statemachine.report.site import make_path
 
-from .conftest import ROOT
+from .conftest import ROOT, need_engine
 
 _NOTEBOOK = ROOT / "notebooks" / "path.ipynb"
 _PICTURES = [
@@ -81,6 +81,7 @@ class _Links(HTMLParser):
 
 @pytest.mark.slow
 def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
+    need_engine("pybullet")
     source = tmp_path / "docs"
     source.mkdir()
     picture = Path("models", "so101", "so101.png")
@@ -116,6 +117,9 @@ def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
     assert "xyzw" in (reference / "conventions.html").read_text()
     assert "mj_forward" in (reference / "calls.html").read_text()
     assert "✗" not in (reference / "calls.html").read_text()
+    hold = (tmp_path / "o" / "comparisons" / "hold.html").read_text()
+    assert "one count of the servos" in hold
+    assert "servo law" in (tmp_path / "o" / "comparisons" / "hold-why.html").read_text()
     assert "--realtime" in (tmp_path / "o" / "path" / "09-time.html").read_text()
 
 

@@ -523,6 +523,19 @@ def test_the_command_records_plays_shows_and_exports(cli: Cli, tmp_path: Path) -
     ]  # fmt: skip
 
 
+def test_the_command_draws(cli: Cli, tmp_path: Path) -> None:
+    write(traced("hold", seconds=0.2), tmp_path / "hold.npz")
+    pytest.importorskip("matplotlib")
+    done = cli("trace", "plot", "hold.npz")
+    assert done.returncode == 0, done.stderr
+    assert "mujoco" in (tmp_path / "hold.svg").read_text()
+    need_engine("pybullet")  # its software renderer, where there is no OpenGL
+    done = cli("trace", "film", "hold.npz", "-o", "f.webp", "--size", "400x320")
+    assert done.returncode == 0, done.stderr
+    with pytest.importorskip("PIL.Image").open(tmp_path / "f.webp") as film:
+        assert getattr(film, "n_frames", 1) == 6
+
+
 CONTROLLERS = """
 def controller(time, data):
     return [0.1] * 6

@@ -40,8 +40,8 @@ def run(options: argparse.Namespace) -> int:
     given = [split(text) for text in options.models]
     if options.what:
         raise BadInputError(f"--models compares descriptions; {options.what[0]} is a run")
-    for name, other in (("model", None), ("seconds", None), ("timestep", None), ("tolerance", [])):
-        if getattr(options, name) != other:
+    for name in ("model", "seconds", "timestep", "tolerance", "plot", "film"):
+        if getattr(options, name) not in (None, []):
             raise BadInputError(f"--{name} is of a run, and --models runs nothing")
     if options.backends:
         if any(engine for _, engine in given):

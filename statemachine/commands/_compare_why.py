@@ -17,9 +17,6 @@ def run(request: Any, quantity: str | None, as_json: bool) -> int:
         quantity: What the gap is measured in; None for the experiment's own.
         as_json: Whether to print the result as JSON.
     """
-    from ..backends import load
-    from ..compare.why import attribute
-    from ..experiments.scenarios import scenario
     from ..report import why as report
     from ..report.progress import progress
 
@@ -28,6 +25,30 @@ def run(request: Any, quantity: str | None, as_json: bool) -> int:
             "--why takes one experiment, which it runs again and again: "
             f"{PROGRAM} compare hold --why"
         )
+    with progress("why") as told:
+        found = explain(request, quantity, told)
+    first = request.backends[0]
+    said = []
+    if not found.one.startswith(first):
+        said.append(f"{first} as it comes is brought to the other: the two have changed places.")
+    if as_json:
+        for line in said:
+            complain(line, 0)
+    return show(report.page(found, said), found, as_json)
+
+
+def explain(request: Any, quantity: str | None, progress: Any) -> Any:
+    """The attribution of one experiment on two backends.
+
+    Args:
+        request: A `compare.Request` that names it.
+        quantity: What the gap is measured in; None for the experiment's own.
+        progress: Told the fraction that is done.
+    """
+    from ..backends import load
+    from ..compare.why import attribute
+    from ..experiments.scenarios import scenario
+
     asked = scenario(request.what[0])
     asked = replace(asked, options={**asked.options, **request.options})
     models = [
@@ -39,21 +60,12 @@ def run(request: Any, quantity: str | None, as_json: bool) -> int:
         )
         for backend in request.backends
     ]
-    with progress("why") as told:
-        found = attribute(
-            models[0],
-            models[1],
-            asked,
-            seconds=request.seconds,
-            seed=request.seed,
-            quantity=quantity,
-            progress=told,
-        )
-    first = models[0].backend
-    said = []
-    if not found.one.startswith(first):
-        said.append(f"{first} as it comes is brought to the other: the two have changed places.")
-    if as_json:
-        for line in said:
-            complain(line, 0)
-    return show(report.page(found, said), found, as_json)
+    return attribute(
+        models[0],
+        models[1],
+        asked,
+        seconds=request.seconds,
+        seed=request.seed,
+        quantity=quantity,
+        progress=progress,
+    )

@@ -6,7 +6,8 @@ import argparse
 from typing import Any
 
 from ..errors import BadInputError
-from . import _compare_models
+from . import _compare_html, _compare_models
+from . import _compare_pictures as pictures
 from ._common import PROGRAM, add_json, add_menagerie, complain, show
 
 
@@ -50,6 +51,8 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--quantity", default=None, metavar="NAME", help="of --why: what the gap is measured in"
     )
+    _compare_html.add_options(parser)
+    pictures.add(parser)
     _compare_models.add_options(parser)
     add_json(parser)
     parser.set_defaults(run=run)
@@ -90,7 +93,7 @@ def request_of(options: argparse.Namespace) -> Any:
         backends=(one, two),
         defaults=options.defaults,
         model=options.model,
-        menagerie=options.menagerie if options.model else None,
+        menagerie=options.menagerie,
         seconds=options.seconds,
         seed=options.seed,
         options={} if options.timestep is None else {"timestep": options.timestep},
@@ -99,9 +102,12 @@ def request_of(options: argparse.Namespace) -> Any:
 
 def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
-    if options.models and (options.why or options.quantity):
-        raise BadInputError("--models compares files: --why and --quantity are of an experiment")
+    _compare_html.check(options)
     if options.models:
+        if options.why or options.quantity:
+            raise BadInputError(
+                "--models compares files: --why and --quantity are of an experiment"
+            )
         return _compare_models.run(options)
     _compare_models.refuse_alone(options)
     if not options.what:
@@ -109,22 +115,31 @@ def run(options: argparse.Namespace) -> int:
             f"compare what? An experiment ({', '.join(EXPERIMENTS)}) or traces: "
             f"{PROGRAM} compare hold"
         )
-    if options.quantity and not options.why:
+    if options.quantity and not (options.why or options.html):
         raise BadInputError("--quantity belongs to --why")
-    if options.why:
-        from ._compare_why import run as run_why
+    if options.why and not options.html:
+        return _run_why(options)
+    return _run_compare(options)
 
-        if options.tolerance:
-            raise BadInputError(
-                "--why takes no --tolerance: it explains the gap, whatever its size"
-            )
-        return run_why(request_of(options), options.quantity, options.json)
+
+def _run_why(options: argparse.Namespace) -> int:
+    from ._compare_why import run as run_why
+
+    if options.tolerance:
+        raise BadInputError("--why takes no --tolerance: it explains the gap, whatever its size")
+    if options.plot or options.film:
+        raise BadInputError("--why runs many times: --plot and --film go without it")
+    return run_why(request_of(options), options.quantity, options.json)
+
+
+def _run_compare(options: argparse.Namespace) -> int:
     from ..compare import compare, parse_tolerances, sides_of, witness
     from ..report import compare as report
     from ..report.progress import progress
 
     tolerances = parse_tolerances(options.tolerance)
     request = request_of(options)
+    wanted = pictures.checked(options)
     with progress("compare") as told:
         (one, two), said = sides_of(request, told)
     found = compare(one, two, tolerances=tolerances)
@@ -132,5 +147,9 @@ def run(options: argparse.Namespace) -> int:
         for line in said:
             complain(line, 0)
     asked = witness(one, two)
+    if options.html:
+        _compare_html.write(options, request, found, (one, two), said, asked)
     page = report.page(found, one.header.says, said, asked)
-    return show(page, {"comparison": found, "witness": asked}, options.json)
+    code = show(page, {"comparison": found, "witness": asked}, options.json)
+    pictures.write(wanted, options, one, two, found)
+    return code

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError
+from . import _compare_pictures as pictures
 from ._common import PROGRAM, SAYS_NO, add_backend, add_json, add_menagerie, complain, show
 from .compare import EXPERIMENTS, add_defaults, add_run
 
@@ -16,7 +17,7 @@ def add(commands: Any) -> None:
     """The subparser, with one for each thing to do."""
     parser = commands.add_parser(
         "trace",
-        help="record a run, play it on another engine, look into it, export it",
+        help="record a run, play it on another engine, look into it, draw it",
         description="Everything that a run did, in a file that opens without an engine.",
     )
     parser.set_defaults(run=lambda _options: _none_given())
@@ -35,10 +36,30 @@ def add(commands: Any) -> None:
     table.add_argument("file", metavar="TRACE", help="a file .npz or .parquet")
     _add_output(table, "TRACE.csv")
     table.set_defaults(run=run_csv)
+    _add_pictures(named)
 
 
 def _none_given() -> int:
-    raise BadInputError(f"trace what? record, play, show or csv: {PROGRAM} trace record hold")
+    raise BadInputError(
+        f"trace what? record, play, show, csv, plot or film: {PROGRAM} trace record hold"
+    )
+
+
+def _add_pictures(named: Any) -> None:
+    for name, help_, usual in (
+        ("plot", "draw its curves: .svg, .png or .pdf", "TRACE.svg"),
+        ("film", "make a film of it: .webp or .mp4", "TRACE.webp"),
+    ):
+        parser = named.add_parser(name, help=help_)
+        parser.add_argument("file", metavar="TRACE", help="a file .npz or .parquet")
+        _add_output(parser, usual)
+        parser.set_defaults(run=run_pictures, picture=name)
+        if name == "film":
+            parser.add_argument(
+                "--model", default=None, metavar="NAME|FILE", help="instead of the trace's own"
+            )
+            add_menagerie(parser)
+            pictures.add_film(parser)
 
 
 def _add_output(parser: argparse.ArgumentParser, usual: str) -> None:
@@ -113,7 +134,7 @@ def run_record(options: argparse.Namespace) -> int:
         options.model or (asked.model if asked else "so101/scene"),
         backend=options.backend,
         defaults=options.defaults,
-        menagerie=options.menagerie if options.model else None,
+        menagerie=options.menagerie,
     )
     with progress(f"record {name} on {options.backend}") as told:
         if asked is not None:
@@ -187,6 +208,21 @@ def run_csv(options: argparse.Namespace) -> int:
     target = _target(options.output, f"{Path(options.file).stem}.csv", (".csv",))
     for path in export_csv(trace, target):
         print(path)
+    return 0
+
+
+def run_pictures(options: argparse.Namespace) -> int:
+    """A figure or a film of one trace."""
+    from ..traces import read
+
+    name = options.picture
+    usual = f"{Path(options.file).stem}.{'svg' if name == 'plot' else 'webp'}"
+    if name == "plot":
+        options.fps = options.slow = options.size = None
+    options.plot = options.film = None
+    setattr(options, name, options.output or usual)
+    trace = read(options.file)
+    pictures.write(pictures.checked(options), options, trace)
     return 0
 
 

@@ -64,9 +64,10 @@ def series(one: Trace, two: Trace, tip: str | None = None) -> list[Series]:
     """
     common = common_moments(one, two)
     found: list[Series] = []
-    for name in one.header.joints:
-        if name in two.header.joints:
-            found += _joint(name, one, two, common)
+    for place, name in enumerate(one.header.joints):
+        other = _counterpart(place, name, two.header)
+        if other is not None:
+            found += _joint(name or f"joint {place}", (place, other), one, two, common)
     site = default_tip(one.header, two.header) if tip is None else tip
     if site and "site_xpos" in one and "site_xpos" in two:
         found += _site(site, one, two, common)
@@ -115,8 +116,16 @@ def _scalar(name: str, kind: Kind, common: Common, one: Array, two: Array) -> Se
     return Series(name, kind, common.time, one, two, np.abs(one - two))
 
 
-def _joint(name: str, one: Trace, two: Trace, common: Common) -> list[Series]:
-    places = [trace.header.joints.index(name) for trace in (one, two)]
+def _counterpart(place: int, name: str, header: Header) -> int | None:
+    """The joint of that name; of one without a name, the one in its place if it has none too."""
+    if name:
+        return header.joints.index(name) if name in header.joints else None
+    return place if place < len(header.joints) and not header.joints[place] else None
+
+
+def _joint(
+    name: str, places: tuple[int, int], one: Trace, two: Trace, common: Common
+) -> list[Series]:
     kinds = [trace.header.jnt_type[place] for trace, place in zip((one, two), places, strict=True)]
     if kinds[0] != kinds[1]:
         return []

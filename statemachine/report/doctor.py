@@ -12,17 +12,8 @@ from dataclasses import dataclass
 
 from ..engines import ENGINES, engine_version
 from ..page import Page, Table, Text, Verdict
+from ..rendering.probe import PATIENCE, offscreen_opengl, opengl_remedy
 
-_RENDER = """
-import mujoco
-model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
-data = mujoco.MjData(model)
-mujoco.mj_forward(model, data)
-with mujoco.Renderer(model, 32, 32) as renderer:
-    renderer.update_scene(data)
-    assert renderer.render().any()
-"""
-_PATIENCE = 60  # seconds for a probe; a software renderer starts slowly
 _ROLES = {
     "mujoco": "runs every lesson",
     "pybullet": "the second engine of every lesson",
@@ -97,7 +88,7 @@ def _engine(name: str) -> Finding:
     try:
         done = _run(code)
     except subprocess.TimeoutExpired:
-        return Finding(name, False, f"import takes over {_PATIENCE} s", "try again", optional)
+        return Finding(name, False, f"import takes over {PATIENCE} s", "try again", optional)
     if done.returncode == 0:
         found = f"{engine_version(name)}, {_ROLES[name]}"
         return Finding(name, True, found, optional=optional)
@@ -111,26 +102,15 @@ def _engine(name: str) -> Finding:
 def _rendering() -> Finding:
     if importlib.util.find_spec("mujoco") is None:
         return Finding("rendering", False, "needs mujoco", optional=True)
-    asked = os.environ.get("MUJOCO_GL", "")
-    for backend in dict.fromkeys((asked, "", "egl", "osmesa")):
-        # An offscreen library that is missing kills the process that asks for it.
-        environment = {key: value for key, value in os.environ.items() if key != "MUJOCO_GL"}
-        if backend:
-            environment["MUJOCO_GL"] = backend
-        try:
-            done = _run(_RENDER, environment)
-        except subprocess.TimeoutExpired:
-            continue
-        if done.returncode == 0 and backend == asked:
-            return Finding("rendering", True, "offscreen", optional=True)
-        if done.returncode == 0:
-            found = f"offscreen with MUJOCO_GL={backend}" if backend else "offscreen by default"
-            step = f"export MUJOCO_GL={backend}" if backend else "unset MUJOCO_GL"
-            return Finding("rendering", True, found, f"{step}, before rendering", optional=True)
-    step = "on Debian and Ubuntu: apt-get install libegl1 libopengl0 libgl1-mesa-dri"
-    if platform.system() != "Linux":
-        step = "needs a graphics driver with OpenGL"
-    return Finding("rendering", False, "no offscreen OpenGL", step, optional=True)
+    works = offscreen_opengl()
+    if works is None:
+        step = opengl_remedy()
+        return Finding("rendering", False, "no offscreen OpenGL", step, optional=True)
+    if works == os.environ.get("MUJOCO_GL", ""):
+        return Finding("rendering", True, "offscreen", optional=True)
+    found = f"offscreen with MUJOCO_GL={works}" if works else "offscreen by default"
+    step = f"export MUJOCO_GL={works}" if works else "unset MUJOCO_GL"
+    return Finding("rendering", True, found, f"{step}, before rendering", optional=True)
 
 
 def _clash() -> Finding:
@@ -146,12 +126,11 @@ def _clash() -> Finding:
     )
 
 
-def _run(code: str, environment: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+def _run(code: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-c", code],
         capture_output=True,
         text=True,
-        timeout=_PATIENCE,
-        env=environment,
+        timeout=PATIENCE,
         check=False,
     )

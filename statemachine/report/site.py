@@ -1,21 +1,27 @@
-"""Pages of the documentation that are made from runs: the path, and the conventions."""
+"""Pages of the documentation that are made from runs: path, conventions, comparisons."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ..backends import backend_names, load
+from ..compare import Request, compare, series, sides_of, witness
+from ..compare.why import attribute
 from ..engines import available
 from ..errors import MissingEngineError
+from ..experiments.scenarios import scenario
 from ..lessons import LESSONS
 from ..lessons.session import page_of_lesson, take
-from ..page import Page, Picture, Verdict
+from ..page import Page, Picture, Traces, Verdict
 from ..probes import phrasebook
 from ..probes.conventions import probe
-from . import conventions
+from . import compare as comparison
+from . import conventions, why
 from .figures import svg
+from .figures_of import scale_of
 from .markdown import block_as_markdown, markdown
 
 
@@ -46,7 +52,8 @@ def make_path(
                 continue
             taken[backend] = take(lesson, model, backend)
         page = page_of_lesson(lesson, taken)
-        written.append(_write(folder, f"{number:02}-{lesson.name}", page, lesson.question))
+        name, typed = f"{number:02}-{lesson.name}", f"statemachine lesson {lesson.name}"
+        written.append(_write(folder, name, page, lesson.question, typed))
     return written
 
 
@@ -71,6 +78,48 @@ def make_reference(folder: Path, say: Callable[[str], None] = print) -> list[Pat
     return [folder / f"{name}.md" for name in pages]
 
 
+def make_comparisons(folder: Path, say: Callable[[str], None] = print) -> list[Path]:
+    """Write what `statemachine compare` says of the arm's experiments, and why.
+
+    Args:
+        folder: Where to; made if it is not there.
+        say: Told what is being made.
+
+    Returns:
+        The pages that were written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    found = []
+    for name in ("hold", "gravity", "box"):
+        say(f"comparing: {name} ...")
+        (one, two), said = sides_of(Request((name,)))
+        asked = witness(one, two)
+        page = comparison.page(compare(one, two), one.header.says, said, asked)
+        curves = {
+            curve.name: (curve.time.tolist(), (curve.difference * scale_of(curve.kind)[0]).tolist())
+            for curve in series(one, two)
+            if curve.kind == "joint"
+        }
+        apart = Traces("How far apart", "time [s]", "difference [°]", curves, log=True)
+        page = replace(page, blocks=[page.blocks[0], apart, *page.blocks[1:]])
+        found.append(_write(folder, name, page, "", f"statemachine compare {name}"))
+        if not (one.header.recorded or two.header.recorded):
+            found.append(_explain(folder, name))
+    return found
+
+
+def _explain(folder: Path, name: str) -> Path:
+    """The page that says why, for engines as they come."""
+    asked = scenario(name)
+    models = [
+        load(asked.model, backend=backend, defaults="engine") for backend in ("mujoco", "pybullet")
+    ]
+    page = why.page(attribute(models[0], models[1], asked), [])
+    return _write(
+        folder, f"{name}-why", page, "", f"statemachine compare {name} --why --defaults engine"
+    )
+
+
 def _phrases(page: Page, table: phrasebook.Calls) -> str:
     """A heading for each concept, and what to type on each engine."""
     parts = [f"# {page.title}", f"*{page.origin}*"]
@@ -84,7 +133,7 @@ def _phrases(page: Page, table: phrasebook.Calls) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def _write(folder: Path, name: str, page: Page, question: str) -> Path:
+def _write(folder: Path, name: str, page: Page, question: str, typed: str) -> Path:
     pictures: list[str] = []
 
     def picture(block: Picture) -> str:
@@ -95,9 +144,9 @@ def _write(folder: Path, name: str, page: Page, question: str) -> Path:
 
     text = markdown(page, picture)
     heading, _, rest = text.partition("\n\n")
-    run = f"In a terminal: `statemachine lesson {name.partition('-')[2]}`"
+    lead = f"**{question}** " if question else ""
     path = folder / f"{name}.md"
-    _save(path, f"{heading}\n\n**{question}** {run}\n\n{rest}")
+    _save(path, f"{heading}\n\n{lead}In a terminal: `{typed}`\n\n{rest}")
     return path
 
 

@@ -1,0 +1,169 @@
+"""`statemachine compare EXPERIMENT --html FILE`: the comparison as one page that stands alone."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from pathlib import Path
+from typing import Any
+
+from ..errors import BadInputError, MissingEngineError, StateMachineError
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Those of the report."""
+    parser.add_argument(
+        "--html",
+        default=None,
+        metavar="FILE",
+        help="write a report that stands alone: both runs in 3D, curves, figures, what causes it",
+    )
+    parser.add_argument(
+        "--no-why", action="store_true", help="of --html: do not look for what causes it"
+    )
+
+
+def check(options: argparse.Namespace) -> None:
+    """Whether the report can be written, before anything is run.
+
+    Raises:
+        BadInputError: It cannot, or --no-why is without --html.
+    """
+    if options.html is None:
+        if options.no_why:
+            raise BadInputError("--no-why goes with --html")
+        return
+    if options.models:
+        raise BadInputError("--html is of a run, and --models runs nothing")
+    from ..report.html import check_target
+
+    check_target(options.html)
+
+
+def write(
+    options: argparse.Namespace,
+    request: Any,
+    comparison: Any,
+    traces: tuple[Any, Any],
+    said: tuple[str, ...],
+    witness: Any = None,
+) -> None:
+    """Look for causes and shapes, and write the page.
+
+    Args:
+        options: `html`, `no_why` and `tolerance` are read.
+        request: The `compare.Request`.
+        comparison: What was found.
+        traces: Both sides.
+        said: What stood in for a run.
+        witness: The third party's figures, or None.
+    """
+    from ..report.html import report, write_report
+
+    attribution, why_not = (None, "") if options.no_why else _why(request, traces, options.quantity)
+    text = report(
+        comparison,
+        *traces,
+        looks=_looks(request, traces),
+        attribution=attribution,
+        why_not=why_not,
+        models=_models(request, traces),
+        said=said,
+        command=_typed(options, request),
+        witness=witness,
+    )
+    target = write_report(options.html, text)
+    print(f"wrote {target} ({len(text.encode()) / 1e6:.2f} MB)", file=sys.stderr)
+
+
+def _why(request: Any, traces: tuple[Any, Any], quantity: str | None) -> tuple[Any, str]:
+    """The attribution, or why there is none."""
+    if request.is_traces:
+        return None, (
+            "What causes it was not looked for: traces were compared, and causes are found by "
+            "running an experiment again."
+        )
+    if any(trace.header.recorded for trace in traces):
+        return None, (
+            "What causes it was not looked for: one side is a recorded run, and causes are found "
+            "by running both again."
+        )
+    from ..report.progress import progress
+    from ._compare_why import explain
+
+    try:
+        with progress("why") as told:
+            return explain(request, quantity, told), ""
+    except StateMachineError as error:
+        return None, f"What causes it could not be found: {error}."
+
+
+def _models(request: Any, traces: tuple[Any, Any]) -> Any:
+    """The page of what each engine makes of the model; None where that cannot be read."""
+    names = [trace.header.provenance.model_file for trace in traces]
+    engines = tuple(trace.header.backend for trace in traces)
+    if engines[0] == engines[1] and names[0] == names[1]:
+        return None
+    from ..compare.models import compare
+    from ..report.model_diff import page
+
+    files = [request.model or name for name in names]
+    try:
+        return page(compare(files[0], files[1], engines=engines, menagerie=request.menagerie))
+    except (StateMachineError, OSError):
+        return None
+
+
+def _looks(request: Any, traces: tuple[Any, Any]) -> tuple[Any, Any]:
+    """What each side is drawn as: its model, if it is the one that the trace is of."""
+    one = _look(request, traces[0])
+    a, b = (trace.header for trace in traces)
+    same = (a.provenance.model_sha256, a.bodies) == (b.provenance.model_sha256, b.bodies)
+    return one, one if same else _look(request, traces[1])
+
+
+def _look(request: Any, trace: Any) -> Any:
+    from ..backends import load
+    from ..drawing import drawing_of
+    from ..experiments._common import provenance
+    from ..report.html import Look
+
+    header = trace.header
+    file = header.provenance.model_file
+    try:
+        model = load(request.model or file, menagerie=request.menagerie)
+        if model.body_names != header.bodies:
+            return Look(None, f"{file} as it is here has other bodies")
+        if provenance(model).model_sha256 != header.provenance.model_sha256:
+            return Look(None, f"{file} as it is here has another digest")
+        return Look(drawing_of(model))
+    except MissingEngineError as error:
+        return Look(None, str(error))
+    except StateMachineError:
+        return Look(None, f"there is no {file} here")
+
+
+def _typed(options: argparse.Namespace, request: Any) -> str:
+    """The command as typed, without folders of this machine."""
+    words = ["statemachine compare", *(Path(word).name for word in request.what)]
+    if tuple(request.backends) != ("mujoco", "pybullet"):
+        words += ["--backends", *request.backends]
+    for flag, value, usual in (
+        ("--defaults", request.defaults, "model"),
+        ("--model", request.model and Path(request.model).name, None),
+        ("--menagerie", request.menagerie and "DIR", None),
+        ("--seconds", request.seconds, None),
+        ("--timestep", request.options.get("timestep"), None),
+        ("--seed", request.seed, 0),
+    ):
+        if value != usual:
+            words += [flag, str(value)]
+    for text in options.tolerance:
+        words += ["--tolerance", text]
+    if options.quantity:
+        words += ["--quantity", options.quantity]
+    if options.no_why:
+        words.append("--no-why")
+    words += ["--html", Path(options.html).name]
+    return " ".join([words[0], *(shlex.quote(word) for word in words[1:])])

@@ -1,0 +1,180 @@
+"""Pictures of a comparison: the options, what is checked before the runs, and the files."""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import BadInputError, ModelFileError, UnknownNameError
+from ._common import complain
+
+_RENDERERS = ("auto", "mujoco", "pybullet")
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """The options."""
+    group = parser.add_argument_group("pictures")
+    group.add_argument(
+        "--plot", default=None, metavar="FILE", help="write a figure: .svg, .png or .pdf"
+    )
+    group.add_argument(
+        "--film", default=None, metavar="FILE", help="write a film of both sides: .webp or .mp4"
+    )
+    add_film(group)
+
+
+def add_film(group: Any) -> None:
+    """How a film is made."""
+    group.add_argument(
+        "--fps", type=float, default=30.0, metavar="N", help="of the film (default 30)"
+    )
+    group.add_argument(
+        "--slow", type=float, default=1.0, metavar="N", help="of the film: N times slower"
+    )
+    group.add_argument(
+        "--size", type=_size, default=(640, 480), metavar="WxH", help="of the film (640x480)"
+    )
+    group.add_argument(
+        "--renderer",
+        default="auto",
+        choices=_RENDERERS,
+        help="of the film; auto: mujoco, and where it has no OpenGL pybullet's software",
+    )
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """What was asked for, and can be made here."""
+
+    plot: Path | None
+    film: Path | None
+    fps: float
+    slow: float
+    size: tuple[int, int]
+    renderer: Any = None
+
+
+def checked(options: argparse.Namespace) -> Pictures:
+    """What was asked for, before anything runs.
+
+    Raises:
+        BadInputError: A file has another suffix or cannot be written, or a figure is none.
+        MissingEngineError: An extra is missing, or nothing here can draw a film.
+    """
+    plot, film = (None if word is None else Path(word) for word in (options.plot, options.film))
+    if plot is not None:
+        from ..report import plot as plots
+
+        plots.check_suffix(plot)
+        _check_place(plot)
+    renderer = None
+    if film is not None:
+        from ..rendering import renderer_here
+        from ..rendering.pictures import check_size, check_speed
+        from ..report import film as films
+        from ..report.progress import progress
+
+        films.check_suffix(film)
+        check_speed(options.fps, options.slow)
+        check_size(options.size, films.SMALLEST)
+        _check_place(film)
+        with progress("looking for OpenGL"):
+            renderer = renderer_here(None if options.renderer == "auto" else options.renderer)
+        if options.renderer == "auto" and renderer.name != "mujoco":
+            complain(f"no OpenGL here: the film is drawn by {renderer}", 0)
+    return Pictures(plot, film, options.fps, options.slow, options.size, renderer)
+
+
+def write(
+    pictures: Pictures, options: Any, one: Any, two: Any = None, comparison: Any = None
+) -> None:
+    """Write what was asked for; a line for each file on standard error.
+
+    Args:
+        pictures: From `checked`.
+        options: Their `model` and `menagerie` say what the film shows, if not the traces.
+        one: A trace.
+        two: The other one; None for pictures of one trace.
+        comparison: Of the two.
+    """
+    from ..report.progress import progress
+
+    if pictures.plot is not None:
+        from ..report import plot as plots
+
+        with progress("figure"):
+            figure = plots.plot_trace(one) if two is None else plots.plot(one, two, comparison)
+            size = plots.write_plot(figure, pictures.plot)
+        complain(f"{pictures.plot}: a figure, {_bytes(size)}", 0)
+    if pictures.film is not None:
+        from ..report import film as films
+
+        models = _models(options, *(trace for trace in (one, two) if trace is not None))
+        with progress("film") as told:
+            film = films.write_film(
+                pictures.film,
+                one,
+                two,
+                comparison,
+                size=pictures.size,
+                fps=pictures.fps,
+                slow=pictures.slow,
+                models=models,
+                renderer=pictures.renderer,
+                progress=told,
+            )
+        complain(
+            f"{film.path}: a film of {film.seconds:.3g} s, {film.pictures} pictures, "
+            f"{_bytes(film.size)}, drawn by {film.renderer}",
+            0,
+        )
+
+
+def _models(options: Any, *traces: Any) -> Any:
+    """What the traces are drawn with; a word where it is not what they were recorded with."""
+    from ..backends import load
+    from ..experiments._common import provenance
+
+    models = []
+    for trace in traces:
+        known = trace.header.provenance
+        name = options.model or known.model_file
+        try:
+            model = load(name, menagerie=options.menagerie)
+        except (ModelFileError, UnknownNameError) as error:
+            raise ModelFileError(f"a film needs the model: {error}; name it with --model") from None
+        if provenance(model).model_sha256 != known.model_sha256:
+            complain(
+                f"the film shows {name} as it is here; the trace of {trace.header.label} was "
+                "recorded with another state of that file",
+                0,
+            )
+        models.append(model)
+    return tuple(models)
+
+
+def _check_place(path: Path) -> None:
+    if path.is_dir():
+        raise BadInputError(f"{path} is a folder, not a file")
+    folder = path.parent
+    if not folder.is_dir():
+        raise BadInputError(f"{path} cannot be written: there is no folder {folder}")
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise BadInputError(f"{path} cannot be written: {error.strerror}") from None
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, cross, height = text.lower().partition("x")
+    if not (cross and width.isdecimal() and height.isdecimal()):
+        raise argparse.ArgumentTypeError(f"a size reads like 640x480; got {text}")
+    return int(width), int(height)
+
+
+def _bytes(size: int) -> str:
+    return f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{max(1, round(size / 1000))} kB"

@@ -1,0 +1,130 @@
+"""Drawn by PyBullet's software renderer, which needs no OpenGL; slower, and plainer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..backends import load
+from ..drawing import Part, drawing_of
+from ..engines import require
+from ..records import Array
+from ..rotations import xyzw_from_wxyz
+from ..silence import silence
+from .camera import Camera
+from .compose import GHOST, Shot
+
+_MOST = 20_000  # faces of one shape; PyBullet takes 131072 vertices
+_TILE = 0.1  # [m] of a floor without an end, laid out so that its perspective is seen
+_TILES = 12  # each way from the middle
+_LIGHT = (0.4, -0.6, 1.5)
+_SKY = np.array([[196.0, 208.0, 220.0], [240.0, 243.0, 246.0]])  # above, and at the horizon
+
+
+class BulletFrames:
+    """Draws the bodies of one or two models wherever they are told to be."""
+
+    SHARPER = 1  # it has no time for smooth edges
+
+    def __init__(self, files: Sequence[Path], size: tuple[int, int], camera: Camera) -> None:
+        """Connect to a world for each side; as `MujocoFrames`."""
+        pb = require("pybullet")
+        self._pb, self._size, self._camera = pb, size, camera
+        self._clients: list[int] = []
+        self._placed: list[list[tuple[int, int]]] = []
+        for k, file in enumerate(files):
+            with silence():
+                client = pb.connect(pb.DIRECT)
+            self._clients.append(client)
+            parts = [part for part in drawing_of(load(file)).parts if k == 0 or part.body]
+            self._placed.append(
+                [
+                    (self._made(client, shape, colour), part.body)
+                    for part in parts
+                    for shape, colour in _shapes(part, (*GHOST, 1.0) if k else part.rgba)
+                ]
+            )
+        up = camera.axes[1].tolist()
+        self._view = pb.computeViewMatrix(camera.eye.tolist(), list(camera.target), up)
+        aspect = size[0] / size[1]
+        self._lens = pb.computeProjectionMatrixFOV(camera.fovy, aspect, camera.near, camera.far)
+
+    def shot(self, side: int, xpos: Array, xquat: Array) -> Shot:
+        """A side with its bodies at xpos (nbody, 3) and xquat (nbody, 4)."""
+        pb, client = self._pb, self._clients[side]
+        turned = xyzw_from_wxyz(xquat)
+        for number, body in self._placed[side]:
+            pb.resetBasePositionAndOrientation(
+                number, xpos[body].tolist(), turned[body].tolist(), physicsClientId=client
+            )
+        width, height = self._size
+        _, _, rgba, window, _ = pb.getCameraImage(
+            width,
+            height,
+            self._view,
+            self._lens,
+            lightDirection=_LIGHT,
+            shadow=side == 0,
+            renderer=pb.ER_TINY_RENDERER,
+            physicsClientId=client,
+        )
+        rgb = np.array(rgba, dtype=np.uint8).reshape(height, width, 4)[..., :3].copy()
+        window = np.array(window, dtype=float).reshape(height, width)
+        near, far = self._camera.near, self._camera.far
+        depth = far * near / (far - (far - near) * window)
+        # Nothing drawn is beyond; the last float32 before 1 is.
+        depth[window >= 1 - 1e-6] = np.inf
+        nothing = ~np.isfinite(depth)
+        fade = np.linspace(0, 1, height)[:, None]
+        sky = ((1 - fade) * _SKY[0] + fade * _SKY[1]).astype(np.uint8)
+        rgb[nothing] = np.broadcast_to(sky[:, None], rgb.shape)[nothing]
+        return Shot(rgb, depth)
+
+    def close(self) -> None:
+        """Give the worlds back."""
+        for client in self._clients:
+            self._pb.disconnect(client)
+
+    def _made(self, client: int, shape: tuple[Any, Any], rgba: Sequence[float]) -> int:
+        vertices, faces = shape
+        look = self._pb.createVisualShape(
+            self._pb.GEOM_MESH,
+            vertices=vertices.tolist(),
+            indices=faces.ravel().tolist(),
+            rgbaColor=list(rgba),
+            specularColor=[0.1, 0.1, 0.1],
+            physicsClientId=client,
+        )
+        return self._pb.createMultiBody(0, -1, look, physicsClientId=client)
+
+
+def _shapes(
+    part: Part, rgba: Sequence[float]
+) -> Iterator[tuple[tuple[NDArray[Any], NDArray[Any]], Sequence[float]]]:
+    """A part in pieces that PyBullet takes, each face with its own corners: flat shading."""
+    if part.endless:
+        yield _tiles(part, 0), (*rgba[:3], 1.0)
+        yield _tiles(part, 1), (*(0.93 * c for c in rgba[:3]), 1.0)
+        return
+    for start in range(0, len(part.faces), _MOST):
+        corners = part.vertices[part.faces[start : start + _MOST]].reshape(-1, 3)
+        yield (corners, np.arange(len(corners))), rgba
+
+
+def _tiles(plane: Part, dark: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Every other square of a chessboard about the middle of a plane."""
+    a, b, c = plane.vertices[plane.faces[0]].astype(float)
+    x = (b - a) / np.linalg.norm(b - a)
+    normal = np.cross(b - a, c - a)
+    y = np.cross(normal / np.linalg.norm(normal), x)
+    around = range(-_TILES, _TILES)
+    squares = np.array([(i, j) for i in around for j in around if (i + j) % 2 == dark])
+    corner = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+    flat = _TILE * (squares[:, None] + corner).reshape(-1, 2)
+    vertices = plane.vertices.mean(axis=0) + flat @ np.stack([x, y])
+    first = 4 * np.arange(len(squares))[:, None, None]
+    return vertices, (first + np.array([(0, 1, 2), (0, 2, 3)])).reshape(-1, 3)

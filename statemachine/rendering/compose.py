@@ -1,0 +1,72 @@
+"""Two pictures into one: a solid side, and a ghost of the other where they part."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..records import Array
+
+Pixels = NDArray[np.uint8]
+GHOST = (0.42, 0.18, 0.62)  # violet: apart from orange to every eye, and dark without colour
+_STRENGTH = 0.6  # of the ghost over what is behind it
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """One picture and how far away everything in it is.
+
+    Attributes:
+        rgb: (height, width, 3).
+        depth: (height, width) along the direction of view [m]; infinite where nothing is.
+    """
+
+    rgb: Pixels
+    depth: Array
+
+
+def compose(solid: Shot, ghost: Shot | None, bias: float, line: int) -> Pixels:
+    """Put a ghost over a solid picture.
+
+    It is seen where it is nearer than the solid side by more than `bias` [m]: where the two
+    are in one place the solid side is drawn alone. The ghost's outline, `line` pixels wide,
+    is drawn at full strength, so that it is told apart without colour.
+    """
+    if ghost is None:
+        return solid.rgb
+    seen = ghost.depth < solid.depth - bias
+    if not seen.any():
+        return solid.rgb
+    there = np.isfinite(ghost.depth)
+    inside = there.copy()
+    for _ in range(line):
+        inside = _shrunk(inside)
+    rgb = solid.rgb.copy()
+    mixed = (1 - _STRENGTH) * solid.rgb[seen] + _STRENGTH * ghost.rgb[seen]
+    rgb[seen] = np.round(mixed).astype(np.uint8)
+    rgb[seen & ~inside] = (0.6 * 255 * np.asarray(GHOST)).astype(np.uint8)
+    return rgb
+
+
+def halved(rgb: Pixels, by: int) -> Pixels:
+    """A picture at a fraction of its size; each pixel is the mean of those it stands for."""
+    if by == 1:
+        return rgb
+    height, width = rgb.shape[0] // by, rgb.shape[1] // by
+    total = np.zeros((height, width, 3), dtype=np.uint16)
+    for i in range(by):
+        for j in range(by):
+            total += rgb[i::by, j::by]
+    return (total // (by * by)).astype(np.uint8)
+
+
+def _shrunk(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Without the pixels at the edge; the frame of the picture is none."""
+    found = mask.copy()
+    found[1:] &= mask[:-1]
+    found[:-1] &= mask[1:]
+    found[:, 1:] &= mask[:, :-1]
+    found[:, :-1] &= mask[:, 1:]
+    return found

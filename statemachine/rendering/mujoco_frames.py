@@ -1,0 +1,113 @@
+"""Drawn by MuJoCo: one view for each side, in one OpenGL context without a window."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..backends import load
+from ..engines import require
+from ..records import Array
+from ..rotations import matrix_from_quat
+from .camera import Camera
+from .compose import GHOST, Shot
+
+
+class MujocoFrames:
+    """Draws the bodies of one or two models wherever they are told to be."""
+
+    SHARPER = 2  # drawn so many times as large, and made smaller: edges are smooth then
+
+    def __init__(self, files: Sequence[Path], size: tuple[int, int], camera: Camera) -> None:
+        """Open an OpenGL context.
+
+        Args:
+            files: The model of the solid side, and that of the ghost if there is one.
+            size: Width and height of the pictures.
+            camera: Where they are seen from.
+        """
+        self._mj = require("mujoco")
+        self._context = self._mj.GLContext(*size)
+        self._context.make_current()
+        self._views = [
+            _View(self._mj, file, size, camera, ghost=k > 0) for k, file in enumerate(files)
+        ]
+
+    def shot(self, side: int, xpos: Array, xquat: Array) -> Shot:
+        """A side with its bodies at xpos (nbody, 3) and xquat (nbody, 4)."""
+        return self._views[side].shot(xpos, xquat)
+
+    def close(self) -> None:
+        """Give OpenGL back."""
+        for view in self._views:
+            view.close()
+        self._context.free()
+
+
+class _View:
+    def __init__(
+        self, mj: Any, file: Path, size: tuple[int, int], camera: Camera, ghost: bool
+    ) -> None:
+        self._mj, self._ghost, self._size = mj, ghost, size
+        self._raw = raw = load(file).raw
+        raw.vis.global_.offwidth, raw.vis.global_.offheight = size
+        raw.vis.global_.fovy, raw.vis.global_.orthographic = camera.fovy, 0
+        raw.vis.map.znear = camera.near / raw.stat.extent
+        raw.vis.map.zfar = camera.far / raw.stat.extent
+        # At the edge of the map of shadows the floor is dotted with them: beyond what is seen.
+        raw.vis.map.shadowclip = 9 * camera.distance / raw.stat.extent
+        raw.vis.quality.shadowsize = 4096
+        raw.vis.quality.offsamples = 0  # the pictures are halved: twice smoothed is blurred
+        self._near, self._far = camera.near, camera.far
+        self._turn = matrix_from_quat(raw.geom_quat)
+        self._data = mj.MjData(raw)
+        mj.mj_forward(raw, self._data)  # lights, and all that no trace tells
+        self._pen = mj.MjrContext(raw, mj.mjtFontScale.mjFONTSCALE_100)
+        mj.mjr_setBuffer(mj.mjtFramebuffer.mjFB_OFFSCREEN, self._pen)
+        self._pen.readDepthMap = mj.mjtDepthMap.mjDEPTH_ZEROFAR
+        self._camera = mj.MjvCamera()
+        self._camera.lookat[:] = camera.target
+        self._camera.distance = camera.distance
+        self._camera.azimuth, self._camera.elevation = camera.azimuth, camera.elevation
+        self._scene = mj.MjvScene(raw, maxgeom=raw.ngeom + 1000)
+        self._shown = mj.MjvOption()
+        seen = raw.geom_group < 3  # as MuJoCo's viewer, and as statemachine.drawing
+        self._shown.geomgroup[:] = (1, 1, 1, 0, 0, 0) if raw.geom_bodyid[seen].any() else 1
+        self._shown.sitegroup[:] = 0
+        self._shown.tendongroup[:] = 0
+        if ghost:
+            flags = mj.mjtRndFlag
+            for flag in (flags.mjRND_SHADOW, flags.mjRND_REFLECTION, flags.mjRND_SKYBOX):
+                self._scene.flags[flag] = 0
+
+    def shot(self, xpos: Array, xquat: Array) -> Shot:
+        mj, raw, data, scene = self._mj, self._raw, self._data, self._scene
+        turn = matrix_from_quat(xquat)
+        body = raw.geom_bodyid
+        data.xpos[:], data.xquat[:] = xpos, xquat  # skins follow these
+        data.geom_xpos[:] = xpos[body] + np.einsum("nij,nj->ni", turn[body], raw.geom_pos)
+        data.geom_xmat[:] = (turn[body] @ self._turn).reshape(-1, 9)
+        what = mj.mjtCatBit.mjCAT_DYNAMIC if self._ghost else mj.mjtCatBit.mjCAT_ALL
+        mj.mjv_updateScene(raw, data, self._shown, None, self._camera, what, scene)
+        if self._ghost:
+            for geom in scene.geoms[: scene.ngeom]:
+                geom.rgba[:] = (*GHOST, 1.0)
+                geom.matid = -1
+        width, height = self._size
+        rgb = np.empty((height, width, 3), dtype=np.uint8)
+        depth = np.empty((height, width), dtype=np.float32)  # as OpenGL has it
+        frame = mj.MjrRect(0, 0, width, height)
+        mj.mjr_setBuffer(mj.mjtFramebuffer.mjFB_OFFSCREEN, self._pen)  # there may be two pens
+        mj.mjr_render(frame, scene, self._pen)
+        mj.mjr_readPixels(rgb, depth, frame, self._pen)
+        # Reversed depth: 1 at the near plane, 0 at the far one, linear in 1/z.
+        near, far = self._near, self._far
+        metres = near * far / (near + depth.astype(np.float64) * (far - near))
+        metres[depth == 0] = np.inf
+        return Shot(rgb[::-1], metres[::-1])
+
+    def close(self) -> None:
+        self._pen.free()

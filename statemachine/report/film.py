@@ -1,0 +1,161 @@
+"""A film of a comparison: both sides in one picture, and how far apart they are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..compare import Comparison, Series, series
+from ..errors import BadInputError, MissingEngineError
+from ..experiments._common import Progress, silent
+from ..model import Model
+from ..rendering import Renderer, Timing, frames, renderer_here, timing_of
+from ..rendering.pictures import check_size
+from ..traces import Trace
+from .figures_of import scale_of
+from .film_files import SUFFIXES, write_mp4, write_webp
+from .film_overlay import Overlay, Strip
+from .plot_panels import side_labels
+
+SMALLEST = (240, 180)  # in which the strip and the text have room
+
+
+@dataclass(frozen=True)
+class Film:
+    """A film that was written.
+
+    Attributes:
+        path: Where.
+        pictures: How many.
+        seconds: How long it takes to watch [s].
+        size: Bytes.
+        renderer: What drew it.
+    """
+
+    path: Path
+    pictures: int
+    seconds: float
+    size: int
+    renderer: str
+
+
+def check_suffix(path: Path) -> None:
+    """Raise BadInputError for a file that is no film, MissingEngineError without an extra."""
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        hint = "; WebP is smaller and has all colours" if suffix == ".gif" else ""
+        raise BadInputError(f"a film is a file {' or '.join(SUFFIXES)}; got {path.name!r}{hint}")
+    try:
+        import PIL.Image  # noqa: F401
+    except ImportError as error:
+        raise MissingEngineError(
+            "films need Pillow: pip install 'statemachine-sim[render]'", engine="pillow"
+        ) from error
+    if suffix == ".mp4":
+        try:
+            import imageio_ffmpeg  # noqa: F401
+        except ImportError as error:
+            raise MissingEngineError(
+                "mp4 needs ffmpeg: pip install 'statemachine-sim[mp4]'; WebP needs nothing more",
+                engine="imageio-ffmpeg",
+            ) from error
+
+
+def write_film(
+    path: Path,
+    one: Trace,
+    two: Trace | None = None,
+    comparison: Comparison | None = None,
+    *,
+    size: tuple[int, int] = (640, 480),
+    fps: float = 30.0,
+    slow: float = 1.0,
+    models: tuple[Model, ...] | None = None,
+    renderer: Renderer | None = None,
+    progress: Progress = silent,
+) -> Film:
+    """Write a film of one trace, or of two and how far apart they are.
+
+    Args:
+        path: A file .webp or .mp4; it is there whole or not at all.
+        one: Drawn solid.
+        two: Drawn as a ghost.
+        comparison: Of the two; has the tolerance that is drawn.
+        size: Width and height [pixels], even.
+        fps: Pictures a second.
+        slow: How many times as long as simulated time it takes.
+        models: What they look like; by default what the traces name.
+        renderer: What draws; by default what works here.
+        progress: Told the fraction that is done.
+
+    Raises:
+        BadInputError: The path, size, fps or slow cannot be.
+        MissingEngineError: An extra is missing, or nothing here can draw.
+    """
+    check_suffix(path)
+    check_size(size, SMALLEST)
+    timing = timing_of(one, two, fps, slow)
+    renderer = renderer_here() if renderer is None else renderer
+    strip = _strip(one, two, comparison)
+    labels = [one.header.label] if two is None else side_labels(one, two)
+    overlay = Overlay(size, timing, one.header.experiment, labels, strip)
+    drawn = frames(
+        one,
+        two,
+        size=overlay.inner,
+        timing=timing,
+        models=models,
+        renderer=renderer,
+    )
+
+    def pictures() -> Iterator[Any]:
+        for k, frame in enumerate(drawn):
+            progress((k + 1) / timing.count)  # before: nobody asks for more than the last
+            yield overlay.paint(frame, k)
+
+    try:
+        if path.suffix.lower() == ".mp4":
+            write_mp4(path, pictures(), size, fps)
+        else:
+            write_webp(path, pictures(), timing.milliseconds)
+    finally:
+        drawn.close()
+    return Film(path, timing.count, _length(path, timing), path.stat().st_size, str(renderer))
+
+
+def _length(path: Path, timing: Timing) -> float:
+    if path.suffix.lower() == ".mp4":  # all of its pictures are shown equally long
+        return timing.count / timing.fps
+    return sum(timing.milliseconds) / 1000
+
+
+def _strip(one: Trace, two: Trace | None, comparison: Comparison | None) -> Strip | None:
+    """How far apart the fingertips are; without one, what is farthest beyond its tolerance."""
+    if two is None:
+        return None
+    curves = series(one, two)
+    curve = next((found for found in curves if found.kind == "tip"), None)
+    worst = comparison.worst.name if comparison is not None and comparison.worst else ""
+    if curve is None:
+        curve = next((found for found in curves if found.name == worst), None)
+    if curve is None and curves:
+        curve = curves[0]
+    return None if curve is None else _strip_of(curve, comparison)
+
+
+def _strip_of(curve: Series, comparison: Comparison | None) -> Strip:
+    scale, unit = scale_of(curve.kind)
+    found = comparison.agreements if comparison is not None else ()
+    allowed = next(
+        (agreement.tolerance for agreement in found if agreement.name == curve.name), None
+    )
+    name = curve.name.removesuffix(", position")
+    return Strip(
+        name,
+        unit.strip(),
+        curve.time,
+        scale * curve.difference,
+        None if allowed is None else scale * allowed,
+    )

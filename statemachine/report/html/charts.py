@@ -1,0 +1,223 @@
+"""Curves over time as SVG, with their axes as text: readable without a script, and in print."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...compare import Agreement, Series
+from ...records import Array, Ints
+from ..figures_of import figure, quantity, scale_of, short_time
+from .markup import Html, joined, tag
+
+_ROWS = 21  # of the table under a chart
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A curve: `y` (n,) in what is shown; `look` is its class; label at its end."""
+
+    y: Array
+    look: str
+    label: str = ""
+
+
+def difference_chart(curve: Series, found: Agreement, points: int = 600) -> Html:
+    """How far apart over time, with the tolerance as a band."""
+    scale = scale_of(curve.kind)[0]
+    top = 1.08 * max(float(curve.difference.max()), found.tolerance) * scale
+    said = (
+        f"{curve.name}, difference over time: at most {quantity(found.max, curve.kind)} at "
+        f"{short_time(found.at)}, settled at {quantity(found.settled, curve.kind)}; tolerance "
+        f"{quantity(found.tolerance, curve.kind)}, "
+        + ("never left." if found.since is None else f"left at {short_time(found.since)}.")
+    )
+    return _plot(
+        curve.time,
+        [Curve(curve.difference * scale, "apart")],
+        (0.0, top),
+        said,
+        band=found.tolerance * scale,
+        points=points,
+    )
+
+
+def values_chart(curve: Series, labels: tuple[str, str], points: int = 600) -> Html | None:
+    """Both sides over time; None for a quantity that has no values of its own."""
+    if not curve.one.size:
+        return None
+    scale, unit = scale_of(curve.kind)
+    curves = []
+    for side, look in ((curve.one, "one"), (curve.two, "two")):
+        columns = side.reshape(len(curve.time), -1).T * scale
+        names = "xyz" if len(columns) == 3 else [""] * len(columns)
+        curves += [
+            Curve(y, look, name if look == "one" else "")
+            for y, name in zip(columns, names, strict=True)
+        ]
+    values = np.concatenate([each.y for each in curves])
+    low, high = float(values.min()), float(values.max())
+    pad = 0.06 * (high - low) or max(abs(high) * 0.05, 1e-9)
+    ends = [
+        ", ".join(f"{float(v):.4g}" for v in np.atleast_1d(side[-1] * scale))
+        for side in (curve.one, curve.two)
+    ]
+    said = (
+        f"{curve.name} over time on both sides: at the end {ends[0]}{unit} on {labels[0]} and "
+        f"{ends[1]}{unit} on {labels[1]}."
+    )
+    floor = low if curve.kind == "force" else low - pad
+    return _plot(curve.time, curves, (floor, high + pad), said, points=points)
+
+
+def data_table(curve: Series, found: Agreement, labels: tuple[str, str]) -> Html:
+    """The figures of a chart: moments evenly spaced, and that of the largest difference."""
+    scale, unit = scale_of(curve.kind)
+    rows = np.linspace(0, len(curve.time) - 1, min(_ROWS, len(curve.time))).round().astype(int)
+    worst = int(np.argmax(curve.difference))
+    rows = np.unique([*rows, worst])
+    columns = []
+    parts = "xyz" if curve.one.ndim == 2 and curve.one.shape[1] == 3 else ("",)
+    if curve.one.size:
+        for side, label in zip((curve.one, curve.two), labels, strict=True):
+            for k, part in enumerate(parts):
+                columns.append((f"{label} {part}".strip(), side.reshape(len(side), -1)[:, k]))
+    columns.append(("apart", curve.difference))
+    head = tag(
+        "tr",
+        tag("th", "time, s", scope="col"),
+        *(tag("th", f"{name}, {unit.strip()}", scope="col") for name, _ in columns),
+    )
+    body = [
+        tag(
+            "tr",
+            tag("th", f"{curve.time[row]:.3f}", scope="row"),
+            *(tag("td", _number(float(values[row]) * scale)) for _, values in columns),
+            class_="most" if row == worst else None,
+        )
+        for row in rows.tolist()
+    ]
+    caption = f"{curve.name}: {len(rows)} of {len(curve.time)} moments, the largest difference bold"
+    return tag(
+        "div",
+        tag("table", tag("caption", caption), tag("thead", head), tag("tbody", *body)),
+        class_="wide",
+        tabindex="0",
+        role="region",
+        aria_label=f"Figures of {curve.name}",
+    )
+
+
+def _number(value: float) -> str:
+    return f"{value:.4f}" if abs(value) >= 1e-3 or value == 0 else figure(value)
+
+
+def _plot(
+    time: Array,
+    curves: Sequence[Curve],
+    span: tuple[float, float],
+    said: str,
+    band: float | None = None,
+    points: int = 600,
+) -> Html:
+    """Curves in a box of 1000 × 100 that is stretched to its place; ticks are text beside it."""
+    until = float(time[-1]) or 1.0
+    low, high = span
+    marks = []
+    if band is not None:
+        y = _up(band, low, high)
+        marks.append(tag("rect", x=0, y=f"{y:.2f}", width=1000, height=f"{100 - y:.2f}",
+                         class_="band"))  # fmt: skip
+        marks.append(tag("line", x1=0, x2=1000, y1=f"{y:.2f}", y2=f"{y:.2f}", class_="edge"))
+    ticks = ticks_of(low, high)
+    marks += [
+        tag("line", x1=0, x2=1000, y1=f"{_up(t, low, high):.2f}", y2=f"{_up(t, low, high):.2f}",
+            class_="grid")
+        for t in ticks
+    ]  # fmt: skip
+    marks += [
+        tag("path", d=_path(time / until, curve.y, low, high, points), class_=f"curve {curve.look}")
+        for curve in sorted(curves, key=lambda each: each.look)
+    ]
+    svg = tag("svg", *marks, viewBox="0 0 1000 100", preserveAspectRatio="none", focusable="false")
+    digits = _digits(ticks)
+    labels = [
+        tag("span", f"{tick:.{digits}f}".replace("-", "−"), class_="ytick",
+            style=f"top:{_up(tick, low, high):.2f}%")
+        for tick in ticks
+    ]  # fmt: skip
+    ends = [
+        tag(
+            "span",
+            curve.label,
+            class_="name",
+            style=f"top:{_up(float(curve.y[-1]), low, high):.2f}%",
+        )
+        for curve in curves
+        if curve.label
+    ]
+    return tag(
+        "div",
+        tag("div", svg, *labels, *ends, tag("i", class_="cursor"), class_="area"),
+        time_axis(until),
+        class_="plot",
+        role="img",
+        aria_label=said,
+    )
+
+
+def time_axis(until: float) -> Html:
+    """Ticks of time under a box that is as wide as the run is long."""
+    ticks = [tick for tick in ticks_of(0.0, until, 5) if tick <= until * 1.0001]
+    digits = _digits(ticks)
+    labels = []
+    for k, tick in enumerate(ticks):
+        text = f"{tick:.{digits}f}" + (" s" if k == len(ticks) - 1 else "")
+        labels.append(tag("span", text, style=f"left:{100 * tick / until:.2f}%"))
+    return tag("div", joined(labels), class_="times", aria_hidden="true")
+
+
+def ticks_of(low: float, high: float, most: int = 4) -> list[float]:
+    """Round numbers within a range: steps of 1, 2 or 5 times a power of ten."""
+    width = high - low
+    if not (math.isfinite(width) and width > 0):
+        return [low]
+    raw = width / most
+    power = 10.0 ** math.floor(math.log10(raw))
+    step = next(f * power for f in (1, 2, 5, 10) if f * power >= raw * 0.999)
+    first = math.ceil(low / step - 1e-9)
+    return [k * step + 0.0 for k in range(first, math.floor(high / step + 1e-9) + 1)]
+
+
+def _digits(ticks: Sequence[float]) -> int:
+    if len(ticks) < 2:
+        return 2
+    return max(0, -math.floor(math.log10(abs(ticks[1] - ticks[0])) + 1e-9))
+
+
+def _up(value: float, low: float, high: float) -> float:
+    return 100.0 * (1.0 - (value - low) / (high - low)) if high > low else 50.0
+
+
+def _path(x: Array, y: Array, low: float, high: float, most: int) -> str:
+    rows = _thinned(y, most)
+    points = [f"{1000 * float(x[k]):.1f} {_up(float(y[k]), low, high):.2f}" for k in rows.tolist()]
+    if len(points) == 1:  # a run of one row is a dash
+        points.append("1000 " + points[0].split()[1])
+    return "M" + "L".join(points)
+
+
+def _thinned(y: Array, most: int) -> Ints:
+    """Rows that show the same curve: of each stretch its lowest and its highest."""
+    n = len(y)
+    if n <= most:
+        return np.arange(n)
+    edges = np.linspace(0, n, most // 2 + 1).astype(int)
+    rows = {0, n - 1}
+    for start, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        part = y[start:stop]
+        rows |= {start + int(np.argmin(part)), start + int(np.argmax(part))}
+    return np.array(sorted(rows))

@@ -1,0 +1,59 @@
+"""A section of charts: how far apart each quantity is over time, and both sides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ...compare import Comparison, Series
+from ..figures_of import scale_of
+from . import sections
+from .charts import data_table, difference_chart, values_chart
+from .markup import Html, joined, tag
+
+
+def curves_section(
+    comparison: Comparison, curves: Sequence[Series], labels: tuple[str, str], points: int
+) -> Html:
+    """A row of charts for each quantity, those that differ first."""
+    by_name = {found.name: found for found in comparison.agreements}
+    shown: dict[str, list[tuple[float, Html]]] = {"differs": [], "settles": [], "agrees": []}
+    for curve in curves:
+        found = by_name[curve.name]
+        chart = values_chart(curve, labels, points)
+        unit = scale_of(curve.kind)[1].strip()
+        row = tag(
+            "section",
+            tag("h3", tag("span", curve.name, class_="quantity"),
+                sections.verdict_badge(found.verdict)),
+            tag(
+                "div",
+                tag("figure", tag("figcaption", f"how far apart, {unit}; shaded: within tolerance"),
+                    difference_chart(curve, found, points)),
+                tag("figure", tag("figcaption", f"both sides, {unit}"), chart) if chart else None,
+                class_="charts",
+            ),
+            tag("details", tag("summary", f"The figures of {curve.name}"),
+                data_table(curve, found, labels), class_="data"),
+            class_="quantity-row",
+        )  # fmt: skip
+        shown[found.verdict].append((-found.max / found.tolerance, row))
+    beyond = [row for v in ("differs", "settles") for _, row in sorted(shown[v], key=_first)]
+    within = [row for _, row in sorted(shown["agrees"], key=_first)]
+    key = tag(
+        "p",
+        tag("i", class_="key one"), f" {labels[0]}, full line ",
+        tag("i", class_="key two"), f" {labels[1]}, broken line ",
+        class_="legend",
+    )  # fmt: skip
+    if not beyond:
+        return joined((key, *within))
+    more = tag("details", tag("summary", _agreeing(len(within))), *within) if within else None
+    return joined([part for part in (key, *beyond, more) if part is not None])
+
+
+def _first(pair: tuple[float, Html]) -> float:
+    return pair[0]
+
+
+def _agreeing(count: int) -> str:
+    return f"The {count} that agree" if count > 1 else "The one that agrees"

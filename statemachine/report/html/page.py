@@ -1,0 +1,285 @@
+"""The report of a comparison as one HTML file that asks for nothing but itself."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from collections.abc import Sequence
+from importlib import resources
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import __version__
+from ...compare import Comparison, Series, Witness, default_tip, series
+from ...page import Page, Verdict
+from ...traces import Trace
+from . import sections
+from .budget import Budget
+from .curves import curves_section
+from .finding import headline, in_words, leading
+from .geometry import packed
+from .markup import Html, data_of, escaped, joined, kept, tag
+from .scene import Look, scene_of
+from .sketch import sketch
+from .stage import quantity_data, stage
+from .timeline import Frames, events_of, frames_of
+
+if TYPE_CHECKING:
+    from ...compare.why import Attribution
+
+_SCRIPTS = ("gl.js", "scene.js", "page.js")
+LIMIT = 2_000_000  # bytes of a page
+_NO_LOOK = Look(None, "no model was given")
+
+
+def report(
+    comparison: Comparison,
+    one: Trace,
+    two: Trace,
+    *,
+    looks: Sequence[Look] = (_NO_LOOK, _NO_LOOK),
+    tip: str | None = None,
+    attribution: Attribution | None = None,
+    why_not: str = "",
+    models: Page | None = None,
+    said: Sequence[str] = (),
+    command: str = "",
+    witness: Witness | None = None,
+) -> str:
+    """The page.
+
+    Args:
+        comparison: What was found in comparing the two.
+        one: The first trace, drawn solid.
+        two: The second, drawn as a ghost.
+        looks: What each is drawn as; the same object twice if both are of one model.
+        tip: The site that was compared, as given to `compare`.
+        attribution: How much each factor explains, if that was asked.
+        why_not: Why there is none, as a sentence.
+        models: The differences between what the engines make of the model, if asked.
+        said: What stood in for a run, line by line.
+        command: What makes the page again.
+        witness: How far the fingertip is from where a third party puts it, if asked.
+
+    Returns:
+        HTML of at most 2 MB: what would be more is drawn with less detail, which is said.
+    """
+    text = ""
+    for share in (1.0, 0.5, 0.25, 0.1):
+        text = _report(
+            comparison,
+            one,
+            two,
+            looks=looks,
+            tip=tip,
+            attribution=attribution,
+            why_not=why_not,
+            models=models,
+            said=said,
+            command=command,
+            witness=witness,
+            budget=Budget(share),
+        )
+        if len(text.encode("utf-8", errors="replace")) <= LIMIT:
+            break
+    return text
+
+
+def _report(
+    comparison: Comparison,
+    one: Trace,
+    two: Trace,
+    *,
+    looks: Sequence[Look],
+    tip: str | None,
+    attribution: Attribution | None,
+    why_not: str,
+    models: Page | None,
+    said: Sequence[str],
+    command: str,
+    witness: Witness | None,
+    budget: Budget,
+) -> str:
+    """The page, with a budget of details."""
+    site = default_tip(one.header, two.header) if tip is None else tip
+    curves = series(one, two, tip)
+    drawn = [curve for curve in curves if np.isfinite(curve.difference).all()]
+    events = events_of(comparison, one, two)
+    frames = frames_of(one, two, _moments(comparison), budget.frames(one, two))
+    scene = scene_of(one, two, frames, looks, site, budget)
+    start = _start(comparison, frames)
+    text = headline(comparison, events, attribution)
+    labels = comparison.one.label, comparison.two.label
+    if labels[0] == labels[1]:
+        labels = f"{labels[0]} (first)", f"{labels[1]} (second)"
+    words = in_words(comparison, events, attribution)
+    data = {
+        "time": packed(frames.time, "f8"),
+        "compared": packed(drawn[0].time[frames.compared], "f8"),
+        "until": comparison.until,
+        "start": start,
+        "quantities": [quantity_data(c, comparison, frames) for c in drawn],
+        "lead": _lead(comparison, drawn),
+        "scene": scene.data,
+    }
+    still = sketch(scene, one, two, frames, start, labels)
+    parts: list[object] = [
+        _head(comparison, one, labels, text, words),
+        stage(comparison, drawn, events, frames, start, labels, still),
+    ]
+    if attribution is not None:
+        parts.append(_section("why", "What causes it", sections.attribution_section(attribution)))
+    elif why_not:
+        parts.append(_section("why", "What causes it", tag("p", why_not)))
+    parts += [
+        _section(
+            "curves",
+            "How far apart, over time",
+            curves_section(comparison, drawn, labels, budget.points(len(drawn))),
+        ),
+        _section(
+            "figures",
+            "The figures",
+            sections.agreements(comparison),
+            sections.third_party(witness, labels) if witness is not None else None,
+        ),
+        _section("events", "What happens when", sections.events_table(events, comparison)),
+    ]
+    if models is not None:
+        parts.append(_section("models", "What each engine makes of the model", _models(models)))
+    emulated = sections.emulated(comparison)
+    if emulated is not None:
+        parts.append(_section("emulated", "What is emulated", emulated))
+    notes = [_sentence(line) for line in (*said, *comparison.notes, *scene.notes)]
+    parts.append(
+        _section(
+            "origin",
+            "Where this comes from",
+            sections.provenance((one.header, two.header), comparison),
+            tag("p", "This page was made by ", tag("code", command), ".") if command else None,
+            tag("h3", "Notes") if notes else None,
+            tag("ul", *(tag("li", note) for note in notes)) if notes else None,
+        )
+    )
+    body = joined(
+        (
+            tag("main", *parts),
+            tag(
+                "footer",
+                tag(
+                    "p", "Neither side is the truth, and two engines that agree may both be wrong."
+                ),
+                tag("p", f"statemachine {__version__}; this file asks for nothing but itself."),
+            ),
+        )
+    )
+    return _assembled(text, body, data)
+
+
+def _moments(comparison: Comparison) -> tuple[float, ...]:
+    """Moments that must be among those shown."""
+    found = comparison.agreements
+    times = {a.at for a in found} | {a.since for a in found if a.since is not None}
+    return tuple(sorted(times))
+
+
+def _start(comparison: Comparison, frames: Frames) -> int:
+    """The moment to open the page at: where the leading quantity is farthest apart."""
+    subject = leading(comparison)
+    at = subject.at if subject is not None else 0.0
+    return int(np.argmin(np.abs(frames.time - at)))
+
+
+def _head(
+    comparison: Comparison, one: Trace, labels: tuple[str, str], text: str, words: Sequence[str]
+) -> Html:
+    says = one.header.says
+    shown = (
+        f"{comparison.until:g} s on {labels[0]}, below as a solid arm, and on {labels[1]}, as a "
+        "ghost over it."
+    )
+    finding, _, cause = text.partition(". ")
+    return tag(
+        "header",
+        tag(
+            "p",
+            tag("span", comparison.one.experiment, class_="experiment"),
+            tag("span", tag("i", class_="key one"), labels[0], class_="side"),
+            tag("span", "against", class_="against"),
+            tag("span", tag("i", class_="key two"), labels[1], class_="side"),
+            tag("button", "Dark", id="theme", type="button", aria_pressed="false", hidden=True,
+                aria_label="Dark colours"),
+            class_="kicker",
+        ),
+        tag(
+            "h1",
+            kept(f"{finding}."),
+            tag("span", kept(f" {cause}."), class_="cause") if cause else None,
+            id="finding",
+            tabindex="-1",
+        ),
+        tag("p", f"{says} " if says else "", kept(shown), class_="says"),
+        *(tag("p", kept(line)) for line in words),
+    )  # fmt: skip
+
+
+def _models(page: Page) -> Html:
+    """The verdict, and what it is of on demand."""
+    verdicts = [block for block in page.blocks if isinstance(block, Verdict)]
+    rest = [block for block in page.blocks if not isinstance(block, Verdict)]
+    return joined(
+        (
+            tag("p", "Before anything moves. What the backends then do about it for the runs above "
+                "is in ", tag("a", "What is emulated", href="#emulated"), "."),
+            sections.from_page(Page("", "", verdicts)),
+            tag("details", tag("summary", page.title), sections.from_page(Page("", "", rest))),
+        )
+    )  # fmt: skip
+
+
+def _section(name: str, heading: str, *content: object) -> Html:
+    return tag(
+        "section",
+        tag("h2", heading, id=f"{name}-heading"),
+        *content,
+        id=name,
+        aria_labelledby=f"{name}-heading",
+    )
+
+
+def _lead(comparison: Comparison, curves: Sequence[Series]) -> list[int]:
+    """The quantities that are spoken with the moment: the leading one, and the fingertip's."""
+    subject = leading(comparison)
+    names = [curve.name for curve in curves]
+    lead = [names.index(subject.name)] if subject and subject.name in names else []
+    lead += [k for k, curve in enumerate(curves) if curve.kind == "tip"]
+    return list(dict.fromkeys(lead))[:2] or [0]
+
+
+def _assembled(title: str, body: Html, data: dict[str, Any]) -> str:
+    script = "(() => {\n'use strict';\n" + "\n".join(_file(name) for name in _SCRIPTS) + "\n})();"
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = (
+        f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'; "
+        "img-src data:; base-uri 'none'; form-action 'none'"
+    )
+    filled = {
+        "policy": Html(policy),
+        "title": escaped(title),
+        "style": Html(_file("page.css")),
+        "body": body,
+        "data": data_of(data),
+        "script": Html(script),
+    }
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: filled[found[1]], _file("page.html"))
+
+
+def _file(name: str) -> str:
+    return resources.files(__package__ or "").joinpath(name).read_text(encoding="utf-8")
+
+
+def _sentence(line: str) -> str:
+    text = line[:1].upper() + line[1:]
+    return text if text.endswith(".") else text + "."

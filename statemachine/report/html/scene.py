@@ -1,0 +1,283 @@
+"""Both runs as data that the page's script draws: shapes, poses, trails, contacts, a camera."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...drawing import Drawing
+from ...records import Array
+from ...traces import Trace
+from .budget import Budget
+from .geometry import bones_of, mesh_as_data, mesh_of, packed, quantised
+from .timeline import Frames
+
+_FAR = 8.0  # extents of the model beyond which nothing is drawn
+OPENING = 0.6  # of the camera from top to bottom [rad]
+ASPECT = 1.45  # width of the picture through its height
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What a side is drawn as.
+
+    Attributes:
+        drawing: Its shapes; None if they cannot be had.
+        why_not: Then why; a sentence without its end.
+    """
+
+    drawing: Drawing | None
+    why_not: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What is drawn.
+
+    Attributes:
+        data: For the script; None if the traces tell no poses.
+        notes: What a reader should know of the picture, in sentences.
+        poses: For each side (n, nbody, 3) positions at the moments shown.
+        tips: For each side (n, 3), or None.
+        camera: target (3,), distance [m], azimuth and elevation [rad].
+    """
+
+    data: dict[str, Any] | None
+    notes: tuple[str, ...]
+    poses: tuple[Array, Array] | None = None
+    tips: tuple[Array, Array] | None = None
+    camera: tuple[Array, float, float, float] | None = None
+
+
+def scene_of(
+    one: Trace, two: Trace, frames: Frames, looks: Sequence[Look], tip: str, budget: Budget
+) -> Scene:
+    """Both runs at the moments that are shown.
+
+    Args:
+        one: A trace.
+        two: The other.
+        frames: The moments.
+        looks: What each side is drawn as; the same object twice if both are of one model.
+        tip: The site whose way is drawn; "" for none.
+        budget: How much detail there may be.
+    """
+    traces = (one, two)
+    if any("xpos" not in t or "xquat" not in t for t in traces):
+        return Scene(None, ("The traces tell no poses of the bodies: there is nothing to draw.",))
+    notes, drawings = _drawings(traces, looks)
+    shared = drawings[0] is drawings[1]
+    most = budget.triangles // (1 if shared else 2)
+    meshes = [mesh_of(drawing, most) for drawing in drawings[: 1 if shared else 2]]
+    for mesh in meshes:
+        if mesh.simplified:
+            notes.append(
+                f"The shapes are drawn with {len(mesh.faces)} of their {mesh.simplified} triangles."
+            )
+    if frames.between:
+        notes.append(
+            f"The timesteps differ: for the picture alone, and for no figure, poses of "
+            f"{two.header.label} are taken between two of its rows."
+        )
+    if frames.left_out:
+        notes.append(f"{frames.left_out} of the compared moments are not shown, for their number.")
+    extent = max(drawing.extent for drawing in drawings)
+    poses = [_poses(trace, rows, share) for trace, rows, share in (
+        (one, frames.one, None), (two, frames.two, frames.share))]  # fmt: skip
+    finite = np.concatenate([pos[np.isfinite(pos).all(axis=2)] for pos, _ in poses])
+    if not len(finite):
+        return Scene(None, ("No pose of a body is a finite number: there is nothing to draw.",))
+    middle = np.asarray(drawings[0].center)
+    low = np.maximum(finite.min(axis=0), middle - _FAR * extent)
+    high = np.minimum(finite.max(axis=0), middle + _FAR * extent)
+    span = np.maximum(high - low, 1e-6)
+    tips = _tips(one, two, frames, tip)
+    camera = _camera([pos for pos, _ in poses], tips, extent)
+    sides = []
+    few = max(2, budget.contacts // len(frames))
+    for k, (trace, (pos, quat)) in enumerate(zip(traces, poses, strict=True)):
+        rows = frames.one if k == 0 else frames.two
+        sides.append(
+            {
+                "mesh": 0 if shared else k,
+                "bodies": len(trace.header.bodies),
+                "pos": packed(quantised(_held(pos), low, span), "u2"),
+                "quat": packed(np.round(np.clip(quat, -1, 1) * 32767), "i2"),
+                "tip": packed(tips[k], "f4") if tips else "",
+                "contacts": _contacts(trace, rows, few),
+            }
+        )
+    if any(_most_at_once(trace) > few for trace in traces):
+        notes.append(f"Of the contacts of a moment the {few} strongest are drawn.")
+    if any("contact_row" in trace and len(trace["contact_row"]) for trace in traces):
+        notes.append("The arrow of a contact grows with the square root of its force.")
+    target, distance, azimuth, elevation = camera
+    data = {
+        "moving": [int(_moves(one, two, body)) for body in range(len(two.header.bodies))],
+        "low": low.tolist(),
+        "span": span.tolist(),
+        "extent": extent,
+        "floor": _floor(drawings),
+        "camera": [*target.tolist(), distance, azimuth, elevation],
+        "meshes": [mesh_as_data(mesh) for mesh in meshes],
+        "sides": sides,
+    }
+    return Scene(data, tuple(notes), (poses[0][0], poses[1][0]), tips, camera)
+
+
+def _drawings(traces: Sequence[Trace], looks: Sequence[Look]) -> tuple[list[str], list[Drawing]]:
+    """A drawing for each side, of sticks where there is none better."""
+    notes: list[str] = []
+    found: list[Drawing] = []
+    for k, (trace, look) in enumerate(zip(traces, looks, strict=True)):
+        if look.drawing is not None:
+            found.append(look.drawing)
+            left_out = look.drawing.left_out
+            if left_out and not (k and look is looks[0]):
+                notes.append(f"Not drawn: {', '.join(left_out)}.")
+            continue
+        if k and look is looks[0]:
+            found.append(found[0])
+            continue
+        notes.append(
+            f"The shapes of {trace.header.label} cannot be had ({look.why_not}): sticks join its "
+            "bodies instead."
+        )
+        found.append(bones_of(trace))
+    return notes, found
+
+
+def _poses(trace: Trace, rows: Any, share: Array | None) -> tuple[Array, Array]:
+    pos, quat = trace["xpos"][rows].copy(), _unit(trace["xquat"][rows])
+    if share is not None and (share > 0).any():
+        after = np.minimum(rows + 1, len(trace) - 1)
+        part = share[:, None, None]
+        pos += part * (trace["xpos"][after] - pos)
+        quat = _slerp(quat, _unit(trace["xquat"][after]), part)
+    return pos, quat
+
+
+def _unit(quat: Array) -> Array:
+    quat = np.nan_to_num(quat)
+    length = np.linalg.norm(quat, axis=-1, keepdims=True)
+    return np.where(length > 0, quat / np.where(length > 0, length, 1.0), [1.0, 0.0, 0.0, 0.0])
+
+
+def _slerp(one: Array, two: Array, share: Array) -> Array:
+    """Rotations between two, along the shorter way (Shoemake 1985)."""
+    cosine = (one * two).sum(axis=-1, keepdims=True)
+    two, cosine = np.where(cosine < 0, -two, two), np.abs(cosine)
+    angle = np.arccos(np.clip(cosine, 0.0, 1.0))
+    sine = np.sin(angle)
+    flat = sine < 1e-6
+    safe = np.where(flat, 1.0, sine)
+    a = np.where(flat, 1 - share, np.sin((1 - share) * angle) / safe)
+    b = np.where(flat, share, np.sin(share * angle) / safe)
+    return _unit(a * one + b * two)
+
+
+def _held(pos: Array) -> Array:
+    """Positions that are not finite are those of the last moment that were."""
+    pos = pos.copy()
+    for k in range(len(pos)):
+        bad = ~np.isfinite(pos[k]).all(axis=1)
+        pos[k][bad] = pos[k - 1][bad] if k else 0.0
+    return pos
+
+
+def _tips(one: Trace, two: Trace, frames: Frames, tip: str) -> tuple[Array, Array] | None:
+    if not tip or any("site_xpos" not in t or tip not in t.header.sites for t in (one, two)):
+        return None
+    ways = one.site(tip)[0][frames.one], two.site(tip)[0][frames.two].copy()
+    after = two.site(tip)[0][np.minimum(frames.two + 1, len(two) - 1)]
+    ways[1][:] += frames.share[:, None] * (after - ways[1])
+    return ways if all(np.isfinite(way).all() for way in ways) else None
+
+
+def _contacts(trace: Trace, rows: Any, most: int) -> dict[str, str]:
+    """Where contacts are at each moment, the strongest first, and the force on the second [N]."""
+    if "contact_row" not in trace:
+        return {"count": "", "at": ""}
+    start = np.searchsorted(trace["contact_row"], rows)
+    end = np.searchsorted(trace["contact_row"], rows, side="right")
+    strength = np.linalg.norm(np.nan_to_num(trace["contact_force"]), axis=1)
+    picked, counts = [np.empty(0, np.int64)], []
+    for a, b in zip(start.tolist(), end.tolist(), strict=True):
+        strongest = a + np.argsort(-strength[a:b], kind="stable")[: min(most, 255)]
+        picked.append(strongest)
+        counts.append(len(strongest))
+    chosen = np.concatenate(picked)
+    # Rows of a contact frame are its axes; the force on the second geom is along them.
+    axes = trace["contact_frame"][chosen].reshape(-1, 3, 3)
+    force = np.einsum("cij,ci->cj", axes, trace["contact_force"][chosen])
+    where = np.nan_to_num(np.hstack([trace["contact_pos"][chosen], force]))
+    return {"count": packed(counts, "u1"), "at": packed(where, "f4")}
+
+
+def _most_at_once(trace: Trace) -> int:
+    """How many contacts there are at one moment, at most."""
+    if "contact_row" not in trace or not len(trace["contact_row"]):
+        return 0
+    return int(np.bincount(trace["contact_row"]).max())
+
+
+def _moves(one: Trace, two: Trace, body: int) -> bool:
+    """Whether a body is elsewhere at another time or on the other side."""
+    if one.header.bodies[body : body + 1] != two.header.bodies[body : body + 1]:
+        return True
+    start = one["xpos"][0, body], one["xquat"][0, body]
+    for trace in (one, two):
+        for column, value in zip(("xpos", "xquat"), start, strict=True):
+            if np.abs(trace[column][:, body] - value).max(initial=0.0) > 1e-6:
+                return True
+    return False
+
+
+def _floor(drawings: Sequence[Drawing]) -> float | None:
+    """The height of an endless level plane, if there is one."""
+    for part in drawings[0].parts:
+        if part.endless and part.body == 0 and np.ptp(part.vertices[:, 2]) < 1e-6:
+            return float(part.vertices[0, 2])
+    return None
+
+
+def _camera(
+    poses: Sequence[Array], tips: tuple[Array, Array] | None, extent: float
+) -> tuple[Array, float, float, float]:
+    """From the side on which the fingertip's way is seen at its full width, near enough."""
+    points = np.concatenate([pos[:, 1:].reshape(-1, 3) for pos in poses])
+    points = points[np.isfinite(points).all(axis=1)]
+    if tips is not None:
+        points = np.vstack([points, *tips])
+    if not len(points):
+        points = np.zeros((1, 3))
+    target = np.median(points, axis=0)
+    points = points[np.abs(points - target).max(axis=1) <= 2 * extent]
+    way = tips[0] if tips is not None else points
+    flat = way[:, :2] - way[:, :2].mean(axis=0)
+    size, axes = np.linalg.eigh(flat.T @ flat)
+    along = axes[:, 1] if size[1] > 0 else np.array([1.0, 0.0])
+    along = along if along[0] >= 0 else -along
+    azimuth, elevation = float(np.arctan2(along[1], along[0])) - np.pi / 2 + 0.35, 0.3
+    right, up, back = axes_of(azimuth, elevation)
+    seen = points @ np.array([right, up, back]).T
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    middle = (low + high) / 2
+    # Origins of bodies do not tell how thick these are.
+    apart = np.abs(seen - middle) + 0.14 * extent
+    slope = np.tan(OPENING / 2)
+    needs = np.maximum(apart[:, 0] / (ASPECT * slope), apart[:, 1] / slope)
+    distance = float((needs + seen[:, 2] - middle[2]).max())
+    target = middle @ np.array([right, up, back])
+    return target, distance, azimuth, elevation
+
+
+def axes_of(azimuth: float, elevation: float) -> tuple[Array, Array, Array]:
+    """Right, up and back of a camera, as unit vectors of the world."""
+    flat = np.cos(elevation)
+    back = np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)])
+    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    return right, np.cross(back, right), back

@@ -1,0 +1,290 @@
+"""Sections of the page that are tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from ...compare import Agreement, Comparison, Witness
+from ...page import Code, Page, Printed, Table, Text, Verdict
+from ...traces import Header
+from ..figures_of import quantity, short_time
+from .finding import capital, title
+from .markup import Html, joined, tag
+from .timeline import Event
+
+if TYPE_CHECKING:
+    from ...compare.why import Attribution, Trial
+
+_BREAK = Html("\n")
+VERDICTS = {"agrees": ("○", "agrees"), "settles": ("◐", "settles"), "differs": ("●", "differs")}
+
+
+def verdict_badge(verdict: str) -> Html:
+    """A verdict as a word with a sign, so that it needs no colour."""
+    sign, word = VERDICTS[verdict]
+    return tag("span", tag("span", sign, aria_hidden="true"), " ", word, class_=f"badge {verdict}")
+
+
+def go(time: float, text: str = "") -> Html:
+    """A moment that the slider goes to when it is pressed."""
+    label = text or short_time(time)
+    return tag("button", label, type="button", class_="go", data_t=f"{time:.6f}")
+
+
+def table(
+    caption: str, head: Sequence[str], rows: Sequence[Sequence[object]], words: Sequence[int] = ()
+) -> Html:
+    """A table whose first column names its rows; `words` are columns of words, not figures."""
+    top = tag(
+        "tr",
+        *(
+            tag("th", text, scope="col", class_="word" if k == 0 or k in words else None)
+            for k, text in enumerate(head)
+        ),
+    )
+    body = [
+        tag(
+            "tr",
+            *(
+                tag("th", cell, scope="row")
+                if k == 0
+                else tag("td", cell, class_="word" if k in words else None, data_name=head[k])
+                for k, cell in enumerate(row)
+            ),
+        )
+        for row in rows
+    ]
+    made = tag("table", tag("caption", caption), tag("thead", top), tag("tbody", *body))
+    return tag("div", made, class_="wide", tabindex="0", role="region", aria_label=caption)
+
+
+def agreements(comparison: Comparison) -> Html:
+    """Figures and verdicts, and under them the reason of each tolerance."""
+    reasons: dict[tuple[str, str], str] = {}
+    rows = []
+    for found in comparison.agreements:
+        key = quantity(found.tolerance, found.kind), found.reason
+        letter = reasons.setdefault(key, _letter(len(reasons)))
+        allowed = joined((key[0], tag("sup", tag("a", letter, href=f"#why-{letter}"))))
+        rows.append((found.name, *_figures(found), allowed, verdict_badge(found.verdict)))
+    one, two = comparison.one.label, comparison.two.label
+    notes = [
+        tag("li", tag("b", letter), f" {value}: {reason}.", id=f"why-{letter}")
+        for (value, reason), letter in reasons.items()
+    ]
+    return joined(
+        (
+            table(
+                f"{one} against {two}: how far apart",
+                ("quantity", "largest", "at", "RMS", "settled", "beyond from", "tolerance",
+                 "verdict"),
+                rows,
+                words=(7,),
+            ),
+            tag(
+                "p",
+                f"Compared at {comparison.moments} moments over {comparison.until:g} s. Settled is "
+                "the mean over the last tenth of them. A quantity agrees if it is within its "
+                "tolerance always, settles if it is so in the end, and differs otherwise.",
+            ),
+            tag("h3", "What does not matter, and why"),
+            tag("ul", *notes, class_="reasons"),
+        )
+    )  # fmt: skip
+
+
+def third_party(found: Witness, labels: tuple[str, str]) -> Html:
+    """Where a witness puts the fingertip of each side."""
+    return tag(
+        "p",
+        f"Two that agree may both be wrong, so {found.by} was asked where {found.site} is in each "
+        f"of the {found.rows} poses: at most {found.one * 1000:.1e} mm from where {labels[0]} has "
+        f"it, and {found.two * 1000:.1e} mm from where {labels[1]} has it.",
+    )
+
+
+def _figures(found: Agreement) -> tuple[object, ...]:
+    if found.kind == "contact":
+        return found.note or quantity(found.max, "contact"), go(found.at), "–", "–", "–"
+    return (
+        quantity(found.max, found.kind),
+        go(found.at),
+        quantity(found.rms, found.kind),
+        quantity(found.settled, found.kind),
+        "never" if found.since is None else go(found.since),
+    )
+
+
+def _letter(number: int) -> str:
+    return "abcdefghijklmnopqrstuvwxyz"[number] if number < 26 else f"z{number}"
+
+
+def events_table(events: Sequence[Event], comparison: Comparison) -> Html:
+    """What happens when; the same on both sides at the same time is one row."""
+    labels = comparison.one.label, comparison.two.label
+    merged: dict[tuple[float, str], set[int | None]] = {}
+    for event in events:
+        merged.setdefault((event.time, event.text), set()).add(event.side)
+    rows = []
+    for (time, text), sides in merged.items():
+        if sides in ({None}, {0, 1}):
+            where = "both" if 0 in sides else "between them"
+        else:
+            where = labels[next(iter(s for s in sides if s is not None))]
+        rows.append((go(time), capital(text), where))
+    return table(
+        "What happens when; press a time to go there", ("time", "what", "on"), rows, (1, 2)
+    )
+
+
+def attribution_section(found: Attribution) -> Html:
+    """Bars: how much of the gap each factor takes away, all on top of each other and alone."""
+    from ..why import amount, conclusion
+
+    gap = amount(found, found.gap)
+    if not found.alone:
+        return tag(
+            "p",
+            f"Differences below {amount(found, found.negligible)} are taken for rounding: there "
+            "is nothing to explain.",
+        )
+    one = found.names[0]
+    return joined(
+        (
+            tag(
+                "p",
+                f"Both sides were run again, {found.runs} runs in all, with less and less between "
+                f"them. The gap is the largest difference in {found.quantity} at any moment: "
+                f"{gap} as they come. A bar is the part of it that goes when one thing is made "
+                "the same on both sides or, where it is each engine's own doing, left out on both.",
+            ),
+            _trials(
+                f"All of them, one on top of the other: from {gap} to {amount(found, found.left)}",
+                found,
+                found.ladder,
+            ),
+            *(tag("p", line) for line in conclusion(found)),
+            tag("h3", "Each by itself"),
+            _trials(f"One at a time: of the {gap}, what goes", found, found.alone),
+            tag(
+                "p",
+                f"A star: {one} itself then moves otherwise than it did, so the gap is that of "
+                "another motion; a smaller one there is a hint, not a proof. A hatched bar: the "
+                "gap grows.",
+            ),
+            *(
+                tag("p", f"{capital(title(trial.factor))}: {trial.note}.")
+                for trial in found.alone
+                if trial.note
+            ),
+            tag("p", "The order. ", " ".join(found.order)),
+        )
+    )
+
+
+def _trials(caption: str, found: Attribution, trials: Sequence[Trial]) -> Html:
+    from ..why import amount, percent
+
+    rows = []
+    for trial in trials:
+        star = "*" if trial.moved and trial.worst is not None and trial.way != "none" else ""
+        did = trial.did or "–"
+        if trial.way == "parity":
+            had = trial.had if trial.did == f"as {found.names[0]}" else trial.had[::-1]
+            did = f"{had[1]} → {had[0]}"
+        bar = _bar(trial.explains, percent(trial.explains).replace("-", "−") + star)
+        rows.append((capital(title(trial.factor)), bar, amount(found, trial.worst), did))
+    return table(caption, ("what", "explains", "gap left", "brought to"), rows, words=(1, 3))
+
+
+def _bar(share: float | None, text: str) -> Html:
+    if share is None:
+        return tag("span", text, class_="percent")
+    length = 100 * min(1.0, abs(share))
+    look = "bar more" if share < 0 else "bar"
+    return tag(
+        "span",
+        tag("span", tag("i", style=f"width:{length:.1f}%"), class_=look, aria_hidden="true"),
+        tag("span", text, class_="percent"),
+        class_="measure",
+    )
+
+
+def from_page(page: Page) -> Html:
+    """The blocks of a page of the terminal."""
+    parts: list[object] = []
+    for block in page.blocks:
+        if isinstance(block, Text):
+            parts.append(tag("p", block.text))
+        elif isinstance(block, Table):
+            words = [k for k in block.words if k]
+            parts.append(table(block.title, block.headers, block.rows, words))
+        elif isinstance(block, Code):
+            parts.append(tag("pre", tag("code", joined(block.lines, _BREAK))))
+        elif isinstance(block, Printed):
+            for engine, text in block.by_engine.items():
+                parts.append(tag("p", tag("b", engine)))
+                parts.append(tag("pre", joined(text.split("\n"), _BREAK)))
+        elif isinstance(block, Verdict):
+            sign = "✓" if block.holds else "✗"
+            parts.append(tag("p", f"{sign} {block.text}", class_="verdict"))
+    return joined(parts)
+
+
+def emulated(comparison: Comparison) -> Html | None:
+    """What of the model a backend keeps instead of its engine."""
+    parts = []
+    for side in (comparison.one, comparison.two):
+        kept = side.provenance.emulated
+        if kept and side.defaults == "model" and not any(side.label in str(part) for part in parts):
+            parts.append(
+                tag(
+                    "p",
+                    tag("b", side.label),
+                    ": what the model asks for and the engine lacks is done around it: ",
+                    ", ".join(kept),
+                    ".",
+                )
+            )
+    if not parts:
+        return None
+    return joined([*parts, tag("p", "The engine as its own users meet it: ",
+                               tag("code", "--defaults engine"), ".")])  # fmt: skip
+
+
+def provenance(headers: tuple[Header, Header], comparison: Comparison) -> Html:
+    """What made both sides."""
+    rows: list[tuple[object, ...]] = []
+
+    def row(name: str, *values: object) -> None:
+        if any(value not in ("", None) for value in values):
+            rows.append((name, *values))
+
+    a, b = (header.provenance for header in headers)
+    row(
+        "ran as", *("recorded, opened here" if h.recorded else "run for this page" for h in headers)
+    )
+    for engine in dict.fromkeys([*a.versions, *b.versions]):
+        row(engine, a.versions.get(engine, "–"), b.versions.get(engine, "–"))
+    row("model", a.model_file, b.model_file)
+    row("its SHA-256", *(tag("code", p.model_sha256, class_="digest") for p in (a, b)))
+    row("defaults", *(header.defaults for header in headers))
+    row("options", *(_options(header) for header in headers))
+    row("starts in", *(h.keyframe or "the default state" for h in headers))
+    row("timestep", *(f"{1000 * h.timestep:.4g} ms" + _substeps(h) for h in headers))
+    row("gravity", *(" ".join(f"{g:g}" for g in h.gravity) + " m/s²" for h in headers))
+    row("rows", f"{comparison.one.rows}", f"{comparison.two.rows}")
+    row("seed", *("none drawn" if p.seed is None else p.seed for p in (a, b)))
+    row("energies by", *(header.energy_by or "–" for header in headers))
+    row("made again by", *(tag("code", h.command) if h.command else "–" for h in headers))
+    labels = comparison.one.label, comparison.two.label
+    return table("What made the two runs", ("", *labels), rows, words=(1, 2))
+
+
+def _options(header: Header) -> str:
+    return ", ".join(f"{name} {value}" for name, value in header.options.items()) or "none"
+
+
+def _substeps(header: Header) -> str:
+    return f" in {header.substeps} substeps" if header.substeps > 1 else ""

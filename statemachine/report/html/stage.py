@@ -1,0 +1,228 @@
+"""The scene with its slider, and under it when each quantity is beyond its tolerance."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ...compare import Comparison, Series
+from ..figures_of import scale_of, short_time
+from .charts import time_axis
+from .geometry import packed
+from .markup import Html, joined, tag
+from .timeline import Event, Frames
+
+
+def stage(
+    comparison: Comparison,
+    curves: Sequence[Series],
+    events: Sequence[Event],
+    frames: Frames,
+    start: int,
+    labels: tuple[str, str],
+    still: Html,
+) -> Html:
+    """The scene, what the figures are at its moment, the slider and the lanes under it."""
+    now = float(frames.time[start])
+    toggles = [
+        ("solid", f"{labels[0]}, solid", "one"),
+        ("ghost", f"{labels[1]}, ghost", "two"),
+        ("marks", "contacts, with their forces", ""),
+        ("trails", "way of the fingertip", ""),
+    ]
+    checks = [
+        tag(
+            "label",
+            tag("input", type="checkbox", id=name, checked=True),
+            tag("i", class_=f"key {look}") if look else None,
+            f" {label}",
+        )
+        for name, label, look in toggles
+    ]
+    buttons = [
+        ("all", "Whole", "Whole arm"),
+        ("near", "Fingertip", "Close to the fingertip"),
+        ("in", "+", "Nearer"),
+        ("out", "−", "Farther"),
+    ]
+    canvas = tag(
+        "div",
+        tag("canvas", id="scene", tabindex="0", role="img", hidden=True,
+            aria_label="Both runs in three dimensions. Arrow keys turn the view, plus and minus "
+                       "move nearer and farther, 0 shows the whole again."),
+        tag("div", still, id="still"),
+        tag("div", *(tag("button", text, type="button", id=f"view-{name}", aria_label=label,
+                         title=label)
+                     for name, text, label in buttons), class_="views", hidden=True, id="views"),
+        tag("p", id="no-scene", class_="no-scene", hidden=True),
+        class_="canvas",
+    )  # fmt: skip
+    transport = tag(
+        "div",
+        tag("button", "Play", id="play", type="button", hidden=True),
+        tag("output", short_time(now), id="clock", for_="slider"),
+        tag(
+            "label",
+            "speed ",
+            tag(
+                "select",
+                *(tag("option", text, value=value, selected=value == "0.25")
+                  for value, text in (("1", "1×"), ("0.25", "¼×"), ("0.05", "1/20×"))),
+                id="speed",
+            ),
+            class_="speed",
+            hidden=True,
+            id="speeds",
+        ),
+        tag("div", *checks, class_="checks", id="checks", hidden=True),
+        class_="transport",
+    )  # fmt: skip
+    slider = tag(
+        "input",
+        type="range",
+        id="slider",
+        min=0,
+        max=max(0, len(frames) - 1),
+        step=1,
+        value=start,
+        aria_label="Moment of the run",
+        aria_valuetext=short_time(now),
+        hidden=True,
+    )
+    share = now / comparison.until if comparison.until else 0.0
+    return tag(
+        "section",
+        tag("h2", "Both runs, moment by moment", id="stage-heading"),
+        tag("div", tag("div", canvas, transport, class_="left"), _readout(comparison),
+            class_="pair"),
+        tag("div", _lanes(comparison, curves, events, slider), class_="lanes"),
+        id="stage",
+        aria_labelledby="stage-heading",
+        style=f"--start:{share:.6f}",
+    )  # fmt: skip
+
+
+def _readout(comparison: Comparison) -> Html:
+    """The table that the script keeps at the cursor's moment."""
+    return tag(
+        "div",
+        tag(
+            "table",
+            tag("caption", "At ", tag("span", "…", id="now"), class_="now"),
+            tag("thead", tag("tr", tag("th", "quantity", scope="col", class_="word"),
+                             tag("th", tag("i", class_="key one"), comparison.one.backend,
+                                 scope="col"),
+                             tag("th", tag("i", class_="key two"), comparison.two.backend,
+                                 scope="col"),
+                             tag("th", "apart", scope="col"))),
+            tag("tbody", id="readout"),
+        ),
+        class_="readout",
+        id="readout-box",
+        hidden=True,
+    )  # fmt: skip
+
+
+def _lanes(
+    comparison: Comparison, curves: Sequence[Series], events: Sequence[Event], slider: Html
+) -> Html:
+    """For each quantity when it is beyond its tolerance, under the slider and as wide."""
+    until = comparison.until or 1.0
+    marks = [
+        tag(
+            "i",
+            class_=f"mark {'one' if event.side == 0 else 'two'}",
+            title=event.text,
+            style=f"left:{100 * event.time / until:.2f}%",
+        )
+        for event in events
+        if event.kind == "touch" and event.side is not None
+    ]
+    rows = [_lane("time", slider, "slide")]
+    if marks:
+        rows.append(_lane("first touches", joined(marks), "touches"))
+    beyond = [(curve, _beyond(curve, comparison)) for curve in curves]
+    beyond = sorted(((c, s) for c, s in beyond if s), key=lambda pair: pair[1][0][0])
+    for curve, spans in beyond:
+        bars = [
+            tag(
+                "i",
+                class_="beyond",
+                style=f"left:{100 * a / until:.2f}%;width:{100 * max(b - a, 0.0) / until:.2f}%",
+            )
+            for a, b in spans
+        ]
+        rows.append(_lane(curve.name, joined(bars), "quantity"))
+    within = len(curves) - len(beyond)
+    said = "Bars: beyond tolerance." if beyond else "No quantity leaves its tolerance."
+    if beyond and within:
+        said += f" {within} more never {'are' if within > 1 else 'is'}."
+    rows.append(_lane("", time_axis(until), "axis"))
+    spoken = "; ".join(
+        f"{curve.name} from {short_time(spans[0][0])}, {sum(b - a for a, b in spans):.3g} s in all"
+        for curve, spans in beyond
+    )
+    return joined(
+        (
+            tag("div", *rows, class_="rows"),
+            tag("p", said, class_="hint"),
+            tag("p", f"Beyond tolerance: {spoken}.", class_="unseen") if spoken else "",
+        )
+    )
+
+
+def _lane(name: str, content: Html, look: str) -> Html:
+    return tag(
+        "div",
+        tag("span", name, class_="lane-name", title=name),
+        tag("div", content, tag("i", class_="cursor") if look != "axis" else None, class_="track"),
+        class_=f"lane {look}",
+    )
+
+
+def _beyond(curve: Series, comparison: Comparison) -> list[list[float]]:
+    """From when to when a quantity is beyond its tolerance [s]."""
+    found = next(each for each in comparison.agreements if each.name == curve.name)
+    beyond = curve.difference > found.tolerance
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], beyond, [False]]).astype(int)))
+    step = comparison.until / max(1, comparison.moments - 1)
+    spans = [
+        [float(curve.time[a]), float(min(curve.time[b - 1] + step, comparison.until))]
+        for a, b in edges.reshape(-1, 2).tolist()
+    ]
+    return _few(spans)
+
+
+def quantity_data(curve: Series, comparison: Comparison, frames: Frames) -> dict[str, Any]:
+    """What the script shows of a quantity at a moment, and when it is beyond."""
+    found = next(each for each in comparison.agreements if each.name == curve.name)
+    scale, unit = scale_of(curve.kind)
+    rows = frames.compared
+    data: dict[str, Any] = {
+        "name": curve.name,
+        "unit": unit,
+        "tolerance": found.tolerance * scale,
+        "apart": packed(curve.difference[rows] * scale, "f4"),
+    }
+    if curve.one.ndim == 1 and curve.one.size:
+        data["one"] = packed(curve.one[rows] * scale, "f4")
+        data["two"] = packed(curve.two[rows] * scale, "f4")
+    return data
+
+
+def _few(spans: list[list[float]], most: int = 200) -> list[list[float]]:
+    """Spans, the shortest gaps between them closed until they are few."""
+    while len(spans) > most:
+        gaps = [b[0] - a[1] for a, b in itertools.pairwise(spans)]
+        cut = sorted(gaps)[len(gaps) // 2]
+        merged = [spans[0]]
+        for before, span in zip(gaps, spans[1:], strict=True):
+            if before <= cut:
+                merged[-1][1] = span[1]
+            else:
+                merged.append(span)
+        spans = merged
+    return spans

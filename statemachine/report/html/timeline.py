@@ -1,0 +1,159 @@
+"""The moments that the page can show, and what happens at some of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ...compare import Comparison
+from ...compare.align import common_moments
+from ...records import Array, Ints
+from ...traces import Trace
+
+_SMOOTH = 1 / 60  # seconds between two pictures that look like motion
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """Moments that can be shown.
+
+    Attributes:
+        time: (n,) since the start [s].
+        one, two: (n,) rows of the traces, the last at or before that moment.
+        share: (n,) how far two has to be taken from its row towards the next, 0 to 1.
+        compared: (n,) number of the last compared moment at or before it.
+        between: Whether any row of two had to be interpolated.
+        left_out: How many rows of one are not shown.
+    """
+
+    time: Array
+    one: Ints
+    two: Ints
+    share: Array
+    compared: Ints
+    between: bool
+    left_out: int
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+def frames_of(one: Trace, two: Trace, must: tuple[float, ...] = (), most: int = 1200) -> Frames:
+    """Moments to be shown: those that were compared, unless they are too few to look like motion.
+
+    Args:
+        one: A trace.
+        two: The other.
+        must: Moments that have to be among them [s].
+        most: How many others there may be.
+    """
+    common = common_moments(one, two)
+    n = len(common.time)
+    spacing = float(common.time[-1]) / max(1, n - 1)
+    steps = one.header.timestep, two.header.timestep
+    if spacing <= max(_SMOOTH, 1.5 * max(steps)):
+        rows, time = common.one, common.time
+    else:
+        elapsed = one.time - one.time[0]
+        rows = np.flatnonzero(elapsed <= common.time[-1] + 1e-9)
+        time = elapsed[rows]
+    keep = np.arange(0, len(time), -(-len(time) // most))
+    wanted = np.searchsorted(time, np.array(must) - 1e-9) if must else np.empty(0, int)
+    keep = np.union1d(keep, np.append(np.clip(wanted, 0, len(time) - 1), len(time) - 1))
+    rows, time = rows[keep], time[keep]
+    other = two.time - two.time[0]
+    after = np.searchsorted(other, time + 1e-9, side="right")
+    row = np.clip(after - 1, 0, len(other) - 1)
+    following = np.clip(row + 1, 0, len(other) - 1)
+    width = np.where(following > row, other[following] - other[row], 1.0)
+    share = np.clip((time - other[row]) / width, 0.0, 1.0)
+    share[(share < 1e-6) | (following == row)] = 0.0
+    compared = np.clip(np.searchsorted(common.time, time + 1e-9, side="right") - 1, 0, n - 1)
+    return Frames(
+        time=time,
+        one=rows,
+        two=row,
+        share=share,
+        compared=compared,
+        between=bool((share > 0).any()),
+        left_out=n - len(time) if rows is not common.one and len(time) < n else 0,
+    )
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happens.
+
+    Attributes:
+        time: Since the start [s].
+        kind: "touch", "part", "largest" or "end".
+        text: What, in a few words.
+        side: 0 or 1, or None for both.
+        what: What touches what; empty otherwise.
+    """
+
+    time: float
+    kind: Literal["touch", "part", "largest", "end"]
+    text: str
+    side: int | None
+    what: str = ""
+
+
+def events_of(comparison: Comparison, one: Trace, two: Trace) -> list[Event]:
+    """First touches on each side, where each quantity parts, largest differences, early ends."""
+    found: list[Event] = []
+    until = comparison.until
+    first = [_touches(trace, until) for trace in (one, two)]
+    for pair in dict.fromkeys([*first[0], *first[1]]):
+        times = [side.get(pair) for side in first]
+        what = next(side[pair][1] for side in first if pair in side)
+        for side, each in enumerate(times):
+            if each is not None:
+                found.append(Event(each[0], "touch", f"first touch: {what}", side, what))
+    since: dict[float, list[str]] = {}
+    largest: dict[float, list[str]] = {}
+    for agreement in comparison.agreements:
+        if agreement.kind == "contact":
+            continue
+        if agreement.since is not None:
+            since.setdefault(agreement.since, []).append(agreement.name)
+            largest.setdefault(agreement.at, []).append(agreement.name)
+    for time, names in since.items():
+        found.append(Event(time, "part", f"beyond tolerance from here: {', '.join(names)}", None))
+    for time, names in largest.items():
+        found.append(Event(time, "largest", f"largest difference: {', '.join(names)}", None))
+    for side, (trace, has) in enumerate(
+        zip((one, two), (comparison.one, comparison.two), strict=True)
+    ):
+        if has.ended:
+            last = float(trace.time[-1] - trace.time[0])
+            found.append(Event(last, "end", f"ends early: {has.ended}", side))
+    return sorted(found, key=lambda event: event.time)
+
+
+def _touches(trace: Trace, until: float) -> dict[tuple[int, int], tuple[float, str]]:
+    """When each pair of bodies first touches, and what there touches what."""
+    found: dict[tuple[int, int], tuple[float, str]] = {}
+    if "contact_row" not in trace:
+        return found
+    header = trace.header
+    for row, geoms in zip(
+        trace["contact_row"].tolist(), trace["contact_geom"].tolist(), strict=True
+    ):
+        bodies = [header.geom_bodyid[geom] for geom in geoms]
+        order = sorted(range(2), key=lambda k: -bodies[k])  # what hangs further out comes first
+        pair = bodies[order[1]], bodies[order[0]]
+        time = float(trace.time[row] - trace.time[0])
+        if pair in found or time > until + 1e-9:
+            continue
+        names = [_name(trace, geoms[k], bodies[k]) for k in order]
+        found[pair] = time, f"{names[0]} on {names[1]}"
+    return found
+
+
+def _name(trace: Trace, geom: int, body: int) -> str:
+    """A body's name; of what stands in the world, its own."""
+    name = trace.header.geoms[geom]
+    return name if body == 0 and name else trace.header.bodies[body]

@@ -1,0 +1,682 @@
+"""Pictures of traces: opened again, and looked at."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.compare import compare
+from statemachine.errors import BadInputError, MissingEngineError, TraceError, UnknownNameError
+from statemachine.rendering import Camera, Timing, framed, frames, motion_of, probe, timing_of
+from statemachine.rendering.compose import Shot, compose, halved
+from statemachine.rendering.motion import corners, rows_at
+from statemachine.report.film import Film, write_film
+from statemachine.report.film_overlay import Overlay, Strip
+from statemachine.report.plot import drawn, plot, plot_trace, write_plot
+from statemachine.traces import Trace, record, shipped, write
+
+from .conftest import ROOT, Cli, need_engine
+from .rendering import rendering_environment, silhouettes
+
+SIZE = (320, 240)
+FIRST, SECOND = (0, -0.6, 1.2, 0.5, 0, 0.6), (0.9, -0.3, 0.4, -0.4, 0, 0.2)
+
+
+@pytest.fixture(scope="module")
+def sides() -> tuple[sm.Model, Trace, Trace]:
+    """Two runs of one model that part at once, and far."""
+    model = sm.load("so101/scene")
+    one, two = (
+        record(model, lambda _t, _d, told=told: np.array(told), 0.5, experiment="swing")
+        for told in (FIRST, SECOND)
+    )
+    return model, one, two
+
+
+@pytest.fixture(scope="module")
+def mujoco_here() -> probe.Renderer:
+    return probe.Renderer("mujoco", rendering_environment().get("MUJOCO_GL", ""))
+
+
+@pytest.fixture
+def renderer(request: pytest.FixtureRequest) -> probe.Renderer:
+    """Each renderer that works here."""
+    if request.param == "pybullet":
+        need_engine("pybullet")
+        return probe.Renderer("pybullet")
+    return request.getfixturevalue("mujoco_here")
+
+
+both_renderers = pytest.mark.parametrize("renderer", probe.RENDERERS, indirect=True)
+
+
+def _differ(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.abs(a.astype(int) - b.astype(int)).max(axis=2) > 8
+
+
+# What a film is of, and when: figures only.
+
+
+def test_a_film_lasts_as_long_as_the_simulated_time() -> None:
+    for seconds, fps, slow in (
+        (2.0, 30, 1),
+        (2.0, 24, 4),
+        (0.37, 25, 0.5),
+        (1.0, 7, 3),
+        (0.001, 30, 1),
+    ):
+        timing = Timing(seconds, fps, slow)
+        assert sum(timing.milliseconds) == round(1000 * seconds * slow)
+        assert len(timing.milliseconds) == timing.count == len(timing.times)
+        assert timing.times[-1] < seconds <= timing.times[-1] + 1 / (fps * slow) + 1e-9
+        np.testing.assert_allclose(timing.times * slow * fps, np.arange(timing.count), atol=1e-9)
+
+
+def test_rows_are_the_nearest_from_the_start_of_each_trace() -> None:
+    trace = _still(times=10.0 + 0.004 * np.arange(6))
+    np.testing.assert_array_equal(
+        rows_at(trace, np.array([0, 0.0019, 0.0021, 0.02, 9])), [0, 0, 1, 5, 5]
+    )
+
+
+def _still(times: np.ndarray) -> Trace:
+    """A trace of a ball that does not move, without what an engine derives."""
+    model = sm.load(_ball())
+    found = record(model, None, 0.004, derive=False)
+    n = len(times)
+    columns = {
+        "time": times,
+        "qpos": np.tile(found.qpos[:1], (n, 1)),
+        "qvel": np.zeros((n, model.nv)),
+        "ctrl": np.zeros((n, 0)),
+    }
+    return Trace(found.header, columns)
+
+
+_BALLS: dict[str, Path] = {}
+
+
+def _ball() -> Path:
+    return _BALLS["ball"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _a_ball(tmp_path_factory: pytest.TempPathFactory) -> None:
+    path = tmp_path_factory.mktemp("model") / "ball.xml"
+    path.write_text(
+        "<mujoco><option gravity='0 0 0'/><worldbody><body name='ball' pos='0 0 1'><freejoint/>"
+        "<geom type='sphere' size='0.1' rgba='1 0.5 0 1'/></body></worldbody></mujoco>"
+    )
+    _BALLS["ball"] = path
+
+
+def test_a_trace_without_poses_has_them_from_its_qpos(sides: tuple[sm.Model, Trace, Trace]) -> None:
+    model, one, _ = sides
+    bare = Trace(one.header, {n: one[n] for n in ("time", "qpos", "qvel", "ctrl")})
+    times = np.array([0.0, 0.2, 0.4])
+    whole, derived = motion_of(one, model, times), motion_of(bare, model, times)
+    np.testing.assert_allclose(derived.xpos, whole.xpos, atol=1e-12)
+    np.testing.assert_allclose(derived.xquat, whole.xquat, atol=1e-12)
+    with pytest.raises(TraceError, match="other bodies"):
+        motion_of(one, sm.load(_ball()), times)
+
+
+def test_the_camera_has_everything_in_its_picture_and_is_as_near_as_can_be() -> None:
+    cloud = np.random.default_rng(1).normal(size=(200, 3)) * (0.3, 0.1, 0.5) + (5, -3, 2)
+    for aspect in (0.5, 4 / 3, 3):
+        for azimuth, elevation in ((140, -20), (0, 0), (-75, -80), (10, 35)):
+            seen = np.abs(framed(cloud, aspect, azimuth, elevation).seen(cloud, aspect))
+            assert seen.max() == pytest.approx(0.9, abs=0.01)
+    camera = framed(cloud, 1, 90, 0)
+    right, up, forward = camera.axes  # azimuth 90 looks along +y
+    np.testing.assert_allclose([right, up, forward], [(1, 0, 0), (0, 0, 1), (0, 1, 0)], atol=1e-12)
+
+
+def test_a_ghost_is_seen_where_it_is_nearer_by_more_than_the_bias() -> None:
+    far = np.full((5, 9), np.inf)
+    solid = Shot(np.full((5, 9, 3), 200, np.uint8), np.where(np.arange(9) < 6, 1.0, far))
+    depth = far.copy()
+    depth[1:4, 1:8] = 0.999  # in the same place as the solid side, to a millimetre
+    depth[2, 2] = 0.9
+    ghost = Shot(np.zeros((5, 9, 3), np.uint8), depth)
+    changed = (compose(solid, ghost, 0.01, 1) != solid.rgb).any(axis=2)
+    expected = np.zeros((5, 9), bool)
+    expected[1:4, 6:8] = True  # where the solid side is not
+    expected[2, 2] = True
+    np.testing.assert_array_equal(changed, expected)
+    assert compose(solid, None, 0.01, 1) is solid.rgb
+
+
+def test_smaller_pictures_are_means() -> None:
+    picture = np.random.default_rng(0).integers(0, 256, (6, 8, 3)).astype(np.uint8)
+    mean = picture.reshape(3, 2, 4, 2, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(halved(picture, 2), mean, atol=1)
+
+
+@pytest.mark.parametrize(
+    ("how", "says"),
+    [
+        ({"fps": 0.5}, "--fps"),
+        ({"fps": float("nan")}, "--fps"),
+        ({"slow": 0}, "--slow"),
+        ({"slow": 100, "fps": 60, "long": 2.0}, "pictures"),
+        ({"size": (641, 480)}, "even"),
+        ({"size": (4000, 480)}, "width"),
+    ],
+)
+def test_a_film_that_cannot_be_is_refused(how: dict[str, Any], says: str) -> None:
+    trace = _still(np.arange(3) * how.pop("long", 0.1))
+    size = how.pop("size", SIZE)
+    with pytest.raises(BadInputError, match=says):
+        next(frames(trace, size=size, timing=timing_of(trace, **how), models=(sm.load(_ball()),)))
+
+
+# Pictures that are drawn.
+
+
+@both_renderers
+def test_pictures_change_as_the_arm_moves(
+    sides: tuple[sm.Model, Trace, Trace], renderer: probe.Renderer
+) -> None:
+    _, one, _ = sides
+    pictures = list(frames(one, size=SIZE, timing=Timing(0.5, 6), renderer=renderer))
+    assert [picture.shape for picture in pictures] == [(240, 320, 3)] * 3
+    assert _differ(pictures[0], pictures[1]).mean() > 0.02
+    assert _differ(pictures[0], pictures[2]).mean() > 0.02
+
+
+@both_renderers
+def test_the_ghost_is_the_second_side_in_its_own_pose(
+    sides: tuple[sm.Model, Trace, Trace], renderer: probe.Renderer, tmp_path: Path
+) -> None:
+    """Against silhouettes that MuJoCo's own renderer draws of the two qpos."""
+    model, one, two = sides
+    timing = Timing(0.5, 2.5)  # pictures at 0 and 0.4 s
+    camera = _camera(model, one, two)
+    how: Any = {"size": SIZE, "timing": timing, "renderer": renderer, "camera": camera}
+    alone, together = list(frames(one, **how)), list(frames(one, two, **how))
+    row = int(np.argmin(np.abs(one.time - 0.4)))
+    first, second = silhouettes(
+        model.path, [one.qpos[row], two.qpos[row]], dataclasses.asdict(camera), SIZE, tmp_path
+    )
+    changed = _differ(alone[1], together[1])
+    outside = _grown(first, 2)
+    assert (second & ~outside).sum() > 1000  # the poses lie apart: the test can fail
+    assert changed[second & ~outside].mean() > 0.95
+    assert changed[~_grown(second, 2)].mean() < 0.001
+    assert not _differ(alone[0], together[0]).any()  # both start in one place
+
+
+def _camera(model: sm.Model, *traces: Trace) -> Camera:
+    times = np.linspace(0, 0.5, 6)
+    cloud = np.concatenate([corners(motion_of(t, model, times), model) for t in traces])
+    return framed(cloud, SIZE[0] / SIZE[1], 140, -20)
+
+
+def _grown(mask: np.ndarray, by: int) -> np.ndarray:
+    for _ in range(by):
+        padded = np.pad(mask, 1)
+        mask = mask | padded[2:, 1:-1] | padded[:-2, 1:-1] | padded[1:-1, 2:] | padded[1:-1, :-2]
+    return mask
+
+
+def test_poses_are_those_of_the_trace_not_of_its_qpos(
+    sides: tuple[sm.Model, Trace, Trace], mujoco_here: probe.Renderer
+) -> None:
+    """An engine that says its bodies are elsewhere is drawn as it says."""
+    model, one, _ = sides
+    moved = Trace(one.header, {**one.columns, "xpos": one["xpos"] + np.array([0, 0, 0.1])})
+    how: Any = {"size": SIZE, "timing": Timing(0.1, 10), "renderer": mujoco_here}
+    how["camera"] = _camera(model, one)
+    (here,), (there,) = (list(frames(trace, **how)) for trace in (one, moved))
+    assert _differ(here, there).mean() > 0.05
+
+
+def test_two_models_of_one_robot_are_drawn_in_one_picture(
+    tmp_path: Path, mujoco_here: probe.Renderer
+) -> None:
+    """Each side with its own looks and its own file."""
+    wide = tmp_path / "wide.xml"
+    wide.write_text(_ball().read_text().replace("size='0.1'", "size='0.2'"))
+    models = (sm.load(_ball()), sm.load(wide))
+    one, two = (record(model, None, 0.02) for model in models)
+    how: Any = {"size": SIZE, "timing": Timing(0.02, 50), "renderer": mujoco_here}
+    how["camera"] = Camera((0, 0, 1), 2.0, 90, 0)
+    (alone,) = frames(one, models=models[:1], **how)
+    (together,) = frames(one, two, models=models, **how)
+    # A sphere of radius r at distance d is seen under asin(r/d): here a disc of 96 pixels.
+    changed = _differ(alone, together)
+    radius = 120 * np.tan(np.arcsin(0.2 / 2.0)) / np.tan(np.radians(15))
+    assert changed.sum() == pytest.approx(np.pi * radius**2, rel=0.04)
+
+
+# Files.
+
+
+@pytest.fixture
+def film(sides: tuple[sm.Model, Trace, Trace], mujoco_here: probe.Renderer, tmp_path: Path) -> Any:
+    _, one, two = sides
+
+    def make(name: str, **how: Any) -> Film:
+        how = {"size": SIZE, "fps": 20, "slow": 2, "renderer": mujoco_here, **how}
+        return write_film(tmp_path / name, one, two, compare(one, two), **how)
+
+    return make
+
+
+def test_webp(film: Any) -> None:
+    image_of = pytest.importorskip("PIL.Image")
+    told: list[float] = []
+    made = film("a.webp", progress=told.append)
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    with image_of.open(made.path) as image:
+        assert image.n_frames == made.pictures == 20
+        assert image.size == SIZE
+        pictures, lengths = [], []
+        for k in range(20):
+            image.seek(k)
+            image.load()
+            lengths.append(image.info["duration"])
+            pictures.append(np.asarray(image.convert("RGB")))
+    assert sum(lengths) == 1000 == 1000 * made.seconds  # 0.5 s, twice as slow
+    for before, after in itertools.pairwise(pictures):
+        assert _differ(before, after).any()
+    assert made.size < 500_000
+    assert os.listdir(made.path.parent) == ["a.webp"]
+
+
+def test_mp4(film: Any) -> None:
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    made = film("a.mp4")
+    content = made.path.read_bytes()
+    assert 0 < content.index(b"moov") < content.index(b"mdat")  # plays before it is all there
+    reader = ffmpeg.read_frames(str(made.path))
+    facts = next(reader)
+    assert facts["pix_fmt"].startswith("yuv420p")
+    assert (facts["source_size"], facts["fps"], facts["duration"]) == (SIZE, 20, 1.0)
+    pictures = [np.frombuffer(p, np.uint8).reshape(240, 320, 3) for p in reader]
+    assert len(pictures) == made.pictures == 20
+    assert _differ(pictures[0], pictures[10]).mean() > 0.02
+    assert made.path.read_bytes() == film("b.mp4").path.read_bytes()
+
+
+def test_a_film_that_fails_leaves_nothing(film: Any, tmp_path: Path) -> None:
+    def stop(_fraction: float) -> None:
+        raise KeyboardInterrupt
+
+    for name in ("a.webp", "a.mp4"):
+        with pytest.raises(KeyboardInterrupt):
+            film(name, progress=stop)
+    assert os.listdir(tmp_path) == []
+    assert not _children()
+
+
+def _children() -> list[str]:
+    """Command lines of the processes that this one has started and are still there."""
+    found = []
+    for task in Path("/proc/self/task").glob("*/children"):
+        for number in task.read_text().split():
+            command = Path(f"/proc/{number}/cmdline").read_bytes().replace(b"\0", b" ").decode()
+            if "rendering" in command or "ffmpeg" in command:
+                found.append(command)
+    return found
+
+
+def test_the_strip_has_cursor_curve_and_tolerance() -> None:
+    """Looked at by colour: the curve lies where its value says."""
+    pytest.importorskip("PIL")
+    values = np.where(np.arange(101) < 50, 0.1, 10.0)
+    strip = Strip("tip", "mm", np.linspace(0, 1, 101), values, 1.0)
+    overlay = Overlay((400, 300), Timing(1.0, 10), "x", ["a", "b"], strip)
+    width, height = overlay.inner
+    assert (width, height % 2) == (400, 0)
+    frame = np.full((height, width, 3), 77, np.uint8)
+    early, late = (np.asarray(overlay.paint(frame, k)).astype(int) for k in (2, 9))
+    assert early.shape == (300, 400, 3)
+    violet = [(np.abs(p - (107, 46, 158)).max(axis=2) < 60)[300 - 54 :] for p in (early, late)]
+    assert violet[0].any(axis=0)[:400].sum() < violet[1].any(axis=0).sum()
+    rows = np.nonzero(violet[1][:, 350])[0], np.nonzero(violet[1][:, 100])[0]
+    assert rows[0].mean() < rows[1].mean()  # ten is above a tenth
+
+
+# Which renderer.
+
+
+def _without_opengl(tmp_path: Path) -> dict[str, str]:
+    """An environment in which the dynamic linker finds no OpenGL worth the name."""
+    folder = tmp_path / "libraries"
+    folder.mkdir()
+    for name in (
+        "libEGL.so.1",
+        "libEGL.so",
+        "libOSMesa.so.8",
+        "libOSMesa.so",
+        "libGL.so.1",
+        "libGL.so",
+    ):
+        (folder / name).write_bytes(b"")
+    return {"LD_LIBRARY_PATH": str(folder), "__EGL_VENDOR_LIBRARY_DIRS": str(folder), "DISPLAY": ""}
+
+
+@pytest.mark.slow
+def test_without_opengl_pybullet_draws_and_it_is_said(cli: Cli, tmp_path: Path) -> None:
+    need_engine("pybullet")
+    image_of = pytest.importorskip("PIL.Image")
+    done = cli(
+        *("compare", "hold", "--seconds", "0.2", "--film", "a.webp", "--size", "320x240"),
+        **_without_opengl(tmp_path),
+    )
+    first, second = done.stderr.splitlines()
+    assert "no OpenGL here" in first
+    assert "PyBullet's software" in first
+    assert second.endswith("drawn by PyBullet's software renderer")
+    with image_of.open(tmp_path / "a.webp") as image:
+        assert image.n_frames == 6
+    done = cli(
+        *("compare", "hold", "--film", "b.webp", "--renderer", "mujoco"),
+        **_environment_of(tmp_path),
+    )
+    assert done.returncode == 3
+    assert not done.stdout
+    (line,) = done.stderr.splitlines()
+    assert "no OpenGL" in line
+    assert "apt-get install" in line
+
+
+def _environment_of(tmp_path: Path) -> dict[str, str]:
+    folder = str(tmp_path / "libraries")
+    return {"LD_LIBRARY_PATH": folder, "__EGL_VENDOR_LIBRARY_DIRS": folder, "DISPLAY": ""}
+
+
+def test_what_draws_is_chosen_by_what_works(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(probe, "offscreen_opengl", lambda: "egl")
+    assert probe.renderer_here() == probe.Renderer("mujoco", "egl")
+    monkeypatch.setattr(probe, "offscreen_opengl", lambda: None)
+    with pytest.raises(MissingEngineError, match=r"apt-get|driver"):
+        probe.renderer_here("mujoco")
+    with pytest.raises(UnknownNameError, match="Did you mean 'mujoco'"):
+        probe.renderer_here("mujcoo")
+
+    def require(name: str) -> None:
+        if name == "pybullet":
+            raise MissingEngineError("pybullet is not installed here", engine=name)
+
+    monkeypatch.setattr(probe, "require", require)
+    with pytest.raises(MissingEngineError, match="nothing here can draw") as caught:
+        probe.renderer_here()
+    assert "\n" not in str(caught.value)
+    monkeypatch.setattr(probe, "require", lambda name: None)
+    assert probe.renderer_here() == probe.Renderer("pybullet")
+
+
+# The command.
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--plot", "a.gif"), "a figure is a file .svg, .png or .pdf"),
+        (("--film", "a.gif"), "a film is a file .webp or .mp4"),
+        (("--film", "a"), "a film is a file .webp or .mp4"),
+        (("--plot", "nowhere/a.svg"), "there is no folder nowhere"),
+        (("--film", "nowhere/a.webp"), "there is no folder nowhere"),
+        (("--plot", "folder.svg"), "is a folder"),
+        (("--film", "a.webp", "--fps", "0"), "--fps is from 1 to 60"),
+        (("--film", "a.webp", "--slow", "-1"), "--slow is from"),
+        (("--film", "a.webp", "--size", "7x9"), "width of a film is even"),
+        (("--film", "a.webp", "--size", "large"), "a size reads like 640x480"),
+        (("--film", "a.webp", "--why"), "go without it"),
+    ],
+)
+def test_what_cannot_be_drawn_is_said_before_anything_runs(
+    cli: Cli, tmp_path: Path, words: tuple[str, ...], says: str
+) -> None:
+    (tmp_path / "folder.svg").mkdir()
+    done = cli("compare", "hold", *words)
+    assert done.returncode == 2
+    assert not done.stdout
+    (line,) = done.stderr.splitlines()
+    assert says in line
+
+
+@pytest.mark.parametrize(
+    ("words", "module", "extra"),
+    [
+        (("--plot", "a.svg"), "matplotlib", "[plot]"),
+        (("--film", "a.webp"), "PIL", "[render]"),
+        (("--film", "a.mp4"), "imageio_ffmpeg", "[mp4]"),
+    ],
+)
+def test_an_extra_that_is_missing_is_named_before_anything_runs(
+    cli: Cli, tmp_path: Path, words: tuple[str, ...], module: str, extra: str
+) -> None:
+    hidden = tmp_path / "hidden"
+    hidden.mkdir()
+    (hidden / f"{module}.py").write_text(f"raise ModuleNotFoundError(name={module!r})\n")
+    done = cli("compare", "hold", *words, PYTHONPATH=f"{hidden}:{ROOT}")
+    assert done.returncode == 3
+    assert not done.stdout
+    (line,) = done.stderr.splitlines()
+    assert extra in line
+
+
+def _two_files(tmp_path: Path, sides: tuple[sm.Model, Trace, Trace]) -> tuple[str, str]:
+    for name, trace in zip(("one.npz", "two.npz"), sides[1:], strict=True):
+        write(trace, tmp_path / name)
+    return "one.npz", "two.npz"
+
+
+def test_compare_writes_what_it_is_asked_for(
+    cli: Cli, tmp_path: Path, sides: tuple[sm.Model, Trace, Trace], mujoco_here: probe.Renderer
+) -> None:
+    pytest.importorskip("matplotlib")
+    files = _two_files(tmp_path, sides)
+    done = cli(
+        *("compare", *files, "--json", "--plot", "a.svg", "--film", "a.webp", "--size", "320x240"),
+        *("--fps", "10", "--renderer", "mujoco"),
+    )
+    assert done.returncode == 1  # they differ
+    json.loads(done.stdout)
+    plotted, filmed = done.stderr.splitlines()
+    assert "a.svg: a figure" in plotted
+    assert "a.webp: a film of 0.5 s, 5 pictures" in filmed
+    assert "drawn by MuJoCo" in filmed
+    assert sorted(path.name for path in tmp_path.glob("a.*")) == ["a.svg", "a.webp"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="looks at processes in /proc")
+@pytest.mark.parametrize("name", ["a.webp", "a.mp4"])
+def test_ctrl_c_leaves_no_half_film_and_no_process(
+    tmp_path: Path, sides: tuple[sm.Model, Trace, Trace], mujoco_here: probe.Renderer, name: str
+) -> None:
+    files = _two_files(tmp_path, sides)
+    command = [sys.executable, "-m", "statemachine", "compare", *files, "--film", name]
+    child = subprocess.Popen(
+        [*command, "--slow", "20", "--renderer", "mujoco"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,  # a group of its own, as a terminal's foreground job
+    )
+    try:
+        deadline = time.monotonic() + 60
+        while not _drawing(child.pid) and time.monotonic() < deadline and child.poll() is None:
+            time.sleep(0.05)
+        time.sleep(1)
+        os.killpg(child.pid, signal.SIGINT)
+        _, said = child.communicate(timeout=60)
+    finally:
+        child.kill()
+    assert child.returncode == 130, said
+    assert "Traceback" not in said
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.npz", "two.npz"]
+    assert not _drawing(child.pid)
+
+
+def _drawing(group: int) -> list[str]:
+    """Processes of a group that draw or encode."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            words = (folder / "stat").read_text().rpartition(")")[2].split()
+            command = (folder / "cmdline").read_bytes()
+        except OSError:
+            continue
+        if int(words[2]) == group and (b"rendering._child" in command or b"ffmpeg" in command):
+            found.append(command.decode())
+    return found
+
+
+# Figures.
+
+
+@pytest.fixture(scope="module")
+def compared() -> tuple[Trace, Trace, Any]:
+    """Hold on MuJoCo, and as PyBullet was recorded."""
+    two = shipped("hold", "pybullet")
+    model = sm.load("so101/scene")
+    one = record(model, lambda _t, _d: np.array(FIRST), 2.0, experiment="hold")
+    return one, two, compare(one, two)
+
+
+def _texts(svg: bytes) -> str:
+    root = ElementTree.fromstring(svg)
+    space = "{http://www.w3.org/2000/svg}"
+    assert root.tag == f"{space}svg"
+    # Millimetres would be lost in pixels: 80 mm wide, whatever is in it.
+    assert float(root.get("width", "").removesuffix("pt")) == pytest.approx(
+        80 / 25.4 * 72, rel=1e-3
+    )
+    return " | ".join("".join(text.itertext()) for text in root.iter(f"{space}text"))
+
+
+def test_an_svg_says_in_text_what_it_shows(compared: tuple[Trace, Trace, Any]) -> None:
+    pytest.importorskip("matplotlib")
+    one, two, found = compared
+    text = _texts(drawn(plot(one, two, found), "svg"))
+    for word in (one.header.label, two.header.label, "hold", *one.header.joints, "gripperframe"):
+        assert word in text
+    for word in ("energy", "tolerance", "world – gripper", "time [s]", "statemachine 0."):
+        assert word in text
+    assert f"they part at {min(a.since for a in found.agreements if a.since):.3f} s" in text
+
+
+def test_the_same_figure_has_the_same_bytes(
+    compared: tuple[Trace, Trace, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    figure = plot(*compared)
+    for form in ("svg", "png", "pdf"):
+        once = drawn(figure, form)
+        # Another day, and a reader who likes other fonts.
+        monkeypatch.setenv("SOURCE_DATE_EPOCH", "1")
+        with matplotlib.rc_context({"font.size": 20, "axes.grid": True}):
+            assert drawn(figure, form) == once
+            assert matplotlib.rcParams["font.size"] == 20
+        monkeypatch.delenv("SOURCE_DATE_EPOCH")
+        target = tmp_path / f"a.{form}"
+        assert write_plot(figure, target) == len(once)
+        assert target.read_bytes() == once
+
+
+def test_a_png_is_a_picture_with_both_sides_in_it(compared: tuple[Trace, Trace, Any]) -> None:
+    pytest.importorskip("matplotlib")
+    image_of = pytest.importorskip("PIL.Image")
+    import io
+
+    image = image_of.open(io.BytesIO(drawn(plot(*compared), "png"))).convert("RGB")
+    assert image.width == pytest.approx(80 / 25.4 * 300, abs=1)
+    pixels = np.asarray(image).astype(int)
+    for colour in ((240, 168, 48), (75, 31, 120)):
+        assert (np.abs(pixels - colour).max(axis=2) < 12).sum() > 500
+    # Without colour one is pale and one is dark.
+    grey = [sum(w * c for w, c in zip((0.3, 0.59, 0.11), colour, strict=True)) for colour in
+            ((240, 168, 48), (75, 31, 120))]  # fmt: skip
+    assert grey[0] - grey[1] > 100
+
+
+def test_panels_hold_the_figures_of_the_comparison(compared: tuple[Trace, Trace, Any]) -> None:
+    one, two, found = compared
+    figure = plot(one, two, found)
+    panels = {panel.title: panel for panel in figure.panels}
+    assert [panel.wide for panel in figure.panels] == [True, *[False] * (len(panels) - 1)]
+    lift = panels["shoulder_lift"]
+    place = one.header.jnt_qposadr[one.header.joints.index("shoulder_lift")]
+    for (_, (_, values)), trace in zip(lift.curves, (one, two), strict=True):
+        np.testing.assert_allclose(values, np.degrees(trace.qpos[:, place]))
+    assert lift.apart is not None
+    apart = np.degrees(np.abs(one.qpos[:, place] - two.qpos[:, place]))
+    np.testing.assert_allclose(lift.apart[1], apart)
+    assert lift.tolerance == pytest.approx(360 / 4096)
+    assert lift.verdict.startswith("DIFFERS")
+    tip = panels["gripperframe, from its start"]
+    (p, _), (q, _) = one.site("gripperframe"), two.site("gripperframe")
+    assert tip.apart is not None
+    np.testing.assert_allclose(tip.apart[1], 1000 * np.linalg.norm(p - q, axis=1))
+    (touch,) = [touch for touch in figure.touches if touch.name == "world – gripper"]
+    for spans, trace in zip(touch.spans, (one, two), strict=True):
+        rows = np.unique(trace["contact_row"])
+        assert spans[0][0] == pytest.approx(trace.time[rows[0]] - trace.time[0])
+        step = trace.header.timestep
+        assert sum(length for _, length in spans) == pytest.approx(
+            len(rows) * step, abs=1.01 * step
+        )
+
+
+def test_what_never_differs_is_drawn_too(compared: tuple[Trace, Trace, Any]) -> None:
+    """A difference of zero has no logarithm."""
+    pytest.importorskip("matplotlib")
+    one, _, _ = compared
+    figure = plot(one, one, compare(one, one))
+    assert figure.part is None
+    assert "they part" not in _texts(drawn(figure, "svg"))
+
+
+@pytest.mark.parametrize("what", ["compared", "recorded", "alone"])
+def test_nothing_is_cut_off_at_the_edges(compared: tuple[Trace, Trace, Any], what: str) -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.text import Text
+
+    from statemachine.report.plot import _SETTINGS
+    from statemachine.report.plot_draw import draw
+
+    one, two, found = compared
+    if what == "recorded":
+        one = Trace(dataclasses.replace(one.header, recorded=True, defaults="engine"), one.columns)
+    figure = plot_trace(two) if what == "alone" else plot(one, two, found)
+    with matplotlib.rc_context(_SETTINGS):
+        canvas = draw(figure)
+        pen = FigureCanvasAgg(canvas)
+        pen.draw()
+        width, height = canvas.bbox.width, canvas.bbox.height
+        for text in canvas.findobj(Text):
+            if text.get_visible() and text.get_text().strip():
+                box = text.get_window_extent(pen.get_renderer())
+                inside = (-1 <= box.x0 <= box.x1 <= width + 1, -1 <= box.y0 <= box.y1 <= height + 1)
+                assert inside == (True, True), text.get_text()
+
+
+def test_one_trace_alone(compared: tuple[Trace, Trace, Any]) -> None:
+    pytest.importorskip("matplotlib")
+    _, two, _ = compared
+    text = _texts(drawn(plot_trace(two), "svg"))
+    for word in (two.header.label, "the command", *two.header.joints, "energy"):
+        assert word in text

@@ -1,0 +1,896 @@
+"""The report of a comparison, looked at in a real browser as a reader would."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import hashlib
+import io
+import itertools
+import json
+import re
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import statemachine as sm
+from statemachine.compare import Comparison, compare, sides_of
+from statemachine.compare.sides import Request
+from statemachine.drawing import drawing_of
+from statemachine.errors import BadInputError
+from statemachine.experiments.scenarios import SCENARIOS
+from statemachine.report.figures_of import quantity
+from statemachine.report.html import Look, check_target, report, write_report
+from statemachine.report.html.finding import headline
+from statemachine.report.html.geometry import bones_of, mesh_of, octahedral
+from statemachine.report.html.timeline import events_of, frames_of
+from statemachine.traces import Trace, record_scenario, shipped, write
+
+from .browser import Tab, browser
+from .conftest import ROOT, Cli, need_engine
+
+LIMIT = 2_000_000  # bytes
+Made = tuple[Comparison, Trace, Trace, Look]
+
+
+def of(one: Trace, two: Trace) -> Made:
+    return compare(one, two), one, two, look_of(one)
+
+
+def look_of(trace: Trace) -> Look:
+    return Look(drawing_of(sm.load(trace.header.provenance.model_file)))
+
+
+def page_of(made: Made, **more: Any) -> str:
+    comparison, one, two, look = made
+    return report(comparison, one, two, **{"looks": (look, look), **more})
+
+
+def rows(trace: Trace, count: int) -> Trace:
+    """The first rows of a trace."""
+    columns = {}
+    few = trace["contact_row"] < count
+    for name, array in trace.columns.items():
+        columns[name] = array[few] if name.startswith("contact") else array[:count]
+    return Trace(trace.header, columns)
+
+
+@pytest.fixture(scope="module")
+def hold() -> Made:
+    """MuJoCo against the recorded run of PyBullet: no second engine is needed."""
+    return of(
+        record_scenario(SCENARIOS["hold"], sm.load("so101/scene")), shipped("hold", "pybullet")
+    )
+
+
+@pytest.fixture(scope="module")
+def page(hold: Made, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    target = tmp_path_factory.mktemp("report") / "hold.html"
+    return write_report(target, page_of(hold, command="statemachine compare hold --html hold.html"))
+
+
+def open_page(tab: Tab, path: Path) -> None:
+    tab.goto(path.as_uri())
+    tab.wait_for_timeout(300)
+
+
+def picture(tab: Tab, where: str = "#scene") -> np.ndarray:
+    if where == "#scene":
+        tab.mouse.move(0, 0)  # nothing under it is in another colour
+        # Always at the same place of the screen: else its edges are rounded otherwise.
+        tab.evaluate(
+            "document.activeElement.blur(); document.querySelector('#stage').scrollIntoView()"
+        )
+        tab.wait_for_timeout(50)
+        tab.wait_for_selector("#scene[data-drawn=fine]")
+    return np.asarray(Image.open(io.BytesIO(tab.locator(where).screenshot())).convert("RGB"), int)
+
+
+def changed(before: np.ndarray, after: np.ndarray) -> int:
+    """How many pixels are clearly of another colour."""
+    return int((np.abs(before - after).max(axis=2) > 24).sum())
+
+
+def cursors(tab: Tab) -> list[float]:
+    """Where the cursor is in each plot that is seen, as a share of its width."""
+    return tab.evaluate(
+        """() => [...document.querySelectorAll('.cursor')].map((c) => {
+          const a = c.parentElement.getBoundingClientRect(), b = c.getBoundingClientRect();
+          return a.width && b.height ? (b.left + b.width / 2 - a.left) / a.width : null;
+        }).filter((x) => x !== null)"""
+    )
+
+
+def go(tab: Tab, row: int) -> None:
+    """Move the slider as a reader does."""
+    slider = tab.locator("#slider")
+    slider.focus()
+    slider.fill(str(row))
+
+
+# What it is as a file.
+
+
+def test_it_asks_for_nothing_and_nothing_is_wrong(page: Path) -> None:
+    with browser(offline=True) as tab:
+        open_page(tab, page)
+        assert tab.requests[0] == page.as_uri()
+        assert {url.split(":")[0] for url in tab.requests[1:]} <= {"data"}
+        tab.nothing_wrong()
+
+
+def test_its_policy_lets_nothing_in(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    policy = re.search(r'Content-Security-Policy" content="([^"]+)"', text)
+    assert policy
+    assert policy[1].startswith("default-src 'none'")
+    assert "http" not in policy[1]
+    assert "unsafe-inline'; script" in policy[1]  # styles alone
+    scripts = re.findall(r"<script>(.*?)</script>", text, re.S)
+    digests = [base64.b64encode(hashlib.sha256(s.encode()).digest()).decode() for s in scripts]
+    assert re.findall(r"'sha256-([^']+)'", policy[1]) == digests
+    assert not re.findall(r"(?:src|href)=\"(?!#|data:)", text)
+    assert str(ROOT) not in text
+
+
+def test_a_script_that_was_put_in_is_not_run(page: Path, tmp_path: Path) -> None:
+    """The policy does what it says: else the test above would say nothing."""
+    text = page.read_text(encoding="utf-8")
+    bad = tmp_path / "bad.html"
+    extra = "<script>window.came_in = 1</script><img src='http://outside.invalid/a.png'></body>"
+    bad.write_text(text.replace("</body>", extra), encoding="utf-8")
+    with browser() as tab:
+        open_page(tab, bad)
+        assert tab.evaluate("window.came_in") is None
+        assert any("Content Security Policy" in error for error in tab.errors)
+
+
+def hostile(text: str) -> str:
+    return f"{text}</script><img src=x onerror=window.hit=1>\"'&{{{{data}}}}\u202e\ud800"
+
+
+def test_names_that_are_markup_do_nothing(hold: Made, tmp_path: Path) -> None:
+    def spoiled(trace: Trace) -> Trace:
+        header = trace.header
+        names = {
+            name: tuple(hostile(each) for each in getattr(header, name))
+            for name in ("joints", "sites", "bodies", "geoms", "actuators")
+        }
+        prov = dataclasses.replace(
+            header.provenance, model_file=hostile("m"), backend=hostile("b"),
+            versions={hostile("v"): hostile("1")}, emulated=(hostile("e"),),
+        )  # fmt: skip
+        texts = {name: hostile(name) for name in ("experiment", "says", "command", "keyframe")}
+        options = {hostile("o"): hostile("p")}
+        found = dataclasses.replace(
+            header, provenance=prov, ended=hostile("end"), options=options, **names, **texts
+        )
+        return Trace(found, trace.columns)
+
+    _, one, two, look = hold
+    made = of_look(spoiled(one), spoiled(two), look)
+    target = write_report(
+        tmp_path / "x.html", page_of(made, said=(hostile("said"),), command=hostile("typed"))
+    )
+    with browser() as tab:
+        open_page(tab, target)
+        assert tab.evaluate("window.hit") is None
+        assert tab.locator("img").count() == 0
+        assert "onerror" in tab.locator("main").inner_text()
+        tab.nothing_wrong()
+
+
+def of_look(one: Trace, two: Trace, look: Look) -> Made:
+    return compare(one, two), one, two, look
+
+
+@pytest.mark.parametrize("name", ["hold", "gravity", "box", "hold.engine"])
+def test_it_is_small(name: str, tmp_path: Path) -> None:
+    experiment, _, engine = name.partition(".")
+    scenario = SCENARIOS[experiment]
+    kind: Any = "engine" if engine else "model"
+    one = record_scenario(scenario, sm.load(scenario.model, defaults=kind), defaults=kind)
+    text = page_of(of(one, shipped(experiment, "pybullet", kind)))
+    assert len(text.encode()) <= LIMIT
+    with browser() as tab:
+        open_page(tab, write_report(tmp_path / "x.html", text))
+        assert tab.locator("#scene").is_visible()
+        tab.nothing_wrong()
+
+
+def test_a_long_run_is_small_too_and_keeps_the_moments_that_count() -> None:
+    one = record_scenario(SCENARIOS["hold"], sm.load("so101/scene"), seconds=20.0)
+    qpos = one.qpos.copy()
+    qpos[1234, 2] += 0.1
+    two = Trace(one.header, {**one.columns, "qpos": qpos})
+    made = of(one, two)
+    assert len(page_of(made).encode()) <= LIMIT
+    at = made[0].agreements[2].at
+    assert at == pytest.approx(1234 * 0.005)
+    assert np.abs(frames_of(one, two, (at,)).time - at).min() < 1e-9
+    assert len(frames_of(one, two)) < len(one)
+
+
+def test_much_to_draw_is_drawn_with_less(hold: Made) -> None:
+    """Many contacts at once, and a shape of two hundred thousand triangles."""
+    _, one, two, look = hold
+    count = 60
+    n = len(one) * count
+    columns = dict(one.columns)
+    columns["contact_row"] = np.repeat(np.arange(len(one)), count)
+    columns["contact_geom"] = np.tile([0, 34], (n, 1))
+    for name, width in (("dist", ()), ("pos", (3,)), ("frame", (9,)), ("force", (3,))):
+        columns[f"contact_{name}"] = np.random.default_rng(0).normal(size=(n, *width))
+    assert look.drawing
+    u, v = np.meshgrid(np.linspace(0, 2 * np.pi, 320), np.linspace(0.01, 3.13, 320))
+    ball = 0.1 * np.stack([np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)], axis=-1)
+    a = np.arange(320 * 320).reshape(320, 320)
+    a, b, c, d = (x.ravel() for x in (a[:-1, :-1], a[:-1, 1:], a[1:, 1:], a[1:, :-1]))
+    faces = np.concatenate([np.stack([a, c, b], axis=1), np.stack([a, d, c], axis=1)])
+    part = dataclasses.replace(
+        look.drawing.parts[1],
+        vertices=ball.reshape(-1, 3).astype(np.float32),
+        faces=faces.astype(np.int32),
+    )
+    big = Look(dataclasses.replace(look.drawing, parts=(*look.drawing.parts, part)))
+    text = page_of(of_look(Trace(one.header, columns), two, big))
+    assert len(text.encode()) <= LIMIT
+    assert "triangles" in text
+    assert "strongest are drawn" in text
+
+
+# What it says.
+
+
+def test_the_headline_is_made_of_the_figures(hold: Made) -> None:
+    comparison, one, two, _ = hold
+    found = {each.name: each for each in comparison.agreements}
+    text = headline(comparison, events_of(comparison, one, two))
+    wrist = found["wrist_flex"]
+    assert text.startswith(f"Joint wrist_flex ends {quantity(wrist.settled, 'joint')} apart")
+    since = min(each.since for each in comparison.agreements if each.since is not None)
+    assert f"the runs part at {since:.3f} s, when gripper touches floor" in text
+    assert "explains" not in text  # nothing was asked about causes
+
+
+def test_other_figures_make_another_headline(hold: Made) -> None:
+    comparison, one, two, _ = hold
+    same = compare(one, one)
+    assert "same in every figure" in headline(same, events_of(same, one, one))
+    near = compare(one, Trace(one.header, {**one.columns, "qpos": one.qpos + 1e-6}))
+    assert "agree for 2 s" in headline(near, [])
+    # Without contacts, nothing is said of a touch.
+    bare = [
+        Trace(t.header, {k: v for k, v in t.columns.items() if not k.startswith("contact")})
+        for t in (one, two)
+    ]
+    apart = compare(*bare)
+    assert "touches" not in headline(apart, events_of(apart, *bare))
+    assert comparison.agreements != apart.agreements
+
+
+def test_every_figure_of_the_comparison_is_on_the_page(hold: Made, page: Path) -> None:
+    with browser(java_script_enabled=False) as tab:
+        open_page(tab, page)
+        text = tab.locator("#figures table").inner_text()
+    for found in hold[0].agreements:
+        (line,) = [row for row in text.splitlines() if row.startswith(found.name + "\t")]
+        assert quantity(found.tolerance, found.kind) in line
+        assert found.verdict in line
+        if found.kind != "contact":
+            for value in (found.max, found.rms, found.settled):
+                assert quantity(value, found.kind) in line
+
+
+def test_it_reads_without_a_script(page: Path) -> None:
+    with browser(java_script_enabled=False) as tab:
+        open_page(tab, page)
+        assert tab.locator("#still svg").is_visible()
+        assert tab.locator("#curves .plot").first.is_visible()
+        assert not tab.locator("#slider").is_visible()
+        assert not tab.locator("#play").is_visible()
+        assert not tab.locator(".cursor").first.is_visible()
+        text = tab.locator("main").inner_text()
+    for heading in ("How far apart, over time", "What happens when", "Where this comes from"):
+        assert heading in text
+
+
+# What moves.
+
+
+def test_the_slider_moves_both_arms_the_cursors_and_the_figures(page: Path, hold: Made) -> None:
+    with browser(height=1000) as tab:
+        open_page(tab, page)
+        for name in ("marks", "trails"):
+            tab.locator(f"#{name}").uncheck()
+        for alone in ("solid", "ghost"):
+            for name in ("solid", "ghost"):
+                tab.locator(f"#{name}").set_checked(name == alone)
+            go(tab, 20)
+            first, at = picture(tab), tab.locator("#readout-box").inner_text()
+            assert changed(first, picture(tab)) == 0  # it stands still by itself
+            go(tab, 120)
+            assert changed(first, picture(tab)) > 2000, alone
+            assert tab.locator("#readout-box").inner_text() != at
+        assert tab.locator("#clock").inner_text() == "0.600 s"
+        places = cursors(tab)
+        assert len(places) > 15
+        assert places == pytest.approx([0.6 / 2.0] * len(places), abs=0.004)
+        values = hold[1].qpos[120, 3], hold[2].qpos[120, 3]
+        cells = tab.locator("#readout tr", has_text="wrist_flex").locator("td").all_inner_texts()
+        shown = [float(cell.rstrip("°").replace("−", "-")) for cell in cells]
+        assert shown[:2] == pytest.approx(np.degrees(values), abs=0.06)
+        assert shown[2] == pytest.approx(abs(np.degrees(values[0] - values[1])), abs=0.006)
+        tab.nothing_wrong()
+
+
+def test_each_side_is_drawn_and_can_be_left_out(page: Path) -> None:
+    with browser(height=1000) as tab:
+        open_page(tab, page)
+        before = picture(tab)
+        for name in ("solid", "ghost", "marks", "trails"):
+            tab.locator(f"#{name}").uncheck()
+            without = picture(tab)
+            assert changed(before, without) > 150, name
+            tab.locator(f"#{name}").check()
+            assert changed(before, picture(tab)) == 0, name
+
+
+def test_the_sides_are_drawn_where_they_are(hold: Made, tmp_path: Path) -> None:
+    """A run against itself turned by a quarter: the ghost is somewhere else."""
+    _, one, _, look = hold
+    xpos = one["xpos"][..., [1, 0, 2]] * [-1, 1, 1]
+    half = np.sqrt(0.5)
+    w, x, y, z = np.moveaxis(one["xquat"], -1, 0)
+    turned = np.stack([w - z, x - y, y + x, z + w], axis=-1) * half
+    two = Trace(one.header, {**one.columns, "xpos": xpos, "xquat": turned})
+    target = write_report(tmp_path / "x.html", page_of(of_look(one, two, look)))
+    with browser(height=1000) as tab:
+        open_page(tab, target)
+        for name in ("marks", "trails"):
+            tab.locator(f"#{name}").uncheck()
+        both = picture(tab)
+        tab.locator("#ghost").uncheck()
+        ghost = np.abs(picture(tab) - both).max(axis=2) > 24
+        tab.locator("#solid").uncheck()
+        empty = picture(tab)
+        tab.locator("#solid").check()
+        solid = np.abs(picture(tab) - empty).max(axis=2) > 24
+    assert (ghost & ~solid).sum() > 0.5 * ghost.sum()
+
+
+def until(tab: Tab, holds: Callable[[], bool]) -> None:
+    """Wait for something; the page's policy keeps the browser from doing it itself."""
+    for _ in range(300):
+        if holds():
+            return
+        tab.wait_for_timeout(50)
+    pytest.fail("it did not happen")
+
+
+def moved(tab: Tab, since: float) -> float:
+    """The row once the slider has gone on by itself."""
+    slider = tab.locator("#slider")
+    until(tab, lambda: float(slider.input_value()) > since)
+    return float(slider.input_value())
+
+
+def test_it_plays_and_pauses(page: Path) -> None:
+    with browser(height=1000) as tab:
+        open_page(tab, page)
+        tab.locator("#play").click()
+        assert tab.locator("#play").inner_text() == "Pause"
+        first = moved(tab, 0)
+        moved(tab, first)
+        tab.locator("#play").click()
+        then = float(tab.locator("#slider").input_value())
+        assert 0 < first < then < 400
+        tab.wait_for_timeout(400)
+        assert float(tab.locator("#slider").input_value()) == then
+        assert cursors(tab)[0] == pytest.approx(then / 400, abs=0.004)
+        tab.wait_for_function(
+            "document.querySelector('#said').textContent.startsWith('Paused at ')"
+        )
+
+
+def test_it_can_be_used_by_keyboard(page: Path) -> None:
+    with browser(height=1000) as tab:
+        open_page(tab, page)
+        slider = tab.locator("#slider")
+        slider.focus()
+        for key, value in (("Home", 0), ("ArrowRight", 1), ("End", 400), ("ArrowLeft", 399)):
+            tab.keyboard.press(key)
+            assert int(slider.input_value()) == value
+        assert re.fullmatch(
+            r"1\.995 s: wrist_flex [\d.]+°, gripperframe, position [\d.]+ mm apart",
+            slider.get_attribute("aria-valuetext"),
+        )
+        tab.keyboard.press("Home")
+        tab.keyboard.press(" ")
+        moved(tab, 0)
+        tab.keyboard.press(" ")
+        assert 0 < int(slider.input_value()) < 400
+        before = picture(tab)
+        tab.locator("#scene").press("ArrowLeft")
+        assert changed(before, picture(tab)) > 1000
+        tab.locator("#scene").press("0")
+        assert changed(before, picture(tab)) == 0
+        # Whatever can be reached shows that it was.
+        for _ in range(12):
+            tab.keyboard.press("Tab")
+            style = tab.evaluate(
+                "(() => { const s = getComputedStyle(document.activeElement);"
+                "return [s.outlineStyle, parseFloat(s.outlineWidth)]; })()"
+            )
+            assert style[0] != "none"
+            assert style[1] >= 2
+
+
+def test_a_time_in_a_table_and_a_press_on_a_chart_go_there(page: Path) -> None:
+    with browser(height=1000) as tab:
+        open_page(tab, page)
+        button = tab.locator("#events button.go").first
+        text = button.inner_text()
+        button.click()
+        assert tab.locator("#clock").inner_text() == text
+        area = tab.locator("#curves .area").first
+        area.scroll_into_view_if_needed()
+        box = area.bounding_box()
+        tab.mouse.click(box["x"] + 0.75 * box["width"], box["y"] + 20)
+        assert tab.locator("#clock").inner_text() == "1.500 s"
+
+
+def test_the_view_turns_and_comes_back(page: Path) -> None:
+    with browser(height=1000) as tab:
+        open_page(tab, page)
+        before = picture(tab)
+        box = tab.locator("#scene").bounding_box()
+        tab.mouse.move(box["x"] + 200, box["y"] + 200)
+        tab.mouse.down()
+        tab.mouse.move(box["x"] + 300, box["y"] + 230, steps=4)
+        tab.mouse.up()
+        assert changed(before, picture(tab)) > 2000
+        tab.locator("#view-near").click()
+        near = picture(tab)
+        assert changed(before, near) > 2000
+        tab.locator("#view-all").click()
+        assert changed(before, picture(tab)) == 0
+
+
+# How it looks, and to whom.
+
+
+@pytest.mark.parametrize("width", [360, 768, 1280])
+def test_nothing_is_wider_than_the_screen(page: Path, width: int) -> None:
+    with browser(width=width, height=700) as tab:
+        open_page(tab, page)
+        for summary in tab.locator("summary").all():
+            summary.click()
+        assert tab.evaluate("document.documentElement.scrollWidth") <= width
+        box = tab.locator("#scene").bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= width
+
+
+def test_dark_and_light(page: Path) -> None:
+    def paper(tab: Tab) -> float:
+        colour = tab.evaluate("getComputedStyle(document.body).backgroundColor")
+        return sum(map(int, re.findall(r"\d+", colour)[:3])) / 3
+
+    with browser(color_scheme="light") as tab:
+        open_page(tab, page)
+        assert paper(tab) > 230
+        before = picture(tab)
+        button = tab.get_by_role("button", name="Dark colours")
+        button.click()
+        assert paper(tab) < 50
+        assert button.get_attribute("aria-pressed") == "true"
+        assert changed(before, picture(tab)) > 10_000
+    with browser(color_scheme="dark") as tab:
+        open_page(tab, page)
+        assert paper(tab) < 50
+        tab.get_by_role("button", name="Dark colours").click()
+        assert paper(tab) > 230
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance (WCAG 2.2)."""
+    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    r, g, b = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b
+
+
+def contrast(one: str, two: str) -> float:
+    high, low = sorted((luminance(one), luminance(two)), reverse=True)
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_every_text_can_be_read(page: Path) -> None:
+    css = (ROOT / "statemachine/report/html/page.css").read_text()
+    blocks = re.findall(r":root[^{]*\{([^}]*--paper[^}]*)\}", css)
+    assert len(blocks) == 4  # light, dark by the system, dark by hand, print
+    colours = [dict(re.findall(r"--([\w-]+): (#\w+)", block)) for block in blocks]
+    assert colours[1] == colours[2]
+    for each in colours:
+        full = {
+            k: v if len(v) == 7 else "#" + "".join(c * 2 for c in v[1:]) for k, v in each.items()
+        }
+        for text in ("ink", "soft", "one", "two", "bad", "link", "edge"):
+            for paper in ("paper", "shade"):
+                assert contrast(full[text], full[paper]) >= 4.5, (text, paper, full[text])
+
+
+def test_the_sides_differ_for_the_colour_blind() -> None:
+    """Machado, Oliveira and Fernandes (2009), severity 1, on linear RGB."""
+    css = (ROOT / "statemachine/report/html/page.css").read_text()
+    deficient = {
+        "protan": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
+                   [-0.003882, -0.048116, 1.051998]],
+        "deutan": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413],
+                   [-0.011820, 0.042940, 0.968881]],
+        "tritan": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602],
+                   [0.004733, 0.691367, 0.303900]],
+    }  # fmt: skip
+    for one, two in zip(re.findall(r"--one: (#\w+)", css), re.findall(r"--two: (#\w+)", css),
+                        strict=True):  # fmt: skip
+        linear = [[(int(c[k : k + 2], 16) / 255) ** 2.2 for k in (1, 3, 5)] for c in (one, two)]
+        for matrix in deficient.values():
+            a, b = (np.clip(np.array(matrix) @ c, 0, 1) ** (1 / 2.2) for c in linear)
+            assert np.abs(a - b).max() > 0.2
+
+
+def test_what_a_screen_reader_hears(page: Path) -> None:
+    with browser() as tab:
+        open_page(tab, page)
+        heard = tab.locator("body").aria_snapshot()
+        for part in (
+            "- main:",
+            "- contentinfo:",
+            '- heading "Joint wrist_flex ends',
+            "[level=1]",
+            '- slider "Moment of the run": ',
+            '- button "Play"',
+            '- checkbox "mujoco',
+            '- region "How far apart, over time"',
+            '- columnheader "largest"',
+            '- rowheader "wrist_flex"',
+            'img "wrist_flex, difference over time: at most 2.61° at 0.370 s',
+            '- img "Both runs in three dimensions',
+        ):
+            assert part in heard, part
+        levels = [
+            int(name[1])
+            for name in tab.evaluate(
+                "[...document.querySelectorAll('h1,h2,h3,h4')].map((h) => h.tagName)"
+            )
+        ]
+        assert levels[0] == 1
+        assert levels.count(1) == 1
+        assert all(b - a <= 1 for a, b in itertools.pairwise(levels))
+        nameless = tab.evaluate(
+            """[...document.querySelectorAll('button, input, select, a, [role=img], [tabindex]')]
+            .filter((e) => !(e.getAttribute('aria-label') || e.textContent.trim()
+              || (e.labels && e.labels.length))).map((e) => e.outerHTML)"""
+        )
+        assert nameless == []
+        tables = tab.evaluate(
+            "[...document.querySelectorAll('table')].map((t) => [!!t.caption?.textContent,"
+            "[...t.querySelectorAll('th')].every((h) => h.scope)])"
+        )
+        assert all(caption and scoped for caption, scoped in tables)
+        assert tab.locator("#said").get_attribute("aria-live") == "polite"
+
+
+def test_it_prints_with_all_sections_and_the_picture(page: Path) -> None:
+    with browser(color_scheme="dark") as tab:
+        open_page(tab, page)
+        # What a browser does when it prints, held still to be looked at.
+        tab.evaluate("dispatchEvent(new Event('beforeprint'))")
+        tab.emulate_media(media="print")
+        tab.wait_for_timeout(300)
+        assert (
+            tab.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+        )
+        text = tab.locator("main").inner_text()
+        for heading in tab.locator("h2").all_inner_texts():
+            assert heading in text
+        assert "shoulder_pan" in tab.locator("#curves > details").inner_text()
+        assert tab.locator("#printed").is_visible()
+        assert picture(tab, "#printed").std() > 10
+        for name in ("#play", "#slider", "#theme", "#views", "#checks"):
+            assert not tab.locator(name).is_visible()
+        tab.emulate_media(media="screen")
+        tab.evaluate("dispatchEvent(new Event('afterprint'))")
+        assert tab.locator("#printed").count() == 0
+        assert not tab.locator("#curves > details").evaluate("(e) => e.open")
+        pdf = tab.page.pdf(format="A4")
+        assert len(re.findall(rb"/Type\s*/Page\b", pdf)) >= 3
+        tab.nothing_wrong()
+
+
+def test_it_says_so_without_webgl(page: Path, tmp_path: Path) -> None:
+    with browser() as tab:
+        tab.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
+        open_page(tab, page)
+        assert "no WebGL" in tab.locator("#no-scene").inner_text()
+        assert tab.locator("#still svg").is_visible()
+        assert not tab.locator("#scene").is_visible()
+        go(tab, 100)
+        assert tab.locator("#clock").inner_text() == "0.500 s"
+        tab.nothing_wrong()
+
+
+def test_it_does_not_move_by_itself_nor_smoothly_where_that_is_not_wanted(page: Path) -> None:
+    with browser(reduced_motion="reduce") as tab:
+        open_page(tab, page)
+        before = tab.locator("#slider").input_value()
+        tab.wait_for_timeout(500)
+        assert tab.locator("#slider").input_value() == before
+        tab.locator("#events button.go").first.click()
+        y = tab.evaluate("scrollY")
+        tab.wait_for_timeout(200)
+        assert tab.evaluate("scrollY") == y
+
+
+# Whatever the traces are.
+
+
+def ended(made: Made) -> Made:
+    _, one, two, look = made
+    early = rows(two, 150)
+    header = dataclasses.replace(early.header, ended="it diverged at 0.745 s")
+    return of_look(one, Trace(header, early.columns), look)
+
+
+def single(made: Made) -> Made:
+    _, one, two, look = made
+    return of_look(rows(one, 1), rows(two, 1), look)
+
+
+def same(made: Made) -> Made:
+    return of_look(made[1], made[1], made[3])
+
+
+def not_finite(made: Made) -> Made:
+    _, one, two, look = made
+    xpos = two["xpos"].copy()
+    xpos[100:] = np.nan
+    xpos[90] = 1e12
+    return of_look(one, Trace(two.header, {**two.columns, "xpos": xpos}), look)
+
+
+@pytest.mark.parametrize("kind", [ended, single, same, not_finite])
+def test_other_traces(hold: Made, kind: Callable[[Made], Made], tmp_path: Path) -> None:
+    made = kind(hold)
+    target = write_report(tmp_path / "x.html", page_of(made))
+    with browser() as tab:
+        open_page(tab, target)
+        assert tab.locator("#scene").is_visible()
+        last = int(tab.locator("#slider").get_attribute("max"))
+        go(tab, last)
+        assert tab.locator("#clock").inner_text() == f"{made[0].until:.3f} s"
+        text = tab.locator("body").inner_text()
+        if kind is ended:
+            assert "it diverged at 0.745 s" in text
+        if kind is same:
+            assert "The two runs are the same in every figure" in text
+        assert "NaN" not in text
+        assert tab.locator("#play").is_visible() == (kind is not single)
+        tab.nothing_wrong()
+
+
+def test_timesteps_that_differ_are_drawn_between_and_it_is_said(tmp_path: Path) -> None:
+    scenario = SCENARIOS["hold"]
+    one = record_scenario(scenario, sm.load(scenario.model, defaults="engine"), defaults="engine")
+    two = shipped("hold", "pybullet", "engine")
+    assert one.header.timestep != two.header.timestep
+    frames = frames_of(one, two)
+    assert len(frames) > 4 * compare(one, two).moments
+    assert frames.between
+    # At a compared moment nothing is taken between.
+    common = np.isclose(frames.time % 0.025, 0, atol=1e-9) | np.isclose(frames.time % 0.025, 0.025)
+    assert (frames.share[common] == 0).all()
+    with browser() as tab:
+        open_page(tab, write_report(tmp_path / "x.html", page_of(of(one, two))))
+        assert "taken between two of its rows" in tab.locator("#origin").inner_text()
+        go(tab, 7)
+        assert "last compared moment, 0.025 s" in tab.locator("#now").inner_text()
+        cell = tab.locator("#readout tr", has_text="elbow_flex").locator("td").last.inner_text()
+        apart = abs(one.qpos[5, 2] - two.qpos[6, 2])  # rows of 5 ms and of 1/240 s
+        assert float(cell.strip("● °")) == pytest.approx(np.degrees(apart), rel=0.01)
+        tab.nothing_wrong()
+
+
+def test_without_the_model_there_are_sticks(hold: Made, tmp_path: Path) -> None:
+    none = Look(None, "there is no so101/scene.xml here")
+    target = write_report(tmp_path / "x.html", page_of(hold, looks=(none, none)))
+    with browser(height=1000) as tab:
+        open_page(tab, target)
+        assert "there is no so101/scene.xml here" in tab.locator("#origin").inner_text()
+        before = picture(tab)
+        go(tab, 0)
+        assert changed(before, picture(tab)) > 2000
+        tab.nothing_wrong()
+
+
+def test_without_poses_there_is_no_scene_and_it_is_said(hold: Made, tmp_path: Path) -> None:
+    bare = [
+        Trace(t.header, {k: v for k, v in t.columns.items() if k not in ("xpos", "xquat")})
+        for t in hold[1:3]
+    ]
+    target = write_report(tmp_path / "x.html", page_of(of_look(bare[0], bare[1], hold[3])))
+    with browser() as tab:
+        open_page(tab, target)
+        assert "no poses" in tab.locator("#stage").inner_text()
+        go(tab, 100)
+        assert tab.locator("#clock").inner_text() == "0.500 s"
+        tab.nothing_wrong()
+
+
+# Shapes.
+
+
+def test_a_mesh_keeps_its_surface() -> None:
+    drawing = drawing_of(sm.load("so101/scene"))
+    mesh = mesh_of(drawing)
+    wanted = sum(area(p.vertices, p.faces) for p in drawing.parts if not p.endless)
+    assert area(mesh.vertices, mesh.faces) == pytest.approx(wanted, rel=1e-5)
+    assert not mesh.simplified
+    assert np.linalg.norm(mesh.normals, axis=1) == pytest.approx(1.0, abs=1e-5)
+    corners = mesh.vertices[mesh.faces].astype(float)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facing = (normal[:, None] * mesh.normals[mesh.faces]).sum(axis=2)
+    assert (facing > 0).mean() > 0.999
+
+
+def area(vertices: Any, faces: Any) -> float:
+    a, b, c = (vertices[faces[:, k]].astype(float) for k in range(3))
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+def test_too_many_triangles_are_made_fewer() -> None:
+    drawing = drawing_of(sm.load("so101/scene"))
+    mesh = mesh_of(drawing, most=2000)
+    assert 500 < len(mesh.faces) <= 2000 < mesh.simplified
+    whole = mesh_of(drawing)
+    for k in (0, 1):
+        ends = [np.sort(m.vertices, axis=0)[[0, -1][k]] for m in (mesh, whole)]
+        assert ends[0] == pytest.approx(ends[1], abs=0.02)
+    assert not whole.simplified
+
+
+def test_folded_normals_unfold() -> None:
+    random = np.random.default_rng(0)
+    n = random.normal(size=(1000, 3))
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    f = octahedral(n) / 32767
+    z = 1 - np.abs(f).sum(axis=1)
+    t = np.maximum(-z, 0)[:, None]
+    found = np.column_stack([f - np.where(f >= 0, t, -t), z])
+    found /= np.linalg.norm(found, axis=1, keepdims=True)
+    assert np.abs(found - n).max() < 1e-4
+
+
+def test_bones_reach_from_body_to_body(hold: Made) -> None:
+    one = hold[1]
+    drawing = bones_of(one)
+    chain = [body for body, parent in enumerate(one.header.body_parentid) if body and parent]
+    assert len(drawing.parts) == len(chain) + 2  # a knob at the end of each branch
+    for body, part in zip(chain, drawing.parts, strict=False):
+        end = part.vertices[-1]
+        apart = one["xpos"][0, body] - one["xpos"][0, one.header.body_parentid[body]]
+        if not apart.any():
+            continue  # the camera's mount has its origin where the gripper has
+        assert np.linalg.norm(end) == pytest.approx(np.linalg.norm(apart), abs=1e-6)
+
+
+# The command.
+
+
+def test_the_command_writes_it(cli: Cli, tmp_path: Path) -> None:
+    need_engine("pybullet")
+    done = cli("compare", "hold", "--no-why", "--html", "out.html")
+    assert done.returncode == 1, done.stderr  # something differs
+    assert "wrote out.html" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["out.html"]
+    text = (tmp_path / "out.html").read_text(encoding="utf-8")
+    assert "statemachine compare hold --no-why --html out.html" in text
+    assert str(tmp_path) not in text
+    json.loads(cli("compare", "hold", "--no-why", "--html", "out.html", "--json").stdout)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("hold", "--html", "out.pdf"), "a report is a file .html"),
+        (("hold", "--html", "no/such/out.html"), "there is no folder no/such"),
+        (("hold", "--html", "."), "a report is a file .html"),
+        (("hold", "--no-why"), "--no-why goes with --html"),
+        (("--models", "so101", "so101", "--html", "x.html"), "--models runs nothing"),
+    ],
+)
+def test_mistakes_are_one_line_before_anything_runs(
+    cli: Cli, tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
+    done = cli("compare", *words)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1, done.stderr
+    assert said in done.stderr
+    assert done.stdout == ""
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_cannot_be_written_into(tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.setattr(
+        "statemachine.report.html.writing.os.access", lambda *_: False
+    )  # root may write anywhere
+    with pytest.raises(BadInputError, match="cannot be written"):
+        check_target(tmp_path / "x.html")
+    (tmp_path / "folder.html").mkdir()
+    with pytest.raises(BadInputError, match="is a folder"):
+        check_target(tmp_path / "folder.html")
+
+
+def test_traces_make_a_report_without_a_cause(cli: Cli, hold: Made, tmp_path: Path) -> None:
+    for name, trace in (("one", hold[1]), ("two", hold[2])):
+        write(rows(trace, 120), tmp_path / f"{name}.npz")
+    done = cli("compare", "one.npz", "two.npz", "--html", "out.html")
+    assert done.returncode == 1, done.stderr
+    assert "causes are found by running an experiment again" in (tmp_path / "out.html").read_text()
+
+
+@pytest.mark.slow
+def test_the_cause_is_on_the_page(cli: Cli, tmp_path: Path) -> None:
+    need_engine("pybullet")
+    assert cli("compare", "hold", "--html", "out.html").returncode == 1
+    with browser() as tab:
+        open_page(tab, tmp_path / "out.html")
+        title = tab.locator("h1").inner_text()
+        assert "Contact explains" in title.replace("\u00a0", " ")
+        why = tab.locator("#why").inner_text()
+        assert "What causes it" in why
+        # The part that goes, as a bar: nearly all of it.
+        row = tab.locator("#why table").first.locator("tr", has_text="Contact")
+        bar, fill = (row.locator(s).first.bounding_box()["width"] for s in (".bar", ".bar i"))
+        assert fill > 0.97 * bar
+        assert tab.locator("#models details").count() == 1
+        assert (tmp_path / "out.html").stat().st_size <= LIMIT
+        tab.nothing_wrong()
+
+
+def test_the_request_of_the_finding_is_not_needed() -> None:
+    """An experiment's sides make a page with nothing but what `sides_of` gives."""
+    need_engine("pybullet")
+    (one, two), said = sides_of(Request(("droop",), seconds=0.2))
+    text = report(compare(one, two), one, two, said=said)
+    assert "no model was given" in text
+    assert Parsed.of(text).unclosed == []
+
+
+class Parsed(HTMLParser):
+    """Whether every element is closed, by a parser that is not the browser's."""
+
+    VOID = frozenset({"meta", "link", "input", "br", "path", "line", "rect", "i"})
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.unclosed: list[str] = []
+
+    @classmethod
+    def of(cls, text: str) -> Parsed:
+        parser = cls()
+        parser.feed(text)
+        return parser
+
+    def handle_starttag(self, tag: str, attrs: Any) -> None:
+        if tag not in self.VOID:
+            self.unclosed.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag not in self.VOID:
+            assert self.unclosed.pop() == tag
