@@ -35,7 +35,7 @@ def page(
     blocks += [Text(_sentence(line)) for line in (*said, *comparison.notes)]
     blocks.append(
         Table(
-            ("quantity", "max", "at", "RMS", "settled", "beyond from", "verdict"),
+            ("quantity", "max", "at", "RMS", "settled", "since", "verdict"),
             [_row(found) for found in comparison.agreements],
             title=f"{one.label} against {two.label}: how far apart",
             words=frozenset({0, 6}),
@@ -48,8 +48,9 @@ def page(
     blocks.append(
         Text(
             f"Compared at {comparison.moments} moments over {comparison.until:g} s. Settled is "
-            "the mean over the last tenth of them. A quantity agrees if it is within its "
-            "tolerance always, settles if it is so in the end, and differs otherwise."
+            "the mean over the last tenth of them (of forces: how far apart the means are). "
+            "Since: when it was first beyond its tolerance. A quantity agrees if it never was, "
+            "settles if what is settled is within, and differs otherwise."
         )
     )
     blocks.append(
@@ -117,9 +118,9 @@ _PLURAL = {
     "joint": "joints",
     "slide": "slides",
     "tip": "fingertip",
-    "tip rotation": "its rotation",
+    "tip rotation": "rotation of the fingertip",
     "body": "free bodies",
-    "body rotation": "their rotation",
+    "body rotation": "rotation of free bodies",
     "energy": "energy",
     "contact": "first touches",
     "force": "contact forces",

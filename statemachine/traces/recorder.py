@@ -103,7 +103,9 @@ def record(
         if rewritten and controller is None:
             raise _not_repeated(rewritten)
         columns |= told
-        columns["energy"], energy_by = energies(model, defaults, inputs["qpos"], inputs["qvel"])
+        columns["energy"], energy_by = energies(
+            model, defaults, inputs["qpos"], inputs["qvel"], (options or {}).get("gravity")
+        )
     header = Header(
         experiment=experiment or getattr(controller, "__name__", "") or "run",
         says=says,
