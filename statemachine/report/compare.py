@@ -35,7 +35,7 @@ def page(
     blocks += [Text(_sentence(line)) for line in (*said, *comparison.notes)]
     blocks.append(
         Table(
-            ("quantity", "max", "at", "RMS", "settled", "since", "verdict"),
+            ("quantity", "max", "at", "RMS", "settled", "beyond from", "verdict"),
             [_row(found) for found in comparison.agreements],
             title=f"{one.label} against {two.label}: how far apart",
             words=frozenset({0, 6}),
@@ -49,8 +49,8 @@ def page(
         Text(
             f"Compared at {comparison.moments} moments over {comparison.until:g} s. Settled is "
             "the mean over the last tenth of them (of forces: how far apart the means are). "
-            "Since: when it was first beyond its tolerance. A quantity agrees if it never was, "
-            "settles if what is settled is within, and differs otherwise."
+            "A quantity agrees if it is never beyond its tolerance, settles if what is settled "
+            "is not beyond it, and differs otherwise."
         )
     )
     blocks.append(
