@@ -13,7 +13,7 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13 python3.14; 
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null \
 	&& { echo $$p; break; }; done)
 
-.PHONY: help lesson test test-fast test-newest check format hooks bench picture report urdf traces docs notebook clean
+.PHONY: help lesson test test-fast test-newest check format hooks bench picture extras report urdf traces docs notebook clean
 
 help:
 	@sed -n 's/^# make /  make /p' Makefile
@@ -72,6 +72,10 @@ picture: $(VENV)/test.stamp
 # make urdf         write models/so101/so101.urdf anew from so101.xml
 urdf: $(VENV)/run.stamp
 	@$(BIN)/python models/so101/make_urdf.py
+
+# make extras       what figures, films, the viewer and parquet need, too
+extras: $(VENV)/run.stamp
+	@$(PIP) $(CONSTRAINTS) -e '.[plot,render,mp4,view,parquet]'
 
 # make report       where the engines part when the arm is told one pose, and why: hold.html
 report: $(VENV)/run.stamp

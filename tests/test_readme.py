@@ -108,11 +108,13 @@ def test_python_block(tmp_path: Path) -> None:
 
 
 def test_the_output_that_is_shown(cli: Cli) -> None:
-    alone, both, part = re.findall(r"```text\n(.*?)```", README, re.DOTALL)
+    alone, both, part, causes = re.findall(r"```text\n(.*?)```", README, re.DOTALL)
     assert alone in cli("lesson", "gravity").stdout
     need_engine("pybullet")
     assert both in cli("lesson", "gravity", "--backend", "all").stdout
     assert part in cli("compare", "hold").stdout
+    assert causes in cli("compare", "hold", "--defaults", "engine", "--why").stdout
+    assert "one on top of the other: contact > 99.9 %." in cli("compare", "hold", "--why").stdout
 
 
 def test_files_that_are_linked_exist() -> None:
