@@ -1,6 +1,6 @@
 """Where two runs part, and by how much: traces of any two engines, quantity by quantity.
 
-    one, two = sides_of("hold")
+    (one, two), said = sides_of("hold")
     comparison = compare(one, two)
     comparison.agrees, comparison.agreements
 

@@ -29,11 +29,12 @@ class Agreement:
         kind: Which sort of quantity it is; unit: its SI unit.
         max: The largest difference; at: when [s from the start].
         rms: Root mean square of the difference over common time.
-        settled: Mean of the difference over the last tenth of common time.
+        settled: Mean of the difference over the last tenth of common time; of a force the
+            difference of the means.
         since: When it was first beyond the tolerance [s]; None if never.
         tolerance: What does not matter; reason: why that much.
-        verdict: "agrees" within tolerance always; "settles" beyond it on the way, within
-            it in the end; "differs" in the end too.
+        verdict: "agrees" within tolerance always; "settles" beyond it on the way, but
+            `settled` within; "differs" else.
         note: What the figures do not say, as which side never touched.
     """
 
@@ -56,12 +57,13 @@ class Side:
     """Whose trace it is.
 
     Attributes:
-        label: Engine, version, and what is unusual.
+        label: Engine, version, and what is unusual; backend: the engine's name alone.
         experiment: What was done.
         rows: How many rows it has; timestep: their distance [s].
+        defaults: What `load` was given.
         recorded: Whether it was read from a file.
         ended: Why it ended early, or "".
-        emulated: What of the contract the backend keeps instead of its engine.
+        provenance: What made it.
     """
 
     label: str
@@ -260,6 +262,11 @@ def _notes(one: Trace, two: Trace) -> list[str]:
         )
     if not np.allclose(a.gravity, b.gravity, rtol=0, atol=1e-12):
         notes.append(f"gravity differs: {_vector(a.gravity)} and {_vector(b.gravity)} m/s²")
+    if any(header.defaults == "engine" and header.energy_by for header in (a, b)):
+        notes.append(
+            f"energy is measured by one yardstick on both sides, masses, armature and gravity of "
+            f"the model ({a.energy_by or b.energy_by}), whatever an engine itself has"
+        )
     commands = [np.array(trace.ctrl[:-1] if len(trace) > 1 else trace.ctrl) for trace in (one, two)]
     if commands[0].shape == commands[1].shape and not np.array_equal(commands[0], commands[1]):
         notes.append("the commands differ: the controllers saw different states, or are two")

@@ -53,9 +53,9 @@ def page(
     blocks.append(
         Text(
             f"Compared at {comparison.moments} moments over {comparison.until:g} s. Settled is "
-            "the mean over the last tenth of them; from is when it is first beyond its tolerance. "
-            "A quantity agrees if it is within it always, settles if it is so in the end, and "
-            "differs otherwise."
+            "the mean over the last tenth of them (of forces: how far apart the means are); from "
+            "is when it is first beyond its tolerance. A quantity agrees if it is never beyond "
+            "it, settles if what is settled is not beyond it, and differs otherwise."
         )
     )
     blocks.append(
@@ -123,9 +123,9 @@ _PLURAL = {
     "joint": "joints",
     "slide": "slides",
     "tip": "fingertip",
-    "tip rotation": "its rotation",
+    "tip rotation": "rotation of the fingertip",
     "body": "free bodies",
-    "body rotation": "their rotation",
+    "body rotation": "rotation of free bodies",
     "energy": "energy",
     "contact": "first touches",
     "force": "contact forces",
