@@ -134,7 +134,7 @@ def _summary(comparison: Comparison) -> str:
     total = len(comparison.agreements)
     if counts[0] == total:
         worst = comparison.worst
-        text = f"All {total} quantities agree at every moment"
+        text = f"All {total} quantities agree at every moment that was compared"
         if worst is not None:
             text += (
                 f"; nearest to its tolerance comes {worst.name}, with "
@@ -154,6 +154,9 @@ def _summary(comparison: Comparison) -> str:
 def _verdict(comparison: Comparison) -> str:
     if comparison.agrees:
         return f"{comparison.one.backend} and {comparison.two.backend} agree within tolerance"
+    if comparison.ended:
+        sides = [side.backend for side in (comparison.one, comparison.two) if side.ended]
+        return f"both runs come to their end (not: {' and '.join(sides)})"
     beyond = [found.name for found in comparison.agreements if found.verdict != "agrees"]
     few = ", ".join(beyond[:4]) + (f" and {len(beyond) - 4} more" if len(beyond) > 4 else "")
     return f"all quantities agree within tolerance (not: {few})"
