@@ -77,15 +77,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):  # a console without Unicode must not end a lesson
             stream.reconfigure(errors="replace")
     warnings.showwarning = _show_warning
-    parser = _parser()
-    words = list(sys.argv[1:] if arguments is None else arguments)
-    for k, word in enumerate(words[1:], start=1):
-        if words[k - 1] == "lesson":  # a station may be called by its number
-            words[k] = lesson.by_number(word)
-    options = parser.parse_args(words)
-    if getattr(options, "run", None) is None:
-        options.run = lesson.overview
     try:
+        options = _options(list(sys.argv[1:] if arguments is None else arguments))
         code = options.run(options)
         sys.stdout.flush()
         return code
@@ -105,6 +98,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return complain(error, BAD_INPUT)
         _let_go_of_output()
         return complain(OSError(f"the output cannot be written: {error.strerror}"), NO_OUTPUT)
+
+
+def _options(words: list[str]) -> argparse.Namespace:
+    parser = _parser()
+    for k, word in enumerate(words[1:], start=1):
+        if words[k - 1] == "lesson":  # a station may be called by its number
+            words[k] = lesson.by_number(word)
+    options = parser.parse_args(words)
+    if getattr(options, "run", None) is None:
+        options.run = lesson.overview
+    return options
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *where: Any) -> None:

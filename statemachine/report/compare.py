@@ -140,7 +140,7 @@ def _summary(comparison: Comparison) -> str:
     total = len(comparison.agreements)
     if counts[0] == total:
         worst = comparison.worst
-        text = f"All {total} quantities agree at every moment"
+        text = f"All {total} quantities agree at every moment that was compared"
         if worst is not None:
             text += (
                 f"; nearest to its tolerance comes {worst.name}, with "
@@ -174,6 +174,9 @@ def _end(contact: Contact, backend: str) -> str:
 def _verdict(comparison: Comparison) -> str:
     if comparison.agrees:
         return f"{comparison.one.backend} and {comparison.two.backend} agree within tolerance"
+    if comparison.ended:
+        sides = [side.backend for side in (comparison.one, comparison.two) if side.ended]
+        return f"both runs come to their end (not: {' and '.join(sides)})"
     found = comparison.agreements
     parts = []
     for verdict, word in (("differs", "differ"), ("settles", "settle")):
