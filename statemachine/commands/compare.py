@@ -131,7 +131,7 @@ def run(options: argparse.Namespace) -> int:
             f"compare what? An experiment ({', '.join(EXPERIMENTS)}) or traces: "
             f"{PROGRAM} compare hold"
         )
-    if len(options.what) == 2 and options.backends:
+    if len(options.what) == 2 and options.backends and not options.why:
         raise BadInputError("--backends is of a run, and two traces are runs that were made")
     if options.quantity and not (options.why or options.html):
         raise BadInputError("--quantity belongs to --why")
