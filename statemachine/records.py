@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, Literal
@@ -199,3 +199,13 @@ class State:
     def time(self) -> float:
         """Simulated time [s]."""
         return float(self["time"][0])
+
+
+def usual_site(names: Sequence[str]) -> int | None:
+    """Number of the site that stands for the fingertip where nobody names one.
+
+    The one that is called gripperframe, else the last; None if there is none.
+    """
+    if "gripperframe" in names:
+        return names.index("gripperframe")
+    return len(names) - 1 if names else None

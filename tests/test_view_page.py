@@ -255,6 +255,7 @@ def test_the_command_shows_both_engines_to_a_browser(tmp_path: Path) -> None:
         Viewer(tmp_path, "--ghost", "pybullet", "--port", str(port)) as viewer,
         browser() as tab,
     ):
+        assert viewer.line().startswith("http://localhost:")
         assert "mujoco" in viewer.line()
         tab.goto(f"http://localhost:{port}")
         for text in ("on mujoco", "on pybullet", "tips apart", "real time"):

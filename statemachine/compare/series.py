@@ -8,7 +8,7 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
-from ..records import Array, JointType
+from ..records import Array, JointType, usual_site
 from ..rotations import angle_between, matrix_from_quat
 from ..traces import Header, Trace
 from .align import Common, common_moments
@@ -95,7 +95,8 @@ def series(one: Trace, two: Trace, tip: str | None = None) -> list[Series]:
 def default_tip(*headers: Header) -> str:
     """The site that all have: gripperframe, else the last one; "" if they share none."""
     shared = [s for s in headers[0].sites if s and all(s in header.sites for header in headers)]
-    return "gripperframe" if "gripperframe" in shared else (shared[-1] if shared else "")
+    tip = usual_site(shared)
+    return "" if tip is None else shared[tip]
 
 
 def normal_forces(trace: Trace) -> dict[str, Array]:

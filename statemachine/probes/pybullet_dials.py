@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator, Mapping
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -130,6 +130,14 @@ class Dials:
             for body, link, b in _links(world):
                 found[b] = pb.getDynamicsInfo(body, link, world.client)[2]
         return found
+
+    @cached_property
+    def frictions(self) -> np.ndarray:
+        """(nsolid,) lateral friction that the engine tells of each link that touches."""
+        with cast("PybulletData", self.model._make_data()) as data:
+            world = data.raw
+            told = [pb.getDynamicsInfo(b, link, world.client)[1] for b, link, _ in world.solids()]
+        return np.array(told)
 
 
 def dials(model: Model, options: Mapping[str, Any]) -> Dials | None:

@@ -8,28 +8,19 @@ which is checked: a trace is a proof that the run can be replayed.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
 
-from ..errors import (
-    BadInputError,
-    DivergedError,
-    EngineError,
-    TraceError,
-    UnsupportedError,
-)
+from ..errors import BadInputError, DivergedError, EngineError, TraceError
 from ..experiments._common import Progress, part_of, provenance, silent, steps_in
 from ..experiments.scenarios import Controller, Scenario
 from ..interface import Data, Model
-from ..records import DERIVED, Array, State
-from ..verbs import forward, get_state, make_data, reset, set_state, step
+from ..records import Array, State
+from ..verbs import make_data, reset, set_state, step
+from .derived import derived
 from .energy import energies
-from .trace import COLUMNS, CONTACTS, Header, Trace
-
-_TOLD = tuple(name for name in DERIVED if name in COLUMNS)
-Start = Callable[[Model, Data], None]
+from .trace import Header, Trace
 
 
 def record(
@@ -99,7 +90,7 @@ def record(
     columns: dict[str, Any] = dict(inputs)
     rewritten, energy_by = 0, ""
     if derive:
-        told, rewritten = _derive(model, begin, inputs, part_of(progress, share, 1.0 - share))
+        told, rewritten = derived(model, begin, inputs, part_of(progress, share, 1.0 - share))
         if rewritten and controller is None:
             raise _not_repeated(rewritten)
         columns |= told
@@ -303,81 +294,6 @@ def _command(data: Data, wanted: Any, time: float) -> None:
         data.ctrl = wanted
     except BadInputError as error:
         raise BadInputError(f"what the controller gave at {time:.3f} s: {error}") from None
-
-
-def _derive(
-    model: Model, begin: Start, inputs: dict[str, Array], progress: Progress
-) -> tuple[dict[str, Any], int]:
-    """Repeat a run and read what is derived; how many rows began otherwise than repeated."""
-    rows = len(inputs["time"])
-    kept: dict[str, list[Array]] = {name: [] for name in _TOLD}
-    contacts: dict[str, list[Any]] = {name: [] for name in CONTACTS}
-    # After a step, derived values are of the state before its last engine step: with one of
-    # those they are of the row that began it. With more, they must be asked for before.
-    after = model.substeps == 1
-    rewritten = 0
-    with make_data(model) as data:
-        begin(model, data)
-        for k in range(rows):
-            differs = False
-            for name in ("qpos", "qvel"):
-                if getattr(data, name).tobytes() != inputs[name][k].tobytes():
-                    getattr(data, name)[:] = inputs[name][k]
-                    differs = True
-            rewritten += differs
-            data.ctrl[:] = inputs["ctrl"][k]
-            if data.time != inputs["time"][k]:
-                data.time = float(inputs["time"][k])
-            if not after:
-                forward(model, data)
-                _read(data, k, kept, contacts)
-            if k < rows - 1:
-                step(model, data)
-            elif after:
-                _one_more(model, data)
-            if after:
-                _read(data, k, kept, contacts)
-            if k % 32 == 0:
-                progress(k / rows)
-    progress(1.0)
-    columns: dict[str, Any] = {name: np.array(values) for name, values in kept.items()}
-    for name, width in CONTACTS.items():
-        kind = np.int64 if name in ("contact_row", "contact_geom") else np.float64
-        columns[name] = np.array(contacts[name], dtype=kind).reshape(-1, *width)
-    return columns, rewritten
-
-
-def _one_more(model: Model, data: Data) -> None:
-    """The step that the last row would begin, so that it too is of the run itself.
-
-    `forward` may start afresh: PyBullet's contacts then lack what the run has built up.
-    A state that no step stands, as the last of a run that diverged, has nothing better.
-    """
-    state = get_state(model, data)
-    try:
-        step(model, data)
-    except DivergedError:
-        set_state(model, data, state)
-        forward(model, data)
-
-
-def _read(
-    data: Data, row: int, kept: dict[str, list[Array]], contacts: dict[str, list[Any]]
-) -> None:
-    for name, values in kept.items():
-        try:
-            values.append(np.array(getattr(data, name)))  # it may be the engine's memory
-        except UnsupportedError:
-            shape = np.shape(data.qvel)
-            values.append(np.full(shape, np.nan))
-    found = data.contacts
-    if len(found):
-        contacts["contact_row"] += [row] * len(found)
-        contacts["contact_geom"] += found.geom.tolist()
-        contacts["contact_dist"] += found.dist.tolist()
-        contacts["contact_pos"] += found.pos.tolist()
-        contacts["contact_frame"] += found.frame.reshape(-1, 9).tolist()
-        contacts["contact_force"] += found.force.tolist()
 
 
 def _plain(value: Any) -> Any:

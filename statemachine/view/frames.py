@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import Model
-from ..records import Array, JointType
+from ..records import Array, JointType, usual_site
 
 _TURN = math.pi / 180  # radians in a degree
 
@@ -170,9 +170,7 @@ def tip_of(model: Model, site: str | None = None) -> int | None:
     """
     if site is not None:
         return model.site_id(site)
-    if "gripperframe" in model.site_names:
-        return model.site_id("gripperframe")
-    return model.nsite - 1 if model.nsite else None
+    return usual_site(model.site_names)
 
 
 def gap_between(

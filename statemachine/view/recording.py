@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import BadInputError, TraceError
-from ..records import Array
+from ..records import Array, usual_site
 from ..traces import Header, Trace
 from .frames import (
     Command,
@@ -61,9 +61,8 @@ class Recording:
         self._rows = int(np.searchsorted(first.time - first.time[0], min(ends) + _EQUAL))
         self.names = tuple(_name(trace.header) for trace in traces)
         sites = first.header.sites if all("site_xpos" in trace for trace in traces) else ()
-        usual = "gripperframe" if "gripperframe" in sites else (sites[-1] if sites else "")
-        self.tip = usual
-        self._site = sites.index(usual) if sites else None
+        self._site = usual_site(sites)
+        self.tip = "" if self._site is None else sites[self._site]
         self._row, self._running, self._resets = 0, False, 1
 
     @property

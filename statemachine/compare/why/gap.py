@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import BadInputError, DivergedError, TraceError
 from ...interface import Model
-from ...records import Array, Ints, JointType
+from ...records import Array, Ints, JointType, usual_site
 from ...traces import Trace
 from ...verbs import forward, make_data
 from ..align import common_moments
@@ -69,9 +69,7 @@ class Ruler:
         self._hinges = places[kinds == int(JointType.HINGE)]
         self._slides = places[kinds == int(JointType.SLIDE)]
         self._free = model.jnt_bodyid[kinds == int(JointType.FREE)]
-        names = list(model.site_names)
-        tips = [names.index("gripperframe")] if "gripperframe" in names else range(len(names))[-1:]
-        self._tip = next(iter(tips), None)
+        self._tip = usual_site(model.site_names)
         self.units = {}
         if len(self._hinges):
             self.units["joints"] = "rad"

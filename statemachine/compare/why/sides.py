@@ -183,7 +183,6 @@ class EngineSide:
         "armature": "none",
         "frictionloss": "none",
         "limits": "hard",
-        "surfaces": "friction 0.5",
         "integrator": "its own",
         "contact": "its own",
     }
@@ -210,6 +209,8 @@ class EngineSide:
         if factor.name == "servo":
             on = self._options.get("actuation", True)
             return "its motors" if on else "motors hold"
+        if factor.name == "surfaces":
+            return f"friction {_span(self._dials.frictions)}"
         return self._WORDS[factor.name]
 
     def refuses(self, factor: Factor, how: How, values: Values, changes: Changes) -> str:

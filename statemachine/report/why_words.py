@@ -1,0 +1,150 @@
+"""What an attribution says, in figures and sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..compare.why import FACTORS, Attribution, Trial
+from .figures_of import quantity as in_units
+from .figures_of import short_time
+
+_WORTH = 0.005  # the least part of the gap that the conclusion speaks of
+ENOUGH = 0.1  # what may stay unexplained without the answer being no
+_OPENS = 1.5  # times the gap of equal settings: a setting put back that opens more is named
+_OTHERWISE = 0.05  # of the gap: a part that changes by more with the order is given both ways
+_AT_TOUCH = ("contact", "limits", "surfaces")  # what does nothing before something is met
+KINDS = {"rad": "joint", "m": "body"}
+
+
+def amount(result: Attribution, value: float | None) -> str:
+    """A gap of the attribution's quantity, with its unit."""
+    if value is None:
+        return "–"
+    return in_units(value, KINDS[result.unit])
+
+
+def percent(part: float | None) -> str:
+    """A part of the gap; tiny ones with their power of ten."""
+    if part is None:
+        return "–"
+    value = 100 * part
+    if value == 0:
+        return "0 %"
+    if abs(value) < 1e-6:
+        return "< 1e-6 %"
+    if abs(value) < 0.05:
+        return f"{value:.0e} %".replace("e-0", "e-")
+    if 99.95 <= value < 100:
+        return "> 99.9 %"
+    return f"{value:.1f} %" if abs(value) < 1000 else f"{value:.0f} %"
+
+
+def shown(result: Attribution, value: float | None, trial: Trial | None = None) -> str:
+    """A gap, marked where it is out of all proportion; not of a trial that moves one too."""
+    own = trial is not None and bool(trial.moved)
+    return amount(result, value) + ("!" if not own and astray(result, value) else "")
+
+
+def astray(result: Attribution, value: float | None) -> bool:
+    """Whether a gap is more than twice what one moves at all, and than the first gap."""
+    return value is not None and value > 2 * max(result.extent, result.gap)
+
+
+def upper(text: str) -> str:
+    """With a capital."""
+    return text[:1].upper() + text[1:]
+
+
+def conclusion(result: Attribution) -> list[str]:
+    """What the figures say, in sentences."""
+    one, two = result.names[0], result.names[1]
+    gap, left = amount(result, result.gap), amount(result, result.left)
+    counted = [trial for trial in result.ladder if trial.explains is not None]
+    found = []
+    worth = sorted(
+        (t for t in counted if abs(t.explains or 0.0) >= _WORTH),
+        key=lambda t: -(t.explains or 0.0),
+    )
+    if not worth:
+        found.append(
+            f"None of these factors takes anything of the {gap} away: the cause is none of them."
+        )
+    else:
+        parts = [f"{FACTORS[t.factor].title} {percent(t.explains)}" for t in worth]
+        found.append(
+            f"Of the {gap}, one on top of the other: {', '.join(parts)}. "
+            f"With all of it the same or left out, {left} stays."
+        )
+    found += _other_orders(result, worth)
+    most = max((t.worst or 0.0 for t in counted), default=0.0)
+    if most > 1.05 * result.gap:
+        found.append(
+            f"On the way the gap grew to {amount(result, most)}: as they come, some of these "
+            "differences hide others, and the parts depend on the order."
+        )
+    same = result.settings_same
+    opened = sorted(
+        (t for t in result.alone if (t.put_back or 0.0) > max(_OPENS * same, result.negligible)),
+        key=lambda t: -(t.put_back or 0.0),
+    )
+    if opened:
+        parts = [f"{FACTORS[t.factor].title} {shown(result, t.put_back)}" for t in opened]
+        found.append(
+            f"With all settings the same, {amount(result, same)}. As it came, alone, each of these "
+            f"opens more again: {', '.join(parts)}."
+        )
+    contact = next((t for t in counted if t.factor == "contact" and t.way == "off"), None)
+    settings = [t for t in counted if t.way == "parity"]
+    if contact is not None:
+        found.append(
+            f"Where all settings are the same, {one} and {two} are {amount(result, same)} apart "
+            f"with contacts, {amount(result, contact.worst)} without: what contact explains is "
+            "how each engine makes it."
+        )
+        touch = result.touch
+        if touch is not None and touch.before < 1e-3 * result.gap:
+            acting = [t.factor for t in result.alone if t.way in ("off", "one side")]
+            named = [FACTORS[name].title for name in acting if name not in _AT_TOUCH]
+            what = touch.what.split("; ", maxsplit=1)[0]
+            found.append(
+                f"The motion as it comes says the same. Until {what}, at "
+                f"{short_time(touch.time)}, the two are {amount(result, touch.before)} apart, "
+                f"though {_and(named)} act from the start."
+            )
+        elif touch is None and not settings:
+            found.append("Something touches from the start, so no moment shows the rest alone.")
+    if abs(result.unexplained) > ENOUGH:
+        found.append(
+            f"{percent(result.unexplained)} of the gap is none of these: look at what is not in "
+            "the table, masses and shapes first."
+        )
+    return found
+
+
+def _other_orders(result: Attribution, worth: Sequence[Trial]) -> list[str]:
+    """What settings explain if they come first or last, where that is another part."""
+    alone = {trial.factor: trial for trial in result.alone}
+    parts = []
+    for rung in worth:
+        if rung.way != "parity" or rung.explains is None:
+            continue
+        by_itself = alone[rung.factor]
+        # Brought to the same it can come first only if it can be without the others.
+        first = by_itself.explains if by_itself.way == "parity" else None
+        last = result.last(by_itself)
+        known = [each for each in (first, last) if each is not None]
+        if any(abs(each - rung.explains) > _OTHERWISE for each in known):
+            along = f" (and {titles(by_itself.along)} with it)" if by_itself.along else ""
+            said = [f"{percent(first)} if it comes first"] if first is not None else []
+            said += [f"{percent(last)} if last{along}"] if last is not None else []
+            parts.append(f"{FACTORS[rung.factor].title} {', '.join(said)}")
+    return [f"In another order the parts are others: {'; '.join(parts)}."] if parts else []
+
+
+def titles(names: Sequence[str]) -> str:
+    """Factors by their titles: "armature, dry friction and joint limits"."""
+    return _and([FACTORS[name].title for name in names])
+
+
+def _and(words: Sequence[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
