@@ -18,13 +18,14 @@ from ...traces import Trace
 from . import sections
 from .budget import Budget
 from .curves import curves_section
-from .finding import headline, in_words, leading
+from .finding import Finding, headline, in_words, leading, subject
 from .geometry import packed
 from .markup import Html, data_of, escaped, joined, kept, tag
+from .pressing import pressing_words
 from .scene import Look, scene_of
 from .sketch import sketch
 from .stage import quantity_data, stage
-from .timeline import Frames, events_of, frames_of
+from .timeline import events_of, frames_of
 
 if TYPE_CHECKING:
     from ...compare.why import Attribution
@@ -109,12 +110,14 @@ def _report(
     events = events_of(comparison, one, two)
     frames = frames_of(one, two, _moments(comparison), budget.frames(one, two))
     scene = scene_of(one, two, frames, looks, site, budget)
-    start = _start(comparison, frames)
-    text = headline(comparison, events, attribution)
+    of = subject(comparison, attribution)
+    start = int(np.argmin(np.abs(frames.time - (of.at if of is not None else 0.0))))
+    finding = headline(comparison, events, attribution, curves)
     labels = comparison.one.label, comparison.two.label
     if labels[0] == labels[1]:
         labels = f"{labels[0]} (first)", f"{labels[1]} (second)"
-    words = in_words(comparison, events, attribution)
+    never, pressed = pressing_words(comparison, (one, two))
+    words = [*never, *in_words(comparison, events, attribution), *pressed]
     data = {
         "time": packed(frames.time, "f8"),
         "compared": packed(drawn[0].time[frames.compared], "f8"),
@@ -126,7 +129,7 @@ def _report(
     }
     still = sketch(scene, one, two, frames, start, labels)
     parts: list[object] = [
-        _head(comparison, one, labels, text, words),
+        _head(comparison, one, labels, finding, words),
         stage(comparison, drawn, events, frames, start, labels, still),
     ]
     if attribution is not None:
@@ -175,7 +178,7 @@ def _report(
             ),
         )
     )
-    return _assembled(text, body, data)
+    return _assembled(finding.lead, body, data)
 
 
 def _moments(comparison: Comparison) -> tuple[float, ...]:
@@ -185,22 +188,18 @@ def _moments(comparison: Comparison) -> tuple[float, ...]:
     return tuple(sorted(times))
 
 
-def _start(comparison: Comparison, frames: Frames) -> int:
-    """The moment to open the page at: where the leading quantity is farthest apart."""
-    subject = leading(comparison)
-    at = subject.at if subject is not None else 0.0
-    return int(np.argmin(np.abs(frames.time - at)))
-
-
 def _head(
-    comparison: Comparison, one: Trace, labels: tuple[str, str], text: str, words: Sequence[str]
+    comparison: Comparison,
+    one: Trace,
+    labels: tuple[str, str],
+    finding: Finding,
+    words: Sequence[str],
 ) -> Html:
     says = one.header.says
     shown = (
         f"{comparison.until:g} s on {labels[0]}, below as a solid arm, and on {labels[1]}, as a "
         "ghost over it."
     )
-    finding, _, cause = text.partition(". ")
     return tag(
         "header",
         tag(
@@ -215,8 +214,9 @@ def _head(
         ),
         tag(
             "h1",
-            kept(f"{finding}."),
-            tag("span", kept(f" {cause}."), class_="cause") if cause else None,
+            kept(f"{finding.lead}."),
+            *(tag("span", kept(f" {each}"), class_="cause") for each in finding.causes),
+            tag("span", kept(f" {finding.end}"), class_="cause end") if finding.end else None,
             id="finding",
             tabindex="-1",
         ),

@@ -9,7 +9,7 @@ from ...compare import Agreement, Comparison, Witness
 from ...page import Code, Page, Printed, Table, Text, Verdict
 from ...traces import Header
 from ..figures_of import quantity, short_time
-from .finding import capital, title
+from .finding import capital, moves, title
 from .markup import Html, joined, tag
 from .timeline import Event
 
@@ -188,7 +188,7 @@ def _trials(caption: str, found: Attribution, trials: Sequence[Trial]) -> Html:
 
     rows = []
     for trial in trials:
-        star = "*" if trial.moved and trial.worst is not None and trial.way != "none" else ""
+        star = "*" if moves(trial) else ""
         did = trial.did or "–"
         if trial.way == "parity":
             had = trial.had if trial.did == f"as {found.names[0]}" else trial.had[::-1]
