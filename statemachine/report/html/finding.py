@@ -71,7 +71,7 @@ def headline(
         return Finding("The two runs differ")
     if of.found is not None and of.found.kind == "contact":
         found = of.found
-        lead = f"{shown(found.name)}: {found.note or of.far + ' apart'}"
+        lead = f"{name_of(found.name)}: {found.note or of.far + ' apart'}"
     else:
         lead = f"{of.named} is up to {of.far} apart"
         names = comparison.one.backend, comparison.two.backend
@@ -140,7 +140,7 @@ def changing(curve: Series, found: Agreement) -> float | None:
     return None
 
 
-def shown(name: str) -> str:
+def name_of(name: str) -> str:
     """A quantity's name where names stand in a list: without a comma of its own."""
     return name.replace(", ", " ")
 
@@ -224,7 +224,7 @@ def in_words(
         text = f"All {total} quantities stay within tolerance at all {comparison.moments} moments."
         if worst is not None and worst.max:
             text += (
-                f" Nearest to its tolerance comes {shown(worst.name)}: "
+                f" Nearest to its tolerance comes {name_of(worst.name)}: "
                 f"{quantity(worst.max, worst.kind)} of {quantity(worst.tolerance, worst.kind)}."
             )
         found.append(text)

@@ -16,6 +16,7 @@ from ...compare import Comparison, Series, Witness, default_tip, series
 from ...page import Page, Verdict
 from ...traces import Trace
 from . import sections
+from .between import own_series, shown_series
 from .budget import Budget
 from .curves import curves_section
 from .finding import Finding, headline, in_words, leading, subject
@@ -108,7 +109,9 @@ def _report(
     curves = series(one, two, tip)
     drawn = [curve for curve in curves if np.isfinite(curve.difference).all()]
     events = events_of(comparison, one, two)
+    own = own_series(one, two, tip)
     frames = frames_of(one, two, _moments(comparison), budget.frames(one, two))
+    at_frames = shown_series(one, two, frames, tip, drawn)
     scene = scene_of(one, two, frames, looks, site, budget)
     of = subject(comparison, attribution)
     start = int(np.argmin(np.abs(frames.time - (of.at if of is not None else 0.0))))
@@ -120,27 +123,34 @@ def _report(
     words = [*never, *in_words(comparison, events, attribution), *pressed]
     data = {
         "time": packed(frames.time, "f8"),
-        "compared": packed(drawn[0].time[frames.compared], "f8"),
+        "between": packed(frames.share > 0, "u1"),
+        "other": labels[1],
         "until": comparison.until,
         "start": start,
-        "quantities": [quantity_data(c, comparison, frames) for c in drawn],
+        "quantities": [quantity_data(c, comparison) for c in at_frames],
         "lead": _lead(comparison, drawn),
         "scene": scene.data,
     }
     still = sketch(scene, one, two, frames, start, labels)
+    steps: Html | None = None
     parts: list[object] = [
         _head(comparison, one, labels, finding, words),
         stage(comparison, drawn, events, frames, start, labels, still),
     ]
     if attribution is not None:
-        parts.append(_section("why", "What causes it", sections.attribution_section(attribution)))
+        from .causes import agreement_steps, causes_section
+
+        parts.append(_section("why", "What causes it", causes_section(attribution)))
+        steps = agreement_steps(attribution)
     elif why_not:
         parts.append(_section("why", "What causes it", tag("p", why_not)))
     parts += [
         _section(
             "curves",
             "How far apart, over time",
-            curves_section(comparison, drawn, labels, budget.points(len(drawn))),
+            curves_section(
+                comparison, drawn, own, labels, budget.points(len(drawn)), _energy_by(one, two)
+            ),
         ),
         _section(
             "figures",
@@ -150,11 +160,14 @@ def _report(
         ),
         _section("events", "What happens when", sections.events_table(events, comparison)),
     ]
-    if models is not None:
-        parts.append(_section("models", "What each engine makes of the model", _models(models)))
     emulated = sections.emulated(comparison)
+    if models is not None:
+        made = _models(models, emulated is not None)
+        parts.append(_section("models", "What each engine makes of the model", made))
     if emulated is not None:
         parts.append(_section("emulated", "What is emulated", emulated))
+    if steps is not None:
+        parts.append(_section("agree", "To make them agree", steps))
     notes = [_sentence(line) for line in (*said, *comparison.notes, *scene.notes)]
     parts.append(
         _section(
@@ -225,14 +238,28 @@ def _head(
     )  # fmt: skip
 
 
-def _models(page: Page) -> Html:
+def _energy_by(one: Trace, two: Trace) -> str:
+    """By what the energies of both sides were computed."""
+    by = [trace.header.energy_by or trace.header.backend for trace in (one, two)]
+    masses = "from the masses, the armature and the gravity of the model"
+    if by[0] == by[1]:
+        return f"For both sides computed by {by[0]}, {masses}."
+    return f"Computed by {by[0]} and by {by[1]}, {masses}."
+
+
+def _models(page: Page, emulated: bool) -> Html:
     """The verdict, and what it is of on demand."""
     verdicts = [block for block in page.blocks if isinstance(block, Verdict)]
     rest = [block for block in page.blocks if not isinstance(block, Verdict)]
+    link = None
+    if emulated:
+        link = joined(
+            (" What the backends then do about it for the runs above is in ",
+             tag("a", "What is emulated", href="#emulated"), ".")
+        )  # fmt: skip
     return joined(
         (
-            tag("p", "Before anything moves. What the backends then do about it for the runs above "
-                "is in ", tag("a", "What is emulated", href="#emulated"), "."),
+            tag("p", "Before anything moves.", link),
             sections.from_page(Page("", "", verdicts)),
             tag("details", tag("summary", page.title), sections.from_page(Page("", "", rest))),
         )

@@ -156,7 +156,7 @@ def _poses(trace: Trace, rows: Any, share: Array | None) -> tuple[Array, Array]:
         after = np.minimum(rows + 1, len(trace) - 1)
         part = share[:, None, None]
         pos += part * (trace["xpos"][after] - pos)
-        quat = _slerp(quat, _unit(trace["xquat"][after]), part)
+        quat = slerp(quat, _unit(trace["xquat"][after]), part)
     return pos, quat
 
 
@@ -166,7 +166,7 @@ def _unit(quat: Array) -> Array:
     return np.where(length > 0, quat / np.where(length > 0, length, 1.0), [1.0, 0.0, 0.0, 0.0])
 
 
-def _slerp(one: Array, two: Array, share: Array) -> Array:
+def slerp(one: Array, two: Array, share: Array) -> Array:
     """Rotations between two, along the shorter way (Shoemake 1985)."""
     cosine = (one * two).sum(axis=-1, keepdims=True)
     two, cosine = np.where(cosine < 0, -two, two), np.abs(cosine)

@@ -11,6 +11,7 @@ import numpy as np
 from ...compare import Comparison, Series
 from ..figures_of import scale_of, short_time
 from .charts import time_axis
+from .finding import name_of
 from .geometry import packed
 from .markup import Html, joined, tag
 from .timeline import Event, Frames
@@ -155,14 +156,15 @@ def _lanes(
             )
             for a, b in spans
         ]
-        rows.append(_lane(curve.name, joined(bars), "quantity"))
+        rows.append(_lane(name_of(curve.name), joined(bars), "quantity"))
     within = len(curves) - len(beyond)
     said = "Bars: beyond tolerance." if beyond else "No quantity leaves its tolerance."
     if beyond and within:
         said += f" {within} more never {'are' if within > 1 else 'is'}."
     rows.append(_lane("", time_axis(until), "axis"))
     spoken = "; ".join(
-        f"{curve.name} from {short_time(spans[0][0])}, {sum(b - a for a, b in spans):.3g} s in all"
+        f"{name_of(curve.name)} from {short_time(spans[0][0])}, "
+        f"{sum(b - a for a, b in spans):.3g} s in all"
         for curve, spans in beyond
     )
     return joined(
@@ -196,20 +198,19 @@ def _beyond(curve: Series, comparison: Comparison) -> list[list[float]]:
     return _few(spans)
 
 
-def quantity_data(curve: Series, comparison: Comparison, frames: Frames) -> dict[str, Any]:
-    """What the script shows of a quantity at a moment, and when it is beyond."""
+def quantity_data(curve: Series, comparison: Comparison) -> dict[str, Any]:
+    """What the script shows of a quantity at each moment shown, and when it is beyond."""
     found = next(each for each in comparison.agreements if each.name == curve.name)
     scale, unit = scale_of(curve.kind)
-    rows = frames.compared
     data: dict[str, Any] = {
-        "name": curve.name,
-        "unit": unit,
+        "name": name_of(curve.name),
+        "unit": unit.replace(" ", "\u00a0"),
         "tolerance": found.tolerance * scale,
-        "apart": packed(curve.difference[rows] * scale, "f4"),
+        "apart": packed(curve.difference * scale, "f4"),
     }
     if curve.one.ndim == 1 and curve.one.size:
-        data["one"] = packed(curve.one[rows] * scale, "f4")
-        data["two"] = packed(curve.two[rows] * scale, "f4")
+        data["one"] = packed(curve.one * scale, "f4")
+        data["two"] = packed(curve.two * scale, "f4")
     return data
 
 
