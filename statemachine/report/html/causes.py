@@ -22,8 +22,6 @@ def causes_section(found: Attribution) -> Html:
             f"Differences below {amount(found, found.negligible)} are taken for rounding: there "
             "is nothing to explain.",
         )
-    one, two = found.names
-    said = conclusion(found)
     parts: list[object] = [
         tag(
             "p",
@@ -36,20 +34,8 @@ def causes_section(found: Attribution) -> Html:
         ),
         _ladder(found),
         *_star(found, found.ladder),
-        *(tag("p", kept(line)) for line in said),
+        *_said(found),
     ]
-    if any("!" in line for line in said):
-        parts.append(
-            tag(
-                "p",
-                kept(
-                    f"! More than twice what {one} moves at all "
-                    f"({amount(found, found.extent)}), and than the gap: {two} does not do the "
-                    "experiment any more."
-                ),
-                class_="foot",
-            )
-        )
     parts += [
         tag(
             "details",
@@ -73,6 +59,21 @@ def causes_section(found: Attribution) -> Html:
     return joined([part for part in parts if part is not None])
 
 
+def _said(found: Attribution) -> list[Html]:
+    """The conclusion; beneath a line with a figure marked by "!" what that means."""
+    one, two = found.names
+    parts = []
+    for line in conclusion(found):
+        parts.append(tag("p", kept(line)))
+        if "!" in line:
+            text = (
+                f"! More than twice what {one} moves at all ({amount(found, found.extent)}), and "
+                f"than the gap: {two} does not do the experiment any more."
+            )
+            parts.append(tag("p", kept(text), class_="foot"))
+    return parts
+
+
 def agreement_steps(found: Attribution) -> Html | None:
     """What to set, in order, so that the runs agree, and what stays; None if nothing is known."""
     if not found.alone:
@@ -93,16 +94,18 @@ def agreement_steps(found: Attribution) -> Html | None:
         first = tag("p", "Bring these to the same, in this order, each kept for the next:")
         what = f"What remains with all of it: {same}."
     else:
-        first = tag("p", f"No setting of {one} and {two} that was tried is another: none is to be "
-                         "brought to the same.")  # fmt: skip
+        first = tag(
+            "p",
+            f"Every setting that was tried is the same on {one} and {two}: there is nothing to set.",
+        )
         what = f"What remains is all of the gap, {same}."
     if rest:
         last = rest[-1]
         listed = " and ".join(title(t.factor) for t in rest)
         what += (
-            f" Left out on both, {listed} ({last.did.removesuffix(', both')}), it is "
-            f"{amount(found, last.worst)}: that is how each engine makes it, and no setting "
-            "that was tried brings it to the same."
+            f" With {listed} left out on both ({last.did.removesuffix(', both')}) it is "
+            f"{amount(found, last.worst)}: that is each engine's own doing, and no setting that "
+            "was tried brings it to the same."
         )
     return joined((first, tag("ol", *items) if items else "", tag("p", kept(what))))
 
@@ -138,7 +141,7 @@ def _star(found: Attribution, trials: Sequence[Trial]) -> list[Html]:
 
 
 def _ladder(found: Attribution) -> Html:
-    signed = any((trial.explains or 0.0) < -0.0005 for trial in found.ladder)
+    signed = any((trial.explains or 0.0) < -0.005 for trial in found.ladder)
     rows = []
     for trial in found.ladder:
         text = percent(trial.explains) + ("*" if moves(trial) else "")

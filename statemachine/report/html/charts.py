@@ -38,8 +38,8 @@ def difference_chart(curve: Series, found: Agreement, points: int = 600) -> Html
     top = 1.08 * max(float(curve.difference.max()), found.tolerance) * scale
     said = (
         f"{name_of(curve.name)}, difference over time: at most "
-        f"{quantity(found.max, curve.kind)} at {short_time(found.at)}, settled at {quantity(found.settled, curve.kind)}; tolerance "
-        f"{quantity(found.tolerance, curve.kind)}, "
+        f"{quantity(found.max, curve.kind)} at {short_time(found.at)}, settled at "
+        f"{quantity(found.settled, curve.kind)}; tolerance {quantity(found.tolerance, curve.kind)}, "
         + ("never left." if found.since is None else f"left at {short_time(found.since)}.")
     )
     band = found.tolerance * scale

@@ -275,6 +275,7 @@ const begin_scene = () => {
   }
   $('still').hidden = true;
   reveal('views', 'checks');
+  if (found.scene.begin_near && scene.sides[0].tip) scene.approach();
   view(canvas);
 };
 
@@ -282,7 +283,8 @@ const begin_scene = () => {
 const dark = matchMedia('(prefers-color-scheme: dark)');
 const is_dark = () => (root.dataset.theme ? root.dataset.theme === 'dark' : dark.matches);
 const themed = () => {
-  $('theme').setAttribute('aria-pressed', String(is_dark()));
+  $('theme').textContent = is_dark() ? 'Light' : 'Dark';
+  $('theme').setAttribute('aria-label', is_dark() ? 'Light colours' : 'Dark colours');
   redraw();
 };
 $('theme').addEventListener('click', () => {

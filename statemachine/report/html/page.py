@@ -18,6 +18,7 @@ from ...traces import Trace
 from . import sections
 from .between import own_series, shown_series
 from .budget import Budget
+from .commanded import commanded
 from .curves import curves_section
 from .finding import Finding, headline, in_words, leading, subject
 from .geometry import packed
@@ -112,15 +113,15 @@ def _report(
     own = own_series(one, two, tip)
     frames = frames_of(one, two, _moments(comparison), budget.frames(one, two))
     at_frames = shown_series(one, two, frames, tip, drawn)
-    scene = scene_of(one, two, frames, looks, site, budget)
     of = subject(comparison, attribution)
     start = int(np.argmin(np.abs(frames.time - (of.at if of is not None else 0.0))))
+    scene = scene_of(one, two, frames, looks, site, budget, start)
     finding = headline(comparison, events, attribution, curves)
     labels = comparison.one.label, comparison.two.label
     if labels[0] == labels[1]:
         labels = f"{labels[0]} (first)", f"{labels[1]} (second)"
     never, pressed = pressing_words(comparison, (one, two))
-    words = [*never, *in_words(comparison, events, attribution), *pressed]
+    words = [*in_words(comparison, events, attribution), *pressed]
     data = {
         "time": packed(frames.time, "f8"),
         "between": packed(frames.share > 0, "u1"),
@@ -134,8 +135,8 @@ def _report(
     still = sketch(scene, one, two, frames, start, labels)
     steps: Html | None = None
     parts: list[object] = [
-        _head(comparison, one, labels, finding, words),
-        stage(comparison, drawn, events, frames, start, labels, still),
+        _head(comparison, one, labels, finding, never, words, commanded(one, two, labels)),
+        stage(comparison, drawn, events, frames, start, labels, still, site, scene.strongest),
     ]
     if attribution is not None:
         from .causes import agreement_steps, causes_section
@@ -206,7 +207,9 @@ def _head(
     one: Trace,
     labels: tuple[str, str],
     finding: Finding,
+    never: Sequence[str],
     words: Sequence[str],
+    command: Html | None,
 ) -> Html:
     says = one.header.says
     shown = (
@@ -221,7 +224,7 @@ def _head(
             tag("span", tag("i", class_="key one"), labels[0], class_="side"),
             tag("span", "against", class_="against"),
             tag("span", tag("i", class_="key two"), labels[1], class_="side"),
-            tag("button", "Dark", id="theme", type="button", aria_pressed="false", hidden=True,
+            tag("button", "Dark", id="theme", type="button", hidden=True,
                 aria_label="Dark colours"),
             class_="kicker",
         ),
@@ -234,7 +237,8 @@ def _head(
             tabindex="-1",
         ),
         tag("p", f"{says} " if says else "", kept(shown), class_="says"),
-        *(tag("p", kept(line)) for line in words),
+        *(tag("p", kept(line)) for line in never),
+        tag("div", command, *(tag("p", kept(line)) for line in words), class_="words"),
     )  # fmt: skip
 
 
