@@ -96,7 +96,8 @@ def agreement_steps(found: Attribution) -> Html | None:
     else:
         first = tag(
             "p",
-            f"Every setting that was tried is the same on {one} and {two}: there is nothing to set.",
+            f"Every setting that was tried is the same on {one} and {two}: there is nothing to "
+            "set.",
         )
         what = f"What remains is all of the gap, {same}."
     if rest:

@@ -39,7 +39,8 @@ def difference_chart(curve: Series, found: Agreement, points: int = 600) -> Html
     said = (
         f"{name_of(curve.name)}, difference over time: at most "
         f"{quantity(found.max, curve.kind)} at {short_time(found.at)}, settled at "
-        f"{quantity(found.settled, curve.kind)}; tolerance {quantity(found.tolerance, curve.kind)}, "
+        f"{quantity(found.settled, curve.kind)}; tolerance "
+        f"{quantity(found.tolerance, curve.kind)}, "
         + ("never left." if found.since is None else f"left at {short_time(found.since)}.")
     )
     band = found.tolerance * scale
@@ -213,8 +214,11 @@ def spread(places: Sequence[float], apart: float = _APART) -> list[float]:
     found = list(places)
     for before, k in itertools.pairwise(order):
         found[k] = max(found[k], found[before] + apart)
-    over = max([0.0, *(place - 100.0 for place in found)])
-    return [place - over for place in found]
+    limit = 100.0
+    for k in reversed(order):
+        found[k] = min(found[k], limit)
+        limit = found[k] - apart
+    return found
 
 
 def time_axis(until: float) -> Html:

@@ -274,7 +274,7 @@ const begin_scene = () => {
     return;
   }
   $('still').hidden = true;
-  reveal('views', 'checks');
+  reveal('views', 'checks', 'arrows');
   if (found.scene.begin_near && scene.sides[0].tip) scene.approach();
   view(canvas);
 };

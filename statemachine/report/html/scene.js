@@ -351,7 +351,7 @@ class Scene {
     gl.uniform3fv(made.at('up'), this.up);
     gl.clear(gl.DEPTH_BUFFER_BIT);
     gl.bindVertexArray(this.arrow.array);
-    const extent = this.near ? 0.35 * this.distance : this.data.extent;
+    const extent = this.near ? 0.7 * this.distance : this.data.extent;
     this.sides.forEach((run, side) => {
       if (!this.show[side ? 'ghost' : 'solid']) return;
       gl.uniform3fv(made.at('colour'), this.hues[side].map((v) => 1.05 * v));

@@ -151,7 +151,7 @@ def _nearness(tips: tuple[Array, Array] | None, start: int, extent: float) -> di
     now = float(np.linalg.norm(tips[0][start] - tips[1][start]))
     return {
         "begin_near": bool(0 < gap < _CLOSE * extent),
-        "near": float(np.clip(25 * now, 0.3 * extent, 0.55 * extent)),
+        "near": float(np.clip(25 * now, 0.4 * extent, 0.55 * extent)),
     }
 
 

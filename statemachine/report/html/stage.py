@@ -97,11 +97,15 @@ def stage(
     )  # fmt: skip
     looks = tag(
         "div",
-        tag("div", *checks, class_="checks"),
-        tag("p", kept(_arrows(strongest)), class_="foot") if strongest else None,
+        tag("div", *checks, class_="checks", id="checks", hidden=True),
+        tag(
+            "p",
+            kept(_arrows(strongest)) if strongest else "",
+            class_="foot",
+            id="arrows",
+            hidden=True,
+        ),
         class_="looks",
-        id="checks",
-        hidden=True,
     )
     slider = tag(
         "input",
@@ -135,8 +139,8 @@ def tip_name(tip: str) -> str:
 
 def _arrows(strongest: float) -> str:
     return (
-        "Arrows: contact forces on what hangs further out, as long as the root of the force; the "
-        f"longest of the run is {figure(strongest)} N."
+        "Arrows: contact forces, each as long as the root of its force; the longest of the run is "
+        f"{figure(strongest)} N."
     )
 
 
