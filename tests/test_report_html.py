@@ -386,7 +386,7 @@ def test_the_section_of_causes(hold: Made, tmp_path: Path) -> None:
 
 
 def test_who_presses_on_what(hold: Made) -> None:
-    comparison, one, two, look = hold
+    comparison, one, two, _ = hold
     found = pressing(one, comparison.until)
     assert found
     late = one["contact_row"] >= 360  # the last tenth of 401 rows
