@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import BadInputError, DivergedError
+from ...errors import BadInputError, DivergedError, TraceError
 from ...interface import Model
-from ...records import Array, JointType
+from ...records import Array, Ints, JointType
 from ...traces import Trace
 from ...verbs import forward, make_data
+from ..align import common_moments
 
 _SAME = 1e-6  # of a timestep: two moments nearer than this are one
-_FEW = 20  # common moments below which rows are interpolated instead
 
 
 @dataclass(frozen=True)
@@ -58,13 +58,12 @@ class Ruler:
         """Of two runs as they come; `model` is what poses are computed with."""
         if (model.nq, model.joint_names) != (two.header.nq, two.header.joints):
             raise BadInputError("the two models have other joints: there is nothing to attribute")
-        times = [trace.time - trace.time[0] for trace in (one, two)]
-        slack = _SAME * min(one.header.timestep, two.header.timestep)
-        near = times[1][np.argmin(np.abs(times[1][None] - times[0][:, None]), axis=1)]
-        common = times[0][np.abs(near - times[0]) <= slack + 1e-9]
-        self.between = len(common) < min(_FEW, len(one), len(two))
-        end = min(times[0][-1], times[1][-1])
-        self.time = times[0][times[0] <= end + slack] if self.between else common
+        try:
+            self.between, self.time = False, common_moments(one, two).time
+        except TraceError:  # too few: rows of the second are made up between its own
+            time, end = one.time - one.time[0], two.time[-1] - two.time[0]
+            slack = _SAME * one.header.timestep
+            self.between, self.time = True, time[time <= end + slack]
         self._model = model
         kinds, places = model.jnt_type, model.jnt_qposadr
         self._hinges = places[kinds == int(JointType.HINGE)]
@@ -84,6 +83,8 @@ class Ruler:
             self.units[model.body_names[body]] = "m"
             if self._tip is not None:
                 self.units[self._in_hand(body)] = "m"
+        if not self.units:
+            raise BadInputError(f"nothing can be measured in {model.path.name}: it has no joint")
 
     @property
     def _tip_name(self) -> str:
@@ -165,10 +166,16 @@ class Ruler:
         return {name: self.gap(name, one, two) for name in self.units}
 
 
-def _rows(time: Array, values: Array, wanted: Array, timestep: float) -> Array:
-    """Rows at moments: of the run itself where it has them, else between two of them."""
+def _nearest(time: Array, wanted: Array) -> Ints:
+    """The row of the time (n,), ascending, that is nearest to each that is wanted (k,)."""
     near = np.clip(np.searchsorted(time, wanted), 0, len(time) - 1)
     near -= (near > 0) & (np.abs(time[near - 1] - wanted) < np.abs(time[near] - wanted))
+    return near
+
+
+def _rows(time: Array, values: Array, wanted: Array, timestep: float) -> Array:
+    """Rows at moments: of the run itself where it has them, else between two of them."""
+    near = _nearest(time, wanted)
     found = values[near].copy()
     off = np.flatnonzero(np.abs(time[near] - wanted) > _SAME * timestep + 1e-9)
     if len(off):
