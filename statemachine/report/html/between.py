@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ...compare import Series, series
@@ -48,7 +50,7 @@ def resampled(trace: Trace, time: Array, rows: Ints, share: Array) -> Trace:
         part = share.reshape(-1, *([1] * (values.ndim - 1)))
         return np.where(part > 0, (1 - part) * values[rows] + part * values[after], values[rows])
 
-    columns = {
+    columns: dict[str, Any] = {
         name: between(trace.columns[name])
         for name in ("qpos", "qvel", "site_xpos", "energy")
         if name in trace
@@ -58,8 +60,10 @@ def resampled(trace: Trace, time: Array, rows: Ints, share: Array) -> Trace:
     for kind, start in zip(header.jnt_type, header.jnt_qposadr, strict=True):
         if JointType(kind) in (JointType.FREE, JointType.BALL):
             first = start + (3 if JointType(kind) is JointType.FREE else 0)
-            ends = (trace.qpos[at, first : first + 4] for at in (rows, after))
-            columns["qpos"][:, first : first + 4] = slerp(*ends, share[:, None])
+            turned = trace.qpos[:, first : first + 4]
+            columns["qpos"][:, first : first + 4] = slerp(
+                turned[rows], turned[after], share[:, None]
+            )
     if "site_xmat" in trace:
         matrices = between(trace["site_xmat"]).reshape(len(rows), -1, 3, 3)
         some = share > 0

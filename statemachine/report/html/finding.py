@@ -67,6 +67,12 @@ def headline(
             f"The two runs agree for {comparison.until:g} s: nothing leaves its tolerance"
         )
     of = subject(comparison, attribution)
+    if all(found.verdict == "agrees" for found in comparison.agreements):
+        sides = [side.label for side in (comparison.one, comparison.two) if side.ended]
+        return Finding(
+            f"The two runs agree for {comparison.until:g} s, and {' and '.join(sides)} ended "
+            "before its time"
+        )
     if of is None:
         return Finding("The two runs differ")
     if of.found is not None and of.found.kind == "contact":
@@ -117,8 +123,10 @@ def window(comparison: Comparison) -> str:
 def _in_the_end(comparison: Comparison, curves: Sequence[Series]) -> str:
     """What of the motion is still apart, as a mean over the end, and whether it still changes."""
     motion = [found for found in comparison.agreements if found.kind in MOTION]
-    still = [found for found in motion if found.verdict == "differs"]
+    still = [found for found in motion if found.verdict == "differs" and found.settled >= 0]
     over = f"On average over {window(comparison)}"
+    if not still and any(found.verdict == "differs" for found in motion):
+        return ""  # what is no number is neither within its tolerance nor beyond it
     if not still:
         return f"{over}, all of the motion is within its tolerance." if motion else ""
     most = max(still, key=lambda found: found.settled / found.tolerance)
@@ -187,9 +195,13 @@ def leading(comparison: Comparison) -> Agreement | None:
     """The quantity farthest beyond its tolerance; of the motion if any of that is beyond."""
     beyond = [each for each in comparison.agreements if each.verdict != "agrees"]
     motion = [each for each in beyond if each.kind in MOTION]
-    return max(
-        motion or beyond, key=lambda each: each.max / each.tolerance, default=comparison.worst
-    )
+    return max(motion or beyond, key=_tolerances, default=comparison.worst)
+
+
+def _tolerances(found: Agreement) -> float:
+    """How many tolerances it is beyond; what is no number comes last."""
+    share = found.max / found.tolerance
+    return share if np.isfinite(share) else -1.0
 
 
 def parting(comparison: Comparison) -> float | None:
