@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,18 +12,24 @@ import numpy as np
 from ...compare import Agreement, Series
 from ...records import Array, Ints
 from ..figures_of import figure, quantity, scale_of, short_time
+from .finding import name_of
 from .markup import Html, joined, tag
 
 _ROWS = 21  # of the table under a chart
+_HIGH = 50.0  # times the tolerance: a difference that reaches more has a log axis
+_DECADES = 1e-2  # of the tolerance: where a log axis begins
+_APART = 13.0  # percent of a chart's height between two names at its end
+_ROUNDING = 1e-6  # of a tolerance
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A curve: `y` (n,) in what is shown; `look` is its class; label at its end."""
+    """A curve: `y` (n,) in what is shown; `look` is its class; label at its end; own times."""
 
     y: Array
     look: str
     label: str = ""
+    time: Array | None = None
 
 
 def difference_chart(curve: Series, found: Agreement, points: int = 600) -> Html:
@@ -30,47 +37,64 @@ def difference_chart(curve: Series, found: Agreement, points: int = 600) -> Html
     scale = scale_of(curve.kind)[0]
     top = 1.08 * max(float(curve.difference.max()), found.tolerance) * scale
     said = (
-        f"{curve.name}, difference over time: at most {quantity(found.max, curve.kind)} at "
-        f"{short_time(found.at)}, settled at {quantity(found.settled, curve.kind)}; tolerance "
+        f"{name_of(curve.name)}, difference over time: at most "
+        f"{quantity(found.max, curve.kind)} at {short_time(found.at)}, settled at "
+        f"{quantity(found.settled, curve.kind)}; tolerance "
         f"{quantity(found.tolerance, curve.kind)}, "
         + ("never left." if found.since is None else f"left at {short_time(found.since)}.")
     )
-    return _plot(
-        curve.time,
-        [Curve(curve.difference * scale, "apart")],
-        (0.0, top),
-        said,
-        band=found.tolerance * scale,
-        points=points,
-    )
+    band = found.tolerance * scale
+    values = curve.difference * scale
+    if logarithmic(found):
+        low = math.log10(_DECADES * band)
+        values = np.log10(np.maximum(values, 10.0**low))
+        return _plot(
+            curve.time, [Curve(values, "apart")], (low, math.log10(top) + 0.1),
+            said, band=math.log10(band), points=points, powers=True,
+        )  # fmt: skip
+    return _plot(curve.time, [Curve(values, "apart")], (0.0, top), said, band=band, points=points)
 
 
-def values_chart(curve: Series, labels: tuple[str, str], points: int = 600) -> Html | None:
-    """Both sides over time; None for a quantity that has no values of its own."""
-    if not curve.one.size:
+def logarithmic(found: Agreement) -> bool:
+    """Whether the tolerance could not be seen on an axis that is as high as the difference."""
+    return found.max > _HIGH * found.tolerance
+
+
+def values_chart(
+    one: Series, two: Series, labels: tuple[str, str], points: int = 600
+) -> Html | None:
+    """Each side over time, at its own rows; None for a quantity that has no values of its own.
+
+    Args:
+        one: A curve of the first side with itself.
+        two: The same of the second.
+        labels: What the sides are called.
+        points: At most, of a curve.
+    """
+    if not one.one.size or not two.one.size:
         return None
-    scale, unit = scale_of(curve.kind)
-    curves = []
-    for side, look in ((curve.one, "one"), (curve.two, "two")):
-        columns = side.reshape(len(curve.time), -1).T * scale
+    until = min(float(one.time[-1]), float(two.time[-1]))
+    scale, unit = scale_of(one.kind)
+    curves, ends = [], []
+    for side, look in ((one, "one"), (two, "two")):
+        inside = side.time <= until + 1e-9
+        values = side.one[inside] * scale
+        ends.append(", ".join(f"{float(v):.4g}" for v in np.atleast_1d(values[-1])))
+        columns = values.reshape(len(values), -1).T
         names = "xyz" if len(columns) == 3 else [""] * len(columns)
         curves += [
-            Curve(y, look, name if look == "one" else "")
+            Curve(y, look, name if look == "one" else "", side.time[inside])
             for y, name in zip(columns, names, strict=True)
         ]
-    values = np.concatenate([each.y for each in curves])
-    low, high = float(values.min()), float(values.max())
+    every = np.concatenate([each.y for each in curves])
+    low, high = float(every.min()), float(every.max())
     pad = 0.06 * (high - low) or max(abs(high) * 0.05, 1e-9)
-    ends = [
-        ", ".join(f"{float(v):.4g}" for v in np.atleast_1d(side[-1] * scale))
-        for side in (curve.one, curve.two)
-    ]
     said = (
-        f"{curve.name} over time on both sides: at the end {ends[0]}{unit} on {labels[0]} and "
-        f"{ends[1]}{unit} on {labels[1]}."
+        f"{name_of(one.name)} over time on both sides: at the end {ends[0]}{unit} on {labels[0]} "
+        f"and {ends[1]}{unit} on {labels[1]}."
     )
-    floor = low if curve.kind == "force" else low - pad
-    return _plot(curve.time, curves, (floor, high + pad), said, points=points)
+    floor = low if one.kind == "force" else low - pad
+    return _plot(np.array([0.0, until]), curves, (floor, high + pad), said, points=points)
 
 
 def data_table(curve: Series, found: Agreement, labels: tuple[str, str]) -> Html:
@@ -95,23 +119,29 @@ def data_table(curve: Series, found: Agreement, labels: tuple[str, str]) -> Html
         tag(
             "tr",
             tag("th", f"{curve.time[row]:.3f}", scope="row"),
-            *(tag("td", _number(float(values[row]) * scale)) for _, values in columns),
+            *(
+                tag("td", _number(float(values[row]) * scale, found.tolerance * scale))
+                for _, values in columns
+            ),
             class_="most" if row == worst else None,
         )
         for row in rows.tolist()
     ]
-    caption = f"{curve.name}: {len(rows)} of {len(curve.time)} moments, the largest difference bold"
+    count = f"{len(rows)} of {len(curve.time)} moments"
+    caption = f"{name_of(curve.name)}: {count}, the largest difference bold"
     return tag(
         "div",
         tag("table", tag("caption", caption), tag("thead", head), tag("tbody", *body)),
         class_="wide",
         tabindex="0",
         role="region",
-        aria_label=f"Figures of {curve.name}",
+        aria_label=f"Figures of {name_of(curve.name)}",
     )
 
 
-def _number(value: float) -> str:
+def _number(value: float, tolerance: float) -> str:
+    if 0 < abs(value) < _ROUNDING * tolerance:
+        return "≈ 0"
     return f"{value:.4f}" if abs(value) >= 1e-3 or value == 0 else figure(value)
 
 
@@ -122,6 +152,7 @@ def _plot(
     said: str,
     band: float | None = None,
     points: int = 600,
+    powers: bool = False,
 ) -> Html:
     """Curves in a box of 1000 × 100 that is stretched to its place; ticks are text beside it."""
     until = float(time[-1]) or 1.0
@@ -132,32 +163,34 @@ def _plot(
         marks.append(tag("rect", x=0, y=f"{y:.2f}", width=1000, height=f"{100 - y:.2f}",
                          class_="band"))  # fmt: skip
         marks.append(tag("line", x1=0, x2=1000, y1=f"{y:.2f}", y2=f"{y:.2f}", class_="edge"))
-    ticks = ticks_of(low, high)
+    ticks = _powers(low, high) if powers else ticks_of(low, high)
+    if len(ticks) < 2:
+        ticks = ticks_of(low, high, 8)
     marks += [
         tag("line", x1=0, x2=1000, y1=f"{_up(t, low, high):.2f}", y2=f"{_up(t, low, high):.2f}",
             class_="grid")
         for t in ticks
     ]  # fmt: skip
     marks += [
-        tag("path", d=_path(time / until, curve.y, low, high, points), class_=f"curve {curve.look}")
-        for curve in sorted(curves, key=lambda each: each.look)
+        tag(
+            "path",
+            d=_path((time if each.time is None else each.time) / until, each.y, low, high, points),
+            class_=f"curve {each.look}",
+        )
+        for each in sorted(curves, key=lambda each: each.look)
     ]
     svg = tag("svg", *marks, viewBox="0 0 1000 100", preserveAspectRatio="none", focusable="false")
     digits = _digits(ticks)
     labels = [
-        tag("span", f"{tick:.{digits}f}".replace("-", "−"), class_="ytick",
+        tag("span", f"{10.0**tick:g}" if powers else f"{tick:.{digits}f}", class_="ytick",
             style=f"top:{_up(tick, low, high):.2f}%")
         for tick in ticks
     ]  # fmt: skip
+    ending = [curve for curve in curves if curve.label]
+    places = spread([_up(float(curve.y[-1]), low, high) for curve in ending])
     ends = [
-        tag(
-            "span",
-            curve.label,
-            class_="name",
-            style=f"top:{_up(float(curve.y[-1]), low, high):.2f}%",
-        )
-        for curve in curves
-        if curve.label
+        tag("span", curve.label, class_="name", style=f"top:{place:.2f}%")
+        for curve, place in zip(ending, places, strict=True)
     ]
     return tag(
         "div",
@@ -169,14 +202,35 @@ def _plot(
     )
 
 
+def _powers(low: float, high: float) -> list[float]:
+    """Powers of ten within a range of exponents, every other if they are many."""
+    found = [float(k) for k in range(math.ceil(low - 1e-9), math.floor(high + 1e-9) + 1)]
+    return found[:: -(-len(found) // 5)]
+
+
+def spread(places: Sequence[float], apart: float = _APART) -> list[float]:
+    """Places from 0 to 100 as they are, but pushed apart until none covers another."""
+    order = sorted(range(len(places)), key=lambda k: places[k])
+    found = list(places)
+    for before, k in itertools.pairwise(order):
+        found[k] = max(found[k], found[before] + apart)
+    limit = 100.0
+    for k in reversed(order):
+        found[k] = min(found[k], limit)
+        limit = found[k] - apart
+    return found
+
+
 def time_axis(until: float) -> Html:
     """Ticks of time under a box that is as wide as the run is long."""
     ticks = [tick for tick in ticks_of(0.0, until, 5) if tick <= until * 1.0001]
     digits = _digits(ticks)
     labels = []
     for k, tick in enumerate(ticks):
-        text = f"{tick:.{digits}f}" + (" s" if k == len(ticks) - 1 else "")
-        labels.append(tag("span", text, style=f"left:{100 * tick / until:.2f}%"))
+        unit = tag("small", "s") if k == len(ticks) - 1 else None
+        labels.append(
+            tag("span", f"{tick:.{digits}f}", unit, style=f"left:{100 * tick / until:.2f}%")
+        )
     return tag("div", joined(labels), class_="times", aria_hidden="true")
 
 

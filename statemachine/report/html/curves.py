@@ -2,37 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ...compare import Comparison, Series
 from ..figures_of import scale_of
 from . import sections
-from .charts import data_table, difference_chart, values_chart
+from .charts import data_table, difference_chart, logarithmic, values_chart
+from .finding import name_of
 from .markup import Html, joined, tag
 
 
 def curves_section(
-    comparison: Comparison, curves: Sequence[Series], labels: tuple[str, str], points: int
+    comparison: Comparison,
+    curves: Sequence[Series],
+    own: Mapping[str, tuple[Series, Series]],
+    labels: tuple[str, str],
+    points: int,
+    energy_by: str = "",
 ) -> Html:
-    """A row of charts for each quantity, those that differ first."""
+    """A row of charts for each quantity, those that differ first.
+
+    Args:
+        comparison: What was found.
+        curves: Of both sides at common moments.
+        own: Of each side at its own rows, by name.
+        labels: What the sides are called.
+        points: At most, of a curve.
+        energy_by: What is said beside the energy: by what it was computed.
+    """
     by_name = {found.name: found for found in comparison.agreements}
     shown: dict[str, list[tuple[float, Html]]] = {"differs": [], "settles": [], "agrees": []}
     for curve in curves:
         found = by_name[curve.name]
-        chart = values_chart(curve, labels, points)
+        chart = values_chart(*own[curve.name], labels, points) if curve.name in own else None
         unit = scale_of(curve.kind)[1].strip()
+        axis = "log axis; " if logarithmic(found) else ""
+        said = f"how far apart, {unit}; {axis}shaded: within tolerance"
         row = tag(
             "section",
-            tag("h3", tag("span", curve.name, class_="quantity"),
+            tag("h3", tag("span", name_of(curve.name), class_="quantity"),
                 sections.verdict_badge(found.verdict)),
             tag(
                 "div",
-                tag("figure", tag("figcaption", f"how far apart, {unit}; shaded: within tolerance"),
+                tag("figure", tag("figcaption", said),
                     difference_chart(curve, found, points)),
                 tag("figure", tag("figcaption", f"both sides, {unit}"), chart) if chart else None,
                 class_="charts",
             ),
-            tag("details", tag("summary", f"The figures of {curve.name}"),
+            tag("p", energy_by, class_="foot") if curve.kind == "energy" and energy_by else None,
+            tag("details", tag("summary", f"The figures of {name_of(curve.name)}"),
                 data_table(curve, found, labels), class_="data"),
             class_="quantity-row",
         )  # fmt: skip

@@ -3,53 +3,158 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ...compare import Agreement, Comparison
+import numpy as np
+
+from ...compare import Agreement, Comparison, Series
+from ...compare.agreement import SETTLED
 from ..figures_of import quantity, short_time
 from .timeline import Event
 
 if TYPE_CHECKING:
-    from ...compare.why import Attribution
+    from ...compare.why import Attribution, Trial
 
-_MOTION = ("joint", "slide", "tip", "tip rotation", "body", "body rotation")
-_SOME = 0.1  # share of the gap from which on a factor is named
+MOTION = ("joint", "slide", "tip", "tip rotation", "body", "body rotation")
+_SOME = 0.1  # share of the gap from which on a factor is a cause
+_WORTH = 0.005  # share below which a factor is not named beside others
+_PROOF = 1e-3  # of the gap: nearer than this until the first touch, the touch parts them
+_MOVES = 0.1  # share by which a difference may change in the end and be called settled
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What the page begins with.
+
+    Attributes:
+        lead: The largest difference and when it is; a sentence without its end.
+        causes: What explains that difference, the strongest reason first; sentences.
+        end: What is still apart in the end, a sentence; "" where there is nothing to say.
+    """
+
+    lead: str
+    causes: tuple[str, ...] = ()
+    end: str = ""
+
+    @property
+    def text(self) -> str:
+        """All of it on one line."""
+        return " ".join(part for part in (f"{self.lead}.", *self.causes, self.end) if part)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """The difference to speak of: its name, the largest value as text, and when [s]."""
+
+    named: str
+    far: str
+    at: float
+    found: Agreement | None
 
 
 def headline(
-    comparison: Comparison, events: Sequence[Event], attribution: Attribution | None = None
-) -> str:
-    """The finding in one sentence."""
+    comparison: Comparison,
+    events: Sequence[Event],
+    attribution: Attribution | None = None,
+    curves: Sequence[Series] = (),
+) -> Finding:
+    """The largest difference, what explains it, and what is left of it in the end."""
     if comparison.agrees:
         if all(found.max == 0 for found in comparison.agreements):
-            return "The two runs are the same in every figure that was compared"
-        return f"The two runs agree for {comparison.until:g} s: nothing leaves its tolerance"
-    subject = leading(comparison)
-    if subject is None:
-        return "The two runs differ"
-    parts = [_apart(subject)]
-    names = comparison.one.backend, comparison.two.backend
-    if names[0] != names[1]:
-        parts[0] += f" on {names[0]} and {names[1]}"
+            return Finding("The two runs are the same in every figure that was compared")
+        return Finding(
+            f"The two runs agree for {comparison.until:g} s: nothing leaves its tolerance"
+        )
+    of = subject(comparison, attribution)
+    if all(found.verdict == "agrees" for found in comparison.agreements):
+        sides = [side.label for side in (comparison.one, comparison.two) if side.ended]
+        return Finding(
+            f"The two runs agree for {comparison.until:g} s, and {' and '.join(sides)} ended "
+            "before its time"
+        )
+    if of is None:
+        return Finding("The two runs differ")
+    if of.found is not None and of.found.kind == "contact":
+        found = of.found
+        lead = f"{name_of(found.name)}: {found.note or of.far + ' apart'}"
+    else:
+        lead = f"{of.named} is up to {of.far} apart"
+        names = comparison.one.backend, comparison.two.backend
+        if names[0] != names[1]:
+            lead += f" on {names[0]} and {names[1]}"
+        lead += f", at {short_time(of.at)}"
+    return Finding(
+        capital("; ".join([lead, *_parting(comparison, events)])),
+        _causes(attribution),
+        _in_the_end(comparison, curves),
+    )
+
+
+def _parting(comparison: Comparison, events: Sequence[Event]) -> list[str]:
+    """When the runs part; of moments farther apart than timesteps, that it is only the first."""
     at = parting(comparison)
-    if at is not None:
-        clause = f"the runs part at {short_time(at)}" if at > 0 else "the runs part from the start"
-        touch = touch_at(comparison, events)
-        parts.append(clause + (f", when {_meets(touch[0].what)}" if touch else ""))
-    cause = _cause(attribution)
-    return capital("; ".join(parts)) + (f". {cause}" if cause else "")
+    if at is None:
+        return []
+    if at == 0:
+        return ["the runs part from the start"]
+    touch = touch_at(comparison, events)
+    when = f", when {_meets(touch[0].what)}" if touch else ""
+    apart = spacing(comparison)
+    if apart is None:
+        return [f"the runs part at {short_time(at)}{when}"]
+    if at <= 1.001 * apart:
+        return [f"they are apart at the first common moment already, {short_time(at)}"]
+    return [f"they are apart from the common moment {short_time(at)} on{when}"]
 
 
-def _apart(found: Agreement) -> str:
-    if found.kind == "contact":
-        return f"{found.name}: {found.note or quantity(found.max, found.kind) + ' apart'}"
-    if found.verdict == "differs":
-        return f"{_named(found)} ends {quantity(found.settled, found.kind)} apart"
-    far = quantity(found.max, found.kind)
-    return f"{_named(found)} gets {far} apart on the way, and comes together again"
+def spacing(comparison: Comparison) -> float | None:
+    """How far apart common moments are [s], if that is more than a timestep of both."""
+    apart = comparison.until / max(1, comparison.moments - 1)
+    steps = comparison.one.timestep, comparison.two.timestep
+    return apart if apart > 1.5 * max(steps) else None
 
 
-def _named(found: Agreement) -> str:
+def window(comparison: Comparison) -> str:
+    """What the figures of the end are a mean over."""
+    return f"the last {SETTLED * comparison.until:.3g} s"
+
+
+def _in_the_end(comparison: Comparison, curves: Sequence[Series]) -> str:
+    """What of the motion is still apart, as a mean over the end, and whether it still changes."""
+    motion = [found for found in comparison.agreements if found.kind in MOTION]
+    still = [found for found in motion if found.verdict == "differs" and found.settled >= 0]
+    over = f"On average over {window(comparison)}"
+    if not still and any(found.verdict == "differs" for found in motion):
+        return ""  # what is no number is neither within its tolerance nor beyond it
+    if not still:
+        return f"{over}, all of the motion is within its tolerance." if motion else ""
+    most = max(still, key=lambda found: found.settled / found.tolerance)
+    text = f"{over} {named(most)} is still {quantity(most.settled, most.kind)} apart"
+    curve = next((each for each in curves if each.name == most.name), None)
+    last = None if curve is None else changing(curve, most)
+    if last is None:
+        return f"{text}."
+    return f"{text}, and still changing: {quantity(last, most.kind)} at the last moment."
+
+
+def changing(curve: Series, found: Agreement) -> float | None:
+    """The last difference, if it moves within the end by more than it may to be settled."""
+    time = curve.time
+    tail = curve.difference[time >= time[-1] - SETTLED * (time[-1] - time[0])]
+    moves = float(np.ptp(tail))
+    if moves > min(found.tolerance, _MOVES * found.settled):
+        return float(tail[-1])
+    return None
+
+
+def name_of(name: str) -> str:
+    """A quantity's name where names stand in a list: without a comma of its own."""
+    return name.replace(", ", " ")
+
+
+def named(found: Agreement) -> str:
+    """A quantity within a sentence."""
     if found.kind in ("joint", "slide"):
         return f"joint {found.name}"
     name, _, part = found.name.partition(", ")
@@ -61,19 +166,42 @@ def _meets(what: str) -> str:
     return f"{one} touches {two}"
 
 
+def subject(comparison: Comparison, attribution: Attribution | None = None) -> Subject | None:
+    """The largest difference: that whose causes were looked for, else the leading one."""
+    found = leading(comparison)
+    if attribution is None or not attribution.alone:
+        if found is None:
+            return None
+        return Subject(named(found), quantity(found.max, found.kind), found.at, found)
+    from ..why import amount
+
+    gap = attribution.first[attribution.quantity]
+    kinds = {"joints": "joint", "slides": "slide"}
+    kind = kinds.get(attribution.quantity)
+    same = [
+        each
+        for each in comparison.agreements
+        if (each.kind == kind if kind else each.name == f"{attribution.quantity}, position")
+        and abs(each.max - gap.worst) <= 1e-6 * gap.worst
+    ]
+    far = amount(attribution, gap.worst)
+    if same:
+        return Subject(named(same[0]), far, gap.at, same[0])
+    who = f"one of the {attribution.quantity}" if kind else f"the {attribution.quantity}"
+    return Subject(who, far, gap.at, None)
+
+
 def leading(comparison: Comparison) -> Agreement | None:
-    """The quantity to speak of: of the motion if that differs, farthest beyond its tolerance."""
-    for verdict in ("differs", "settles"):
-        for kinds in (_MOTION, None):
-            found = [
-                each
-                for each in comparison.agreements
-                if each.verdict == verdict and (kinds is None or each.kind in kinds)
-            ]
-            if found:
-                size = "settled" if verdict == "differs" else "max"
-                return max(found, key=lambda each: getattr(each, size) / each.tolerance)
-    return comparison.worst
+    """The quantity farthest beyond its tolerance; of the motion if any of that is beyond."""
+    beyond = [each for each in comparison.agreements if each.verdict != "agrees"]
+    motion = [each for each in beyond if each.kind in MOTION]
+    return max(motion or beyond, key=_tolerances, default=comparison.worst)
+
+
+def _tolerances(found: Agreement) -> float:
+    """How many tolerances it is beyond; what is no number comes last."""
+    share = found.max / found.tolerance
+    return share if np.isfinite(share) else -1.0
 
 
 def parting(comparison: Comparison) -> float | None:
@@ -108,21 +236,30 @@ def in_words(
         text = f"All {total} quantities stay within tolerance at all {comparison.moments} moments."
         if worst is not None and worst.max:
             text += (
-                f" Nearest to its tolerance comes {worst.name}: "
+                f" Nearest to its tolerance comes {name_of(worst.name)}: "
                 f"{quantity(worst.max, worst.kind)} of {quantity(worst.tolerance, worst.kind)}."
             )
         found.append(text)
     else:
+        still = counts["differs"]
         text = (
-            f"Of {total} quantities {counts['agrees']} agree, {counts['settles']} leave their "
-            f"tolerance and come back, and {counts['differs']} still differ at the end."
+            f"Of {total} quantities {counts['agrees']} {_s(counts['agrees'], 'agree')}, "
+            f"{counts['settles']} {_s(counts['settles'], 'leave')} tolerance and "
+            f"{_s(counts['settles'], 'come')} back, and {still} still {_s(still, 'differ')} "
+            f"over {window(comparison)}."
         )
-        subject = leading(comparison)
-        if subject is not None and subject.kind != "contact":
+        of = subject(comparison, attribution)
+        if of is not None and of.found is not None and of.found.kind != "contact":
             text += (
-                f" {capital(_named(subject))} is {quantity(subject.max, subject.kind)} apart at "
-                f"most, at {short_time(subject.at)}; its tolerance is "
-                f"{quantity(subject.tolerance, subject.kind)}."
+                f" The tolerance of {named(of.found)} is "
+                f"{quantity(of.found.tolerance, of.found.kind)}."
+            )
+        far = leading(comparison)
+        if of is not None and of.found is None and far is not None:
+            text += (
+                f" Farthest beyond its tolerance is {named(far)}: "
+                f"{quantity(far.max, far.kind)} of {quantity(far.tolerance, far.kind)}, at "
+                f"{short_time(far.at)}."
             )
         found.append(text)
         touch = touch_at(comparison, events)
@@ -132,50 +269,72 @@ def in_words(
             missing = [labels[k] for k in (0, 1) if k not in [e.side for e in touch]]
             each += [f"never on {label}" for label in missing]
             found.append(f"The first touch of {touch[0].what} is {' and '.join(each)}.")
-    if attribution is not None and attribution.alone:
-        found.append(_left(attribution))
-    return found
+    coarse = coarsely(comparison)
+    return [*found, coarse] if coarse else found
 
 
-def _left(attribution: Attribution) -> str:
-    """What remains of the gap after the ladder."""
-    from ..why import amount, conclusion
-
-    counted = [trial for trial in attribution.ladder if trial.explains is not None]
-    if len(counted) != 1:
-        return conclusion(attribution)[0]
-    trial = counted[0]
-    how = f"with {title(trial.factor)} brought to the same ({trial.did})"
-    if trial.way == "off":
-        how = f"without {title(trial.factor)} ({trial.did})"
+def coarsely(comparison: Comparison) -> str:
+    """That figures are of moments which are farther apart than the timesteps; "" if not."""
+    apart = spacing(comparison)
+    if apart is None:
+        return ""
+    steps = " and ".join(
+        f"{1000 * step:.3g}" for step in (comparison.one.timestep, comparison.two.timestep)
+    )
     return (
-        f"Run again {how}, the largest difference {_of(attribution)} is "
-        f"{amount(attribution, trial.worst)} instead of {amount(attribution, attribution.gap)}."
+        f"The sides step every {steps} ms and meet every {1000 * apart:.3g} ms. Figures are of "
+        "these common moments alone: times are no finer, and a peak between two of them is not "
+        "seen, so a largest difference may be larger."
     )
 
 
-def _of(attribution: Attribution) -> str:
-    if attribution.quantity in ("joints", "slides"):
-        return f"in the {attribution.quantity}"
-    return f"of {attribution.quantity}"
+def _s(count: int, verb: str) -> str:
+    return verb + ("s" if count == 1 else "")
 
 
-def _cause(attribution: Attribution | None) -> str:
-    """Which factors take the gap away, with their shares, one on top of the other."""
+def _causes(attribution: Attribution | None) -> tuple[str, ...]:
+    """What takes the largest difference away, of the ladder; what is a proof comes first."""
     if attribution is None or not attribution.alone:
-        return ""
+        return ()
     from ..why import amount, percent
 
     counted = [trial for trial in attribution.ladder if trial.explains is not None]
-    rungs = [trial for trial in counted if (trial.explains or 0.0) >= _SOME]
-    rungs.sort(key=lambda trial: -(trial.explains or 0.0))
-    if not rungs:
-        return "None of the factors that were tried explains a tenth of the gap"
-    named = [f"{title(trial.factor)} explains {percent(trial.explains)}" for trial in rungs[:1]]
-    named += [f"{title(trial.factor)} {percent(trial.explains)}" for trial in rungs[1:3]]
-    listed = " and ".join([", ".join(named[:-1]), named[-1]] if len(named) > 1 else named)
-    gap = amount(attribution, attribution.gap)
-    return f"{capital(listed)} of the largest difference {_of(attribution)}, {gap}"
+    if max((trial.explains or 0.0 for trial in counted), default=0.0) < _SOME:
+        return ("None of the factors that were tried explains a tenth of it.",)
+    worth = [trial for trial in counted if (trial.explains or 0.0) >= _WORTH]
+    worth.sort(key=lambda trial: -(trial.explains or 0.0))
+    found = []
+    touch = attribution.touch
+    contact = next((t for t in worth if t.factor == "contact" and t.way == "off"), None)
+    if contact is not None and touch is not None and touch.before < _PROOF * attribution.gap:
+        what = touch.what.split("; ", maxsplit=1)[0]
+        found.append(
+            f"Until the first touch, {what} at {short_time(touch.time)}, "
+            f"{_all(attribution)} {amount(attribution, touch.before)} apart."
+        )
+    same = [trial for trial in worth if not moves(trial)]
+    other = [trial for trial in worth if moves(trial)]
+    listed = [f"{title(t.factor)} {percent(t.explains)}" for t in same]
+    if same:
+        found.append(f"Of that, made the same one on top of the other: {', '.join(listed)}.")
+    if other:
+        listed = [f"{title(t.factor)} takes {percent(t.explains)} of it away*" for t in other]
+        found.append(
+            f"{'Then, left' if same else 'Left'} out on both sides, {', '.join(listed)}. "
+            f"* This moves {attribution.names[0]} itself: a hint, not a proof."
+        )
+    return tuple(found)
+
+
+def _all(attribution: Attribution) -> str:
+    if attribution.quantity in ("joints", "slides"):
+        return f"the {attribution.quantity} are"
+    return f"the {attribution.quantity} is"
+
+
+def moves(trial: Trial) -> bool:
+    """Whether it moves the first side itself, so that the gap is of another motion."""
+    return bool(trial.moved and trial.worst is not None and trial.way != "none")
 
 
 def title(factor: str) -> str:

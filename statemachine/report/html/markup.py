@@ -24,6 +24,16 @@ def escaped(text: object) -> Html:
     """A text as markup that shows it; markup stays as it is."""
     if isinstance(text, Html):
         return text
+    return Html(html.escape(_printable(with_minus(str(text)))))
+
+
+def with_minus(text: str) -> str:
+    """A text whose figures have the sign minus, not a hyphen."""
+    return re.sub(r"(?<![\w\-–)\].])-(?=\d)|(?<=\de)-(?=\d)", "−", text)
+
+
+def literal(text: object) -> Html:
+    """A text as it is, for what may be typed or copied."""
     return Html(html.escape(_printable(str(text))))
 
 
@@ -47,13 +57,17 @@ def tag(name: str, *content: object, **attributes: object) -> Html:
             continue
         said += " " + key.rstrip("_").replace("_", "-")
         if value is not True:
-            said += f'="{html.escape(_printable(str(value)))}"'
+            text = with_minus(str(value)) if key in _SPOKEN else str(value)
+            said += f'="{html.escape(_printable(text))}"'
     if name in _VOID:
         return Html(f"<{name}{said}>" if name not in _DRAWN else f"<{name}{said}/>")
+    if name in ("code", "pre"):
+        content = tuple(p if isinstance(p, Html) or p is None else literal(p) for p in content)
     inner = "".join(escaped(part) for part in content if part is not None)
     return Html(f"<{name}{said}>{inner}</{name}>")
 
 
+_SPOKEN = ("aria_label", "aria_valuetext", "title")
 _DRAWN = frozenset({"path", "line", "rect", "circle"})
 
 

@@ -6,7 +6,7 @@ const root = document.documentElement;
 root.classList.add('script');
 
 const times = numbers(found.time, Float64Array);
-const compared = numbers(found.compared, Float64Array);
+const between = bytes(found.between);
 const frames = times.length;
 const quantities = found.quantities.map((q) => ({
   ...q,
@@ -28,11 +28,16 @@ const figure = (value) => {
   if (a < 1e-3) return minus(value.toExponential(0));
   return minus(value.toFixed(Math.min(4, Math.max(0, 2 - Math.floor(Math.log10(a))))));
 };
-const apart = (q, k) => `${q.name} ${figure(q.apart[k])}${q.unit}`;
+// What is a millionth of the tolerance is rounding.
+const gap = (q, k) => (q.apart[k] && q.apart[k] < 1e-6 * q.tolerance ? '\u2248 0'
+  : `${figure(q.apart[k])}${q.unit}`);
+const apart = (q, k) => `${q.name} ${gap(q, k)}`;
 const spoken = (k) => {
   const lead = found.lead.map((n) => quantities[n]).filter(Boolean).map((q) => apart(q, k));
-  return `${moment(times[k])}: ${lead.join(', ')} apart`;
+  return `${moment(times[k])}: ${lead.join('; ')} apart`;
 };
+
+const value = (q, v) => (v && Math.abs(v) < 1e-6 * q.tolerance ? '\u2248 0' : `${figure(v)}${q.unit}`);
 
 // --- the table beside the scene -----------------------------------------------------------
 const cells = [];
@@ -49,15 +54,12 @@ const build_readout = () => {
   }
 };
 const fill_readout = () => {
-  const between = Math.abs(compared[row] - times[row]) > 1e-9;
-  $('now').textContent = between
-    ? `${moment(times[row])} (figures: last compared moment, ${moment(compared[row])})`
-    : moment(times[row]);
+  $('now').textContent = between[row]
+    ? `${moment(times[row])} (${found.other}: between two of its rows)` : moment(times[row]);
   quantities.forEach((q, n) => {
     const { line, own } = cells[n];
-    own[0].textContent = q.one ? `${figure(q.one[row])}${q.unit}` : '';
-    own[1].textContent = q.two ? `${figure(q.two[row])}${q.unit}` : '';
-    own[2].textContent = `${figure(q.apart[row])}${q.unit}`;
+    [q.one, q.two].forEach((side, k) => { own[k].textContent = side ? value(q, side[row]) : ''; });
+    own[2].textContent = gap(q, row);
     line.className = q.apart[row] > q.tolerance ? 'beyond' : '';
   });
 };
@@ -272,7 +274,8 @@ const begin_scene = () => {
     return;
   }
   $('still').hidden = true;
-  reveal('views', 'checks');
+  reveal('views', 'checks', 'arrows');
+  if (found.scene.begin_near && scene.sides[0].tip) scene.approach();
   view(canvas);
 };
 
@@ -280,7 +283,8 @@ const begin_scene = () => {
 const dark = matchMedia('(prefers-color-scheme: dark)');
 const is_dark = () => (root.dataset.theme ? root.dataset.theme === 'dark' : dark.matches);
 const themed = () => {
-  $('theme').setAttribute('aria-pressed', String(is_dark()));
+  $('theme').textContent = is_dark() ? 'Light' : 'Dark';
+  $('theme').setAttribute('aria-label', is_dark() ? 'Light colours' : 'Dark colours');
   redraw();
 };
 $('theme').addEventListener('click', () => {

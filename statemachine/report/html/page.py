@@ -16,15 +16,18 @@ from ...compare import Comparison, Series, Witness, default_tip, series
 from ...page import Page, Verdict
 from ...traces import Trace
 from . import sections
+from .between import own_series, shown_series
 from .budget import Budget
+from .commanded import commanded
 from .curves import curves_section
-from .finding import headline, in_words, leading
+from .finding import Finding, headline, in_words, leading, subject
 from .geometry import packed
 from .markup import Html, data_of, escaped, joined, kept, tag
+from .pressing import pressing_words
 from .scene import Look, scene_of
 from .sketch import sketch
 from .stage import quantity_data, stage
-from .timeline import Frames, events_of, frames_of
+from .timeline import events_of, frames_of
 
 if TYPE_CHECKING:
     from ...compare.why import Attribution
@@ -107,37 +110,48 @@ def _report(
     curves = series(one, two, tip)
     drawn = [curve for curve in curves if np.isfinite(curve.difference).all()]
     events = events_of(comparison, one, two)
+    own = own_series(one, two, tip)
     frames = frames_of(one, two, _moments(comparison), budget.frames(one, two))
-    scene = scene_of(one, two, frames, looks, site, budget)
-    start = _start(comparison, frames)
-    text = headline(comparison, events, attribution)
+    at_frames = shown_series(one, two, frames, tip, drawn)
+    of = subject(comparison, attribution)
+    start = int(np.argmin(np.abs(frames.time - (of.at if of is not None else 0.0))))
+    scene = scene_of(one, two, frames, looks, site, budget, start)
+    finding = headline(comparison, events, attribution, curves)
     labels = comparison.one.label, comparison.two.label
     if labels[0] == labels[1]:
         labels = f"{labels[0]} (first)", f"{labels[1]} (second)"
-    words = in_words(comparison, events, attribution)
+    never, pressed = pressing_words(comparison, (one, two))
+    words = [*in_words(comparison, events, attribution), *pressed]
     data = {
         "time": packed(frames.time, "f8"),
-        "compared": packed(drawn[0].time[frames.compared], "f8"),
+        "between": packed(frames.share > 0, "u1"),
+        "other": labels[1],
         "until": comparison.until,
         "start": start,
-        "quantities": [quantity_data(c, comparison, frames) for c in drawn],
+        "quantities": [quantity_data(c, comparison) for c in at_frames],
         "lead": _lead(comparison, drawn),
         "scene": scene.data,
     }
     still = sketch(scene, one, two, frames, start, labels)
+    steps: Html | None = None
     parts: list[object] = [
-        _head(comparison, one, labels, text, words),
-        stage(comparison, drawn, events, frames, start, labels, still),
+        _head(comparison, one, labels, finding, never, words, commanded(one, two, labels)),
+        stage(comparison, drawn, events, frames, start, labels, still, site, scene.strongest),
     ]
     if attribution is not None:
-        parts.append(_section("why", "What causes it", sections.attribution_section(attribution)))
+        from .causes import agreement_steps, causes_section
+
+        parts.append(_section("why", "What causes it", causes_section(attribution)))
+        steps = agreement_steps(attribution)
     elif why_not:
         parts.append(_section("why", "What causes it", tag("p", why_not)))
     parts += [
         _section(
             "curves",
             "How far apart, over time",
-            curves_section(comparison, drawn, labels, budget.points(len(drawn))),
+            curves_section(
+                comparison, drawn, own, labels, budget.points(len(drawn)), _energy_by(one, two)
+            ),
         ),
         _section(
             "figures",
@@ -147,11 +161,14 @@ def _report(
         ),
         _section("events", "What happens when", sections.events_table(events, comparison)),
     ]
-    if models is not None:
-        parts.append(_section("models", "What each engine makes of the model", _models(models)))
     emulated = sections.emulated(comparison)
+    if models is not None:
+        made = _models(models, emulated is not None)
+        parts.append(_section("models", "What each engine makes of the model", made))
     if emulated is not None:
         parts.append(_section("emulated", "What is emulated", emulated))
+    if steps is not None:
+        parts.append(_section("agree", "To make them agree", steps))
     notes = [_sentence(line) for line in (*said, *comparison.notes, *scene.notes)]
     parts.append(
         _section(
@@ -175,7 +192,7 @@ def _report(
             ),
         )
     )
-    return _assembled(text, body, data)
+    return _assembled(finding.lead, body, data)
 
 
 def _moments(comparison: Comparison) -> tuple[float, ...]:
@@ -185,22 +202,20 @@ def _moments(comparison: Comparison) -> tuple[float, ...]:
     return tuple(sorted(times))
 
 
-def _start(comparison: Comparison, frames: Frames) -> int:
-    """The moment to open the page at: where the leading quantity is farthest apart."""
-    subject = leading(comparison)
-    at = subject.at if subject is not None else 0.0
-    return int(np.argmin(np.abs(frames.time - at)))
-
-
 def _head(
-    comparison: Comparison, one: Trace, labels: tuple[str, str], text: str, words: Sequence[str]
+    comparison: Comparison,
+    one: Trace,
+    labels: tuple[str, str],
+    finding: Finding,
+    never: Sequence[str],
+    words: Sequence[str],
+    command: Html | None,
 ) -> Html:
     says = one.header.says
     shown = (
         f"{comparison.until:g} s on {labels[0]}, below as a solid arm, and on {labels[1]}, as a "
         "ghost over it."
     )
-    finding, _, cause = text.partition(". ")
     return tag(
         "header",
         tag(
@@ -209,30 +224,46 @@ def _head(
             tag("span", tag("i", class_="key one"), labels[0], class_="side"),
             tag("span", "against", class_="against"),
             tag("span", tag("i", class_="key two"), labels[1], class_="side"),
-            tag("button", "Dark", id="theme", type="button", aria_pressed="false", hidden=True,
+            tag("button", "Dark", id="theme", type="button", hidden=True,
                 aria_label="Dark colours"),
             class_="kicker",
         ),
         tag(
             "h1",
-            kept(f"{finding}."),
-            tag("span", kept(f" {cause}."), class_="cause") if cause else None,
+            kept(f"{finding.lead}."),
+            *(tag("span", kept(f" {each}"), class_="cause") for each in finding.causes),
+            tag("span", kept(f" {finding.end}"), class_="cause end") if finding.end else None,
             id="finding",
             tabindex="-1",
         ),
         tag("p", f"{says} " if says else "", kept(shown), class_="says"),
-        *(tag("p", kept(line)) for line in words),
+        *(tag("p", kept(line)) for line in never),
+        tag("div", command, *(tag("p", kept(line)) for line in words), class_="words"),
     )  # fmt: skip
 
 
-def _models(page: Page) -> Html:
+def _energy_by(one: Trace, two: Trace) -> str:
+    """By what the energies of both sides were computed."""
+    by = [trace.header.energy_by or trace.header.backend for trace in (one, two)]
+    masses = "from the masses, the armature and the gravity of the model"
+    if by[0] == by[1]:
+        return f"For both sides computed by {by[0]}, {masses}."
+    return f"Computed by {by[0]} and by {by[1]}, {masses}."
+
+
+def _models(page: Page, emulated: bool) -> Html:
     """The verdict, and what it is of on demand."""
     verdicts = [block for block in page.blocks if isinstance(block, Verdict)]
     rest = [block for block in page.blocks if not isinstance(block, Verdict)]
+    link = None
+    if emulated:
+        link = joined(
+            (" What the backends then do about it for the runs above is in ",
+             tag("a", "What is emulated", href="#emulated"), ".")
+        )  # fmt: skip
     return joined(
         (
-            tag("p", "Before anything moves. What the backends then do about it for the runs above "
-                "is in ", tag("a", "What is emulated", href="#emulated"), "."),
+            tag("p", "Before anything moves.", link),
             sections.from_page(Page("", "", verdicts)),
             tag("details", tag("summary", page.title), sections.from_page(Page("", "", rest))),
         )

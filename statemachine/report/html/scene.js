@@ -21,6 +21,8 @@ const decoded = (scene, frames) => scene.sides.map((side) => {
     first,
     at: side.contacts.at ? numbers(side.contacts.at, Float32Array) : new Float32Array(0),
     tip: side.tip ? numbers(side.tip, Float32Array) : null,
+    way: side.way ? numbers(side.way, Float32Array) : null,
+    behind: side.behind ? numbers(side.behind, Uint16Array) : null,
     place(row, body) {
       const k = row * side.bodies + body;
       return [0, 1, 2].map((i) => scene.low[i] + scene.span[i] * pos[3 * k + i] / 65535);
@@ -95,7 +97,7 @@ class Scene {
 
   approach() {
     this.near = true;
-    this.distance = 0.55 * this.data.extent;
+    this.distance = this.data.near;
   }
 
   build() {
@@ -117,7 +119,7 @@ class Scene {
     gl.enableVertexAttribArray(this.floor.attribute('corner'));
     gl.vertexAttribPointer(this.floor.attribute('corner'), 2, gl.FLOAT, false, 0, 0);
     this.nothing = gl.createVertexArray();
-    this.ways = this.sides.map((side) => side.tip && this.way(side.tip));
+    this.ways = this.sides.map((side) => side.way && this.way(side.way));
     this.layers = null;
   }
 
@@ -235,7 +237,7 @@ class Scene {
     if (this.data.floor !== null) this.draw_floor(ink);
     if (this.show.solid) this.draw_outline(0, ink.map((v, k) => 0.5 * v + 0.5 * this.hues[0][k]), 0, 0.7);
     if (this.show.trails) this.draw_ways();
-    if (this.show.ghost) this.draw_outline(1, this.hues[1], 0.26, 1);
+    if (this.show.ghost) this.draw_outline(1, this.hues[1], 0.42, 1);
     if (this.show.marks) this.draw_contacts();
   }
 
@@ -306,7 +308,7 @@ class Scene {
     gl.bindTexture(gl.TEXTURE_2D, this.layers[0].texture);
     gl.uniform1i(over.at('solid'), 1);
     gl.uniform1f(over.at('through'), side && this.show.solid ? 0.3 : 1);
-    const wide = side ? 0.75 * this.sharp : 0.5 * this.sharp;
+    const wide = side ? 1.1 * this.sharp : 0.5 * this.sharp;
     gl.uniform2f(over.at('pixel'), wide / this.canvas.width, wide / this.canvas.height);
     gl.uniform3fv(over.at('colour'), colour);
     gl.uniform1f(over.at('fill'), fill);
@@ -326,10 +328,11 @@ class Scene {
     gl.uniform2f(made.at('screen'), this.canvas.width / 2, this.canvas.height / 2);
     gl.disable(gl.DEPTH_TEST);
     this.ways.forEach((way, side) => {
-      if (!way || this.frames < 2 || !this.show[side ? 'ghost' : 'solid']) return;
+      if (!way || !this.show[side ? 'ghost' : 'solid']) return;
       gl.bindVertexArray(way);
       gl.uniform1i(made.at('dash'), side ? 4 : 0);
-      for (const [count, strength, wide] of [[this.frames - 1, 0.35, 0.6], [this.row, 1, 1]]) {
+      for (const [count, strength, wide] of [
+        [this.sides[side].way.length / 3 - 1, 0.35, 0.6], [this.sides[side].behind[this.row], 1, 1]]) {
         gl.uniform1f(made.at('wide'), wide * this.sharp);
         gl.uniform4f(made.at('colour'), ...this.hues[side], strength);
         if (count) gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, count);
@@ -338,7 +341,7 @@ class Scene {
     gl.enable(gl.DEPTH_TEST);
   }
 
-  // An arrow from each contact along the force there; its length grows with the root of it.
+  // An arrow from each contact along the force there; its length is as its root.
   draw_contacts() {
     const gl = this.gl, made = this.solid.use();
     gl.uniformMatrix4fv(made.at('view'), false, this.view);
@@ -348,7 +351,7 @@ class Scene {
     gl.uniform3fv(made.at('up'), this.up);
     gl.clear(gl.DEPTH_BUFFER_BIT);
     gl.bindVertexArray(this.arrow.array);
-    const extent = this.near ? 0.35 * this.distance : this.data.extent;
+    const extent = this.near ? 0.7 * this.distance : this.data.extent;
     this.sides.forEach((run, side) => {
       if (!this.show[side ? 'ghost' : 'solid']) return;
       gl.uniform3fv(made.at('colour'), this.hues[side].map((v) => 1.05 * v));
@@ -356,7 +359,7 @@ class Scene {
         const at = run.at.subarray(6 * k, 6 * k + 3), force = run.at.subarray(6 * k + 3, 6 * k + 6);
         const strength = size(force);
         if (!strength) continue;
-        const long = extent * (0.06 + 0.34 * Math.sqrt(strength / this.most));
+        const long = extent * 0.4 * Math.sqrt(strength / this.most);
         const vector = unit(force).map((v) => v * long);
         gl.uniformMatrix4fv(made.at('pose'), false, along(at, vector, 0.008 * extent));
         gl.drawElements(gl.TRIANGLES, this.arrow.count, this.arrow.kind, 0);

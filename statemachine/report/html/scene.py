@@ -17,6 +17,9 @@ from .timeline import Frames
 
 _FAR = 8.0  # extents of the model beyond which nothing is drawn
 OPENING = 0.6  # of the camera from top to bottom [rad]
+_WAY = 2000  # points of the way of a site
+_DASH = 0.0015  # m between these
+_CLOSE = 0.05  # of the scene: a gap below it is looked at from near
 ASPECT = 1.45  # width of the picture through its height
 
 
@@ -43,6 +46,7 @@ class Scene:
         poses: For each side (n, nbody, 3) positions at the moments shown.
         tips: For each side (n, 3), or None.
         camera: target (3,), distance [m], azimuth and elevation [rad].
+        strongest: The largest contact force that is drawn [N].
     """
 
     data: dict[str, Any] | None
@@ -50,10 +54,17 @@ class Scene:
     poses: tuple[Array, Array] | None = None
     tips: tuple[Array, Array] | None = None
     camera: tuple[Array, float, float, float] | None = None
+    strongest: float = 0.0
 
 
 def scene_of(
-    one: Trace, two: Trace, frames: Frames, looks: Sequence[Look], tip: str, budget: Budget
+    one: Trace,
+    two: Trace,
+    frames: Frames,
+    looks: Sequence[Look],
+    tip: str,
+    budget: Budget,
+    start: int = 0,
 ) -> Scene:
     """Both runs at the moments that are shown.
 
@@ -64,6 +75,7 @@ def scene_of(
         looks: What each side is drawn as; the same object twice if both are of one model.
         tip: The site whose way is drawn; "" for none.
         budget: How much detail there may be.
+        start: The moment that the page opens at, among the frames.
     """
     traces = (one, two)
     if any("xpos" not in t or "xquat" not in t for t in traces):
@@ -97,9 +109,12 @@ def scene_of(
     tips = _tips(one, two, frames, tip)
     camera = _camera([pos for pos, _ in poses], tips, extent)
     sides = []
+    strongest = 0.0
     few = max(2, budget.contacts // len(frames))
     for k, (trace, (pos, quat)) in enumerate(zip(traces, poses, strict=True)):
         rows = frames.one if k == 0 else frames.two
+        contacts, most_of_side = _contacts(trace, rows, few)
+        strongest = max(strongest, most_of_side)
         sides.append(
             {
                 "mesh": 0 if shared else k,
@@ -107,25 +122,37 @@ def scene_of(
                 "pos": packed(quantised(_held(pos), low, span), "u2"),
                 "quat": packed(np.round(np.clip(quat, -1, 1) * 32767), "i2"),
                 "tip": packed(tips[k], "f4") if tips else "",
-                "contacts": _contacts(trace, rows, few),
+                "contacts": contacts,
+                **_way(trace, tip, float(frames.time[-1]), frames.time),
             }
         )
     if any(_most_at_once(trace) > few for trace in traces):
         notes.append(f"Of the contacts of a moment the {few} strongest are drawn.")
-    if any("contact_row" in trace and len(trace["contact_row"]) for trace in traces):
-        notes.append("The arrow of a contact grows with the square root of its force.")
     target, distance, azimuth, elevation = camera
     data = {
         "moving": [int(_moves(one, two, body)) for body in range(len(two.header.bodies))],
         "low": low.tolist(),
         "span": span.tolist(),
         "extent": extent,
+        **_nearness(tips, start, extent),
         "floor": _floor(drawings),
         "camera": [*target.tolist(), distance, azimuth, elevation],
         "meshes": [mesh_as_data(mesh) for mesh in meshes],
         "sides": sides,
     }
-    return Scene(data, tuple(notes), (poses[0][0], poses[1][0]), tips, camera)
+    return Scene(data, tuple(notes), (poses[0][0], poses[1][0]), tips, camera, strongest)
+
+
+def _nearness(tips: tuple[Array, Array] | None, start: int, extent: float) -> dict[str, Any]:
+    """Whether to begin close to the site, and how close: so that a small gap is seen."""
+    if tips is None:
+        return {"begin_near": False, "near": 0.55 * extent}
+    gap = float(np.linalg.norm(tips[0] - tips[1], axis=1).max())
+    now = float(np.linalg.norm(tips[0][start] - tips[1][start]))
+    return {
+        "begin_near": bool(0 < gap < _CLOSE * extent),
+        "near": float(np.clip(25 * now, 0.4 * extent, 0.55 * extent)),
+    }
 
 
 def _drawings(traces: Sequence[Trace], looks: Sequence[Look]) -> tuple[list[str], list[Drawing]]:
@@ -156,7 +183,7 @@ def _poses(trace: Trace, rows: Any, share: Array | None) -> tuple[Array, Array]:
         after = np.minimum(rows + 1, len(trace) - 1)
         part = share[:, None, None]
         pos += part * (trace["xpos"][after] - pos)
-        quat = _slerp(quat, _unit(trace["xquat"][after]), part)
+        quat = slerp(quat, _unit(trace["xquat"][after]), part)
     return pos, quat
 
 
@@ -166,7 +193,7 @@ def _unit(quat: Array) -> Array:
     return np.where(length > 0, quat / np.where(length > 0, length, 1.0), [1.0, 0.0, 0.0, 0.0])
 
 
-def _slerp(one: Array, two: Array, share: Array) -> Array:
+def slerp(one: Array, two: Array, share: Array) -> Array:
     """Rotations between two, along the shorter way (Shoemake 1985)."""
     cosine = (one * two).sum(axis=-1, keepdims=True)
     two, cosine = np.where(cosine < 0, -two, two), np.abs(cosine)
@@ -197,10 +224,34 @@ def _tips(one: Trace, two: Trace, frames: Frames, tip: str) -> tuple[Array, Arra
     return ways if all(np.isfinite(way).all() for way in ways) else None
 
 
-def _contacts(trace: Trace, rows: Any, most: int) -> dict[str, str]:
-    """Where contacts are at each moment, the strongest first, and the force on the second [N]."""
+def _way(trace: Trace, tip: str, until: float, shown: Array) -> dict[str, str]:
+    """The way of a site at the rows that its own side has, and how much of it lies behind."""
+    if not tip or "site_xpos" not in trace or tip not in trace.header.sites:
+        return {"way": "", "behind": ""}
+    elapsed = trace.time - trace.time[0]
+    rows = np.flatnonzero(elapsed <= until + 1e-9)
+    rows = np.unique([*rows[:: -(-len(rows) // _WAY)], rows[-1]])
+    way = trace.site(tip)[0][rows]
+    if len(rows) < 2 or not np.isfinite(way).all():
+        return {"way": "", "behind": ""}
+    # Points as far apart on the way as each other, so that its dashes are as long.
+    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1)))
+    along += 1e-9 * np.arange(len(along))  # where it stands still, time goes on
+    at = np.linspace(0.0, along[-1], int(np.clip(along[-1] / _DASH, 2, _WAY)))
+    way = np.column_stack([np.interp(at, along, axis) for axis in way.T])
+    when = np.interp(at, along, elapsed[rows])
+    behind = np.clip(np.searchsorted(when, shown + 1e-9, side="right") - 1, 0, len(at) - 1)
+    return {"way": packed(way, "f4"), "behind": packed(behind, "u2")}
+
+
+def _contacts(trace: Trace, rows: Any, most: int) -> tuple[dict[str, str], float]:
+    """Where contacts are at each moment, the strongest first, and the force on the second [N].
+
+    Returns:
+        These, and the largest of the forces.
+    """
     if "contact_row" not in trace:
-        return {"count": "", "at": ""}
+        return {"count": "", "at": ""}, 0.0
     start = np.searchsorted(trace["contact_row"], rows)
     end = np.searchsorted(trace["contact_row"], rows, side="right")
     strength = np.linalg.norm(np.nan_to_num(trace["contact_force"]), axis=1)
@@ -214,7 +265,8 @@ def _contacts(trace: Trace, rows: Any, most: int) -> dict[str, str]:
     axes = trace["contact_frame"][chosen].reshape(-1, 3, 3)
     force = np.einsum("cij,ci->cj", axes, trace["contact_force"][chosen])
     where = np.nan_to_num(np.hstack([trace["contact_pos"][chosen], force]))
-    return {"count": packed(counts, "u1"), "at": packed(where, "f4")}
+    largest = float(np.linalg.norm(where[:, 3:], axis=1).max(initial=0.0))
+    return {"count": packed(counts, "u1"), "at": packed(where, "f4")}, largest
 
 
 def _most_at_once(trace: Trace) -> int:

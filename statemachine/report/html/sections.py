@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from ...compare import Agreement, Comparison, Witness
 from ...page import Code, Page, Printed, Table, Text, Verdict
 from ...traces import Header
 from ..figures_of import quantity, short_time
-from .finding import capital, title
-from .markup import Html, joined, tag
+from .finding import capital, coarsely, name_of, window
+from .markup import Html, joined, kept, tag
 from .timeline import Event
 
-if TYPE_CHECKING:
-    from ...compare.why import Attribution, Trial
-
 _BREAK = Html("\n")
+ROUNDING = 1e-6  # of a tolerance: what is less is shown as nothing
 VERDICTS = {"agrees": ("○", "agrees"), "settles": ("◐", "settles"), "differs": ("●", "differs")}
 
 
@@ -67,7 +64,7 @@ def agreements(comparison: Comparison) -> Html:
         key = quantity(found.tolerance, found.kind), found.reason
         letter = reasons.setdefault(key, _letter(len(reasons)))
         allowed = joined((key[0], tag("sup", tag("a", letter, href=f"#why-{letter}"))))
-        rows.append((found.name, *_figures(found), allowed, verdict_badge(found.verdict)))
+        rows.append((name_of(found.name), verdict_badge(found.verdict), *_figures(found), allowed))
     one, two = comparison.one.label, comparison.two.label
     notes = [
         tag("li", tag("b", letter), f" {value}: {reason}.", id=f"why-{letter}")
@@ -77,16 +74,19 @@ def agreements(comparison: Comparison) -> Html:
         (
             table(
                 f"{one} against {two}: how far apart",
-                ("quantity", "largest", "at", "RMS", "settled", "beyond from", "tolerance",
-                 "verdict"),
+                ("quantity", "verdict", "largest", "at", "RMS", "settled", "beyond from",
+                 "tolerance"),
                 rows,
-                words=(7,),
+                words=(1,),
             ),
             tag(
                 "p",
-                f"Compared at {comparison.moments} moments over {comparison.until:g} s. Settled is "
-                "the mean over the last tenth of them. A quantity agrees if it is within its "
-                "tolerance always, settles if it is so in the end, and differs otherwise.",
+                kept(
+                    f"Compared at {comparison.moments} moments over {comparison.until:g} s. "
+                    f"Settled is the mean over {window(comparison)}. A quantity agrees if it is "
+                    "within its tolerance always, settles if it is so in the end, and differs "
+                    f"otherwise. {coarsely(comparison)}"
+                ),
             ),
             tag("h3", "What does not matter, and why"),
             tag("ul", *notes, class_="reasons"),
@@ -98,20 +98,29 @@ def third_party(found: Witness, labels: tuple[str, str]) -> Html:
     """Where a witness puts the fingertip of each side."""
     return tag(
         "p",
-        f"Two that agree may both be wrong, so {found.by} was asked where {found.site} is in each "
-        f"of the {found.rows} poses: at most {found.one * 1000:.1e} mm from where {labels[0]} has "
-        f"it, and {found.two * 1000:.1e} mm from where {labels[1]} has it.",
+        f"Two that agree may both be wrong. So {found.by} was given the joint angles of all "
+        f"{found.rows} rows and asked where {found.site} then is: at most "
+        f"{found.one * 1000:.0e} mm from where {labels[0]} has it, and {found.two * 1000:.0e} mm "
+        f"from where {labels[1]} has it. That checks where {found.site} is for given joint angles "
+        "(kinematics), not the motion.",
     )
+
+
+def small(value: float, found: Agreement) -> str:
+    """A difference as text; what is a millionth of its tolerance is rounding."""
+    if 0 < abs(value) < ROUNDING * found.tolerance:
+        return "≈ 0"
+    return quantity(value, found.kind)
 
 
 def _figures(found: Agreement) -> tuple[object, ...]:
     if found.kind == "contact":
         return found.note or quantity(found.max, "contact"), go(found.at), "–", "–", "–"
     return (
-        quantity(found.max, found.kind),
+        small(found.max, found),
         go(found.at),
-        quantity(found.rms, found.kind),
-        quantity(found.settled, found.kind),
+        small(found.rms, found),
+        small(found.settled, found),
         "never" if found.since is None else go(found.since),
     )
 
@@ -134,80 +143,10 @@ def events_table(events: Sequence[Event], comparison: Comparison) -> Html:
             where = labels[next(iter(s for s in sides if s is not None))]
         rows.append((go(time), capital(text), where))
     return table(
-        "What happens when; press a time to go there", ("time", "what", "on"), rows, (1, 2)
-    )
-
-
-def attribution_section(found: Attribution) -> Html:
-    """Bars: how much of the gap each factor takes away, all on top of each other and alone."""
-    from ..why import amount, conclusion
-
-    gap = amount(found, found.gap)
-    if not found.alone:
-        return tag(
-            "p",
-            f"Differences below {amount(found, found.negligible)} are taken for rounding: there "
-            "is nothing to explain.",
-        )
-    one = found.names[0]
-    return joined(
-        (
-            tag(
-                "p",
-                f"Both sides were run again, {found.runs} runs in all, with less and less between "
-                f"them. The gap is the largest difference in {found.quantity} at any moment: "
-                f"{gap} as they come. A bar is the part of it that goes when one thing is made "
-                "the same on both sides or, where it is each engine's own doing, left out on both.",
-            ),
-            _trials(
-                f"All of them, one on top of the other: from {gap} to {amount(found, found.left)}",
-                found,
-                found.ladder,
-            ),
-            *(tag("p", line) for line in conclusion(found)),
-            tag("h3", "Each by itself"),
-            _trials(f"One at a time: of the {gap}, what goes", found, found.alone),
-            tag(
-                "p",
-                f"A star: {one} itself then moves otherwise than it did, so the gap is that of "
-                "another motion; a smaller one there is a hint, not a proof. A hatched bar: the "
-                "gap grows.",
-            ),
-            *(
-                tag("p", f"{capital(title(trial.factor))}: {trial.note}.")
-                for trial in found.alone
-                if trial.note
-            ),
-            tag("p", "The order. ", " ".join(found.order)),
-        )
-    )
-
-
-def _trials(caption: str, found: Attribution, trials: Sequence[Trial]) -> Html:
-    from ..why import amount, percent
-
-    rows = []
-    for trial in trials:
-        star = "*" if trial.moved and trial.worst is not None and trial.way != "none" else ""
-        did = trial.did or "–"
-        if trial.way == "parity":
-            had = trial.had if trial.did == f"as {found.names[0]}" else trial.had[::-1]
-            did = f"{had[1]} → {had[0]}"
-        bar = _bar(trial.explains, percent(trial.explains).replace("-", "−") + star)
-        rows.append((capital(title(trial.factor)), bar, amount(found, trial.worst), did))
-    return table(caption, ("what", "explains", "gap left", "brought to"), rows, words=(1, 3))
-
-
-def _bar(share: float | None, text: str) -> Html:
-    if share is None:
-        return tag("span", text, class_="percent")
-    length = 100 * min(1.0, abs(share))
-    look = "bar more" if share < 0 else "bar"
-    return tag(
-        "span",
-        tag("span", tag("i", style=f"width:{length:.1f}%"), class_=look, aria_hidden="true"),
-        tag("span", text, class_="percent"),
-        class_="measure",
+        "First touches, partings, largest differences; press a time to go there",
+        ("time", "what", "on"),
+        rows,
+        (1, 2),
     )
 
 
@@ -232,19 +171,42 @@ def from_page(page: Page) -> Html:
     return joined(parts)
 
 
+# Of the promises that a backend may emulate, those that move the arm, in plain words.
+PHYSICS = {
+    "position servo": "the servos, with the gains of the model",
+    "armature": "the inertia of the rotors, as the joints feel it (armature)",
+    "joint damping": "the damping of the joints",
+    "dry friction": "the dry friction of the joints",
+    "joint limits": "the limits of the joints",
+}
+
+
 def emulated(comparison: Comparison) -> Html | None:
     """What of the model a backend keeps instead of its engine."""
     parts = []
+    labels = set()
     for side in (comparison.one, comparison.two):
         kept = side.provenance.emulated
-        if kept and side.defaults == "model" and not any(side.label in str(part) for part in parts):
+        if not kept or side.defaults != "model" or side.label in labels:
+            continue
+        labels.add(side.label)
+        moving = [PHYSICS[name] for name in kept if name in PHYSICS]
+        rest = [name for name in kept if name not in PHYSICS]
+        said = "What the model asks for and the engine lacks is computed around it"
+        if moving:
+            parts.append(tag("p", tag("b", side.label), f". {said}, and moves the arm:"))
+            parts.append(tag("ul", *(tag("li", each) for each in moving)))
+        if rest:
             parts.append(
                 tag(
-                    "p",
-                    tag("b", side.label),
-                    ": what the model asks for and the engine lacks is done around it: ",
-                    ", ".join(kept),
-                    ".",
+                    "details",
+                    tag("summary", f"What else is kept around {side.label}"),
+                    tag(
+                        "p",
+                        "Promises of this library, and conventions of its states and forces: ",
+                        "; ".join(rest),
+                        ".",
+                    ),
                 )
             )
     if not parts:

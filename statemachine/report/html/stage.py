@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ...compare import Comparison, Series
-from ..figures_of import scale_of, short_time
+from ..figures_of import figure, scale_of, short_time
 from .charts import time_axis
+from .finding import name_of
 from .geometry import packed
-from .markup import Html, joined, tag
+from .markup import Html, joined, kept, tag
 from .timeline import Event, Frames
 
 
@@ -24,14 +26,28 @@ def stage(
     start: int,
     labels: tuple[str, str],
     still: Html,
+    tip: str,
+    strongest: float,
 ) -> Html:
-    """The scene, what the figures are at its moment, the slider and the lanes under it."""
+    """The scene, what the figures are at its moment, the slider and the lanes under it.
+
+    Args:
+        comparison: What was found.
+        curves: What the lanes are of.
+        events: First touches are marked.
+        frames: What the slider goes over.
+        start: The moment to open at, among the frames.
+        labels: What the sides are called.
+        still: The drawing that needs no script.
+        tip: The site whose way is drawn; "" for none.
+        strongest: The largest force of an arrow [N]; 0 if there are no contacts.
+    """
     now = float(frames.time[start])
     toggles = [
         ("solid", f"{labels[0]}, solid", "one"),
         ("ghost", f"{labels[1]}, ghost", "two"),
         ("marks", "contacts, with their forces", ""),
-        ("trails", "way of the fingertip", ""),
+        ("trails", f"way of {tip_name(tip)}", ""),
     ]
     checks = [
         tag(
@@ -44,7 +60,7 @@ def stage(
     ]
     buttons = [
         ("all", "Whole", "Whole arm"),
-        ("near", "Fingertip", "Close to the fingertip"),
+        ("near", "Close", f"Close to {tip_name(tip)}"),
         ("in", "+", "Nearer"),
         ("out", "−", "Farther"),
     ]
@@ -77,9 +93,20 @@ def stage(
             hidden=True,
             id="speeds",
         ),
-        tag("div", *checks, class_="checks", id="checks", hidden=True),
         class_="transport",
     )  # fmt: skip
+    looks = tag(
+        "div",
+        tag("div", *checks, class_="checks", id="checks", hidden=True),
+        tag(
+            "p",
+            kept(_arrows(strongest)) if strongest else "",
+            class_="foot",
+            id="arrows",
+            hidden=True,
+        ),
+        class_="looks",
+    )
     slider = tag(
         "input",
         type="range",
@@ -96,13 +123,25 @@ def stage(
     return tag(
         "section",
         tag("h2", "Both runs, moment by moment", id="stage-heading"),
-        tag("div", tag("div", canvas, transport, class_="left"), _readout(comparison),
+        tag("div", tag("div", canvas, transport, looks, class_="left"), _readout(comparison),
             class_="pair"),
-        tag("div", _lanes(comparison, curves, events, slider), class_="lanes"),
+        tag("div", _lanes(comparison, curves, events, slider, labels), class_="lanes"),
         id="stage",
         aria_labelledby="stage-heading",
         style=f"--start:{share:.6f}",
     )  # fmt: skip
+
+
+def tip_name(tip: str) -> str:
+    """The site that is followed, as it is called in the model."""
+    return "gripperframe (tool frame)" if tip == "gripperframe" else tip or "a site"
+
+
+def _arrows(strongest: float) -> str:
+    return (
+        "Arrows: contact forces, each as long as the root of its force; the longest of the run is "
+        f"{figure(strongest)} N."
+    )
 
 
 def _readout(comparison: Comparison) -> Html:
@@ -127,23 +166,29 @@ def _readout(comparison: Comparison) -> Html:
 
 
 def _lanes(
-    comparison: Comparison, curves: Sequence[Series], events: Sequence[Event], slider: Html
+    comparison: Comparison,
+    curves: Sequence[Series],
+    events: Sequence[Event],
+    slider: Html,
+    labels: tuple[str, str],
 ) -> Html:
     """For each quantity when it is beyond its tolerance, under the slider and as wide."""
     until = comparison.until or 1.0
-    marks = [
-        tag(
-            "i",
-            class_=f"mark {'one' if event.side == 0 else 'two'}",
-            title=event.text,
-            style=f"left:{100 * event.time / until:.2f}%",
-        )
-        for event in events
-        if event.kind == "touch" and event.side is not None
-    ]
     rows = [_lane("time", slider, "slide")]
-    if marks:
-        rows.append(_lane("first touches", joined(marks), "touches"))
+    short = comparison.one.backend, comparison.two.backend
+    if short[0] == short[1]:
+        short = labels
+    for side, look in enumerate(("one", "two")):
+        marks = [
+            tag("i", class_=f"mark {look}", title=event.text,
+                style=f"left:{100 * event.time / until:.2f}%")
+            for event in events
+            if event.kind == "touch" and event.side == side
+        ]  # fmt: skip
+        if marks:
+            key = tag("i", class_=f"mark key-of {look}")
+            name = joined(("first touches, ", short[side], " ", key))
+            rows.append(_lane(name, joined(marks), "touches"))
     beyond = [(curve, _beyond(curve, comparison)) for curve in curves]
     beyond = sorted(((c, s) for c, s in beyond if s), key=lambda pair: pair[1][0][0])
     for curve, spans in beyond:
@@ -155,14 +200,15 @@ def _lanes(
             )
             for a, b in spans
         ]
-        rows.append(_lane(curve.name, joined(bars), "quantity"))
+        rows.append(_lane(name_of(curve.name), joined(bars), "quantity"))
     within = len(curves) - len(beyond)
     said = "Bars: beyond tolerance." if beyond else "No quantity leaves its tolerance."
     if beyond and within:
         said += f" {within} more never {'are' if within > 1 else 'is'}."
     rows.append(_lane("", time_axis(until), "axis"))
     spoken = "; ".join(
-        f"{curve.name} from {short_time(spans[0][0])}, {sum(b - a for a, b in spans):.3g} s in all"
+        f"{name_of(curve.name)} from {short_time(spans[0][0])}, "
+        f"{sum(b - a for a, b in spans):.3g} s in all"
         for curve, spans in beyond
     )
     return joined(
@@ -177,7 +223,7 @@ def _lanes(
 def _lane(name: str, content: Html, look: str) -> Html:
     return tag(
         "div",
-        tag("span", name, class_="lane-name", title=name),
+        tag("span", name, class_="lane-name", title=re.sub(r"<[^>]*>", "", name)),
         tag("div", content, tag("i", class_="cursor") if look != "axis" else None, class_="track"),
         class_=f"lane {look}",
     )
@@ -196,20 +242,19 @@ def _beyond(curve: Series, comparison: Comparison) -> list[list[float]]:
     return _few(spans)
 
 
-def quantity_data(curve: Series, comparison: Comparison, frames: Frames) -> dict[str, Any]:
-    """What the script shows of a quantity at a moment, and when it is beyond."""
+def quantity_data(curve: Series, comparison: Comparison) -> dict[str, Any]:
+    """What the script shows of a quantity at each moment shown, and when it is beyond."""
     found = next(each for each in comparison.agreements if each.name == curve.name)
     scale, unit = scale_of(curve.kind)
-    rows = frames.compared
     data: dict[str, Any] = {
-        "name": curve.name,
-        "unit": unit,
+        "name": name_of(curve.name),
+        "unit": unit.replace(" ", "\u00a0"),
         "tolerance": found.tolerance * scale,
-        "apart": packed(curve.difference[rows] * scale, "f4"),
+        "apart": packed(curve.difference * scale, "f4"),
     }
     if curve.one.ndim == 1 and curve.one.size:
-        data["one"] = packed(curve.one[rows] * scale, "f4")
-        data["two"] = packed(curve.two[rows] * scale, "f4")
+        data["one"] = packed(curve.one * scale, "f4")
+        data["two"] = packed(curve.two * scale, "f4")
     return data
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -118,12 +119,12 @@ def events_of(comparison: Comparison, one: Trace, two: Trace) -> list[Event]:
         if agreement.kind == "contact":
             continue
         if agreement.since is not None:
-            since.setdefault(agreement.since, []).append(agreement.name)
-            largest.setdefault(agreement.at, []).append(agreement.name)
+            since.setdefault(agreement.since, []).append(agreement.name.replace(", ", " "))
+            largest.setdefault(agreement.at, []).append(agreement.name.replace(", ", " "))
     for time, names in since.items():
-        found.append(Event(time, "part", f"beyond tolerance from here: {', '.join(names)}", None))
+        found.append(Event(time, "part", f"beyond tolerance from here: {'; '.join(names)}", None))
     for time, names in largest.items():
-        found.append(Event(time, "largest", f"largest difference: {', '.join(names)}", None))
+        found.append(Event(time, "largest", f"largest difference: {'; '.join(names)}", None))
     for side, (trace, has) in enumerate(
         zip((one, two), (comparison.one, comparison.two), strict=True)
     ):
@@ -143,14 +144,26 @@ def _touches(trace: Trace, until: float) -> dict[tuple[int, int], tuple[float, s
         trace["contact_row"].tolist(), trace["contact_geom"].tolist(), strict=True
     ):
         bodies = [header.geom_bodyid[geom] for geom in geoms]
-        order = sorted(range(2), key=lambda k: -bodies[k])  # what hangs further out comes first
-        pair = bodies[order[1]], bodies[order[0]]
+        pair = min(bodies), max(bodies)
         time = float(trace.time[row] - trace.time[0])
         if pair in found or time > until + 1e-9:
             continue
-        names = [_name(trace, geoms[k], bodies[k]) for k in order]
-        found[pair] = time, f"{names[0]} on {names[1]}"
+        found[pair] = time, _pair(trace, geoms)
     return found
+
+
+def touching(trace: Trace) -> dict[tuple[int, int], str]:
+    """What each pair of geoms that touches is called, as "gripper on floor"."""
+    found: dict[tuple[int, int], str] = {}
+    for one, two in np.unique(trace["contact_geom"], axis=0).tolist():
+        found[one, two] = _pair(trace, (one, two))
+    return found
+
+
+def _pair(trace: Trace, geoms: Sequence[int]) -> str:
+    bodies = [trace.header.geom_bodyid[geom] for geom in geoms]
+    order = sorted(range(2), key=lambda k: -bodies[k])  # what hangs further out comes first
+    return " on ".join(_name(trace, geoms[k], bodies[k]) for k in order)
 
 
 def _name(trace: Trace, geom: int, body: int) -> str:

@@ -1,0 +1,89 @@
+"""Both sides at the moments that are shown: figures of the same moments as the picture."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...compare import Series, series
+from ...records import Array, Ints, JointType
+from ...traces import Trace
+from .scene import slerp
+from .timeline import Frames
+
+
+def shown_series(
+    one: Trace, two: Trace, frames: Frames, tip: str | None, curves: list[Series]
+) -> list[Series]:
+    """The curves at the moments shown; where two has no row then, between two of its rows."""
+    if len(frames) < 2:
+        return curves
+    sides = (
+        resampled(one, frames.time, frames.one, np.zeros(len(frames))),
+        resampled(two, frames.time, frames.two, frames.share),
+    )
+    by_name = {curve.name: curve for curve in series(*sides, tip)}
+    none = np.zeros(len(frames))
+    return [
+        # A force that is at none of these moments has no curve among them.
+        by_name.get(curve.name, Series(curve.name, curve.kind, frames.time, none, none, none))
+        for curve in curves
+    ]
+
+
+def resampled(trace: Trace, time: Array, rows: Ints, share: Array) -> Trace:
+    """A trace at other moments.
+
+    Args:
+        trace: What was recorded.
+        time: (n,) the moments since its start [s].
+        rows: (n,) its last row at or before each.
+        share: (n,) how far to go from there to the next, 0 to 1.
+
+    Returns:
+        Positions, poses of sites and energies in between; contacts of the row before.
+    """
+    after = np.minimum(rows + 1, len(trace) - 1)
+
+    def between(values: Array) -> Array:
+        part = share.reshape(-1, *([1] * (values.ndim - 1)))
+        return np.where(part > 0, (1 - part) * values[rows] + part * values[after], values[rows])
+
+    columns: dict[str, Any] = {
+        name: between(trace.columns[name])
+        for name in ("qpos", "qvel", "site_xpos", "energy")
+        if name in trace
+    }
+    columns |= {"time": time + 0.0, "ctrl": trace.ctrl[rows]}
+    header = trace.header
+    for kind, start in zip(header.jnt_type, header.jnt_qposadr, strict=True):
+        if JointType(kind) in (JointType.FREE, JointType.BALL):
+            first = start + (3 if JointType(kind) is JointType.FREE else 0)
+            turned = trace.qpos[:, first : first + 4]
+            columns["qpos"][:, first : first + 4] = slerp(
+                turned[rows], turned[after], share[:, None]
+            )
+    if "site_xmat" in trace:
+        matrices = between(trace["site_xmat"]).reshape(len(rows), -1, 3, 3)
+        some = share > 0
+        if some.any():  # the nearest rotation to the mean of two
+            u, _, v = np.linalg.svd(np.nan_to_num(matrices[some]))
+            matrices[some] = u @ v
+        columns["site_xmat"] = matrices.reshape(len(rows), -1, 9)
+    if "contact_row" in trace:
+        start = np.searchsorted(trace["contact_row"], rows)
+        end = np.searchsorted(trace["contact_row"], rows, side="right")
+        count = end - start
+        picked = np.repeat(start - np.cumsum(count) + count, count) + np.arange(count.sum())
+        columns["contact_row"] = np.repeat(np.arange(len(rows)), count)
+        for name in trace.columns:
+            if name.startswith("contact_") and name != "contact_row":
+                columns[name] = trace.columns[name][picked]
+    return Trace(header, columns)
+
+
+def own_series(one: Trace, two: Trace, tip: str | None) -> dict[str, tuple[Series, Series]]:
+    """Each side's curves at all of its own rows, by name; of what both have."""
+    sides = [{curve.name: curve for curve in series(trace, trace, tip)} for trace in (one, two)]
+    return {name: (sides[0][name], sides[1][name]) for name in sides[0] if name in sides[1]}
