@@ -412,7 +412,9 @@ def test_who_presses_on_what(hold: Made) -> None:
     never, said = pressing_words(compare(one, bare), (one, bare))
     assert never == ["On pybullet gripper never touches floor in this run."]
     assert "on pybullet nothing touches at all" in said[0]
-    assert "On pybullet gripper never touches floor" in page_of(of_look(one, bare, hold[3]))
+    text = page_of(of_look(one, bare, hold[3]))
+    assert "On pybullet gripper never touches floor" in text
+    assert "world – gripper force over time on both sides" in text
 
 
 def test_names_in_a_list_have_no_comma(hold: Made, page: Path) -> None:

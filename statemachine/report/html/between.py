@@ -86,4 +86,18 @@ def resampled(trace: Trace, time: Array, rows: Ints, share: Array) -> Trace:
 def own_series(one: Trace, two: Trace, tip: str | None) -> dict[str, tuple[Series, Series]]:
     """Each side's curves at all of its own rows, by name; of what both have."""
     sides = [{curve.name: curve for curve in series(trace, trace, tip)} for trace in (one, two)]
-    return {name: (sides[0][name], sides[1][name]) for name in sides[0] if name in sides[1]}
+    found = {}
+    for name in dict.fromkeys([*sides[0], *sides[1]]):
+        turned = " – ".join(reversed(name.removesuffix(", force").split(" – "))) + ", force"
+        pair = [side.get(name) or side.get(turned) for side in sides]
+        known = pair[0] or pair[1]
+        if known is not None and known.kind == "force":  # a side that never touches presses nothing
+            pair = [each or _nothing(known, t) for each, t in zip(pair, (one, two), strict=True)]
+        if pair[0] is not None and pair[1] is not None:
+            found[name] = pair[0], pair[1]
+    return found
+
+
+def _nothing(like: Series, trace: Trace) -> Series:
+    none = np.zeros(len(trace))
+    return Series(like.name, like.kind, trace.time - trace.time[0], none, none, none)
