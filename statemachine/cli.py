@@ -44,7 +44,8 @@ class _Parser(argparse.ArgumentParser):
                 message += f" (one that begins with a minus: {flag}={typed})"
         if message.startswith("unrecognized arguments: -"):
             given = message.split()[2].partition("=")[0]
-            close = difflib.get_close_matches(given, _flags(self), n=1, cutoff=0.6)
+            known = _flags(self) - {given}  # it may be another command's
+            close = difflib.get_close_matches(given, known, n=1, cutoff=0.6)
             message += f". Did you mean {close[0]}?" if close else ""
         print(f"{self.prog}: {message}", file=sys.stderr)
         raise SystemExit(BAD_INPUT)
