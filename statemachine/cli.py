@@ -44,8 +44,7 @@ class _Parser(argparse.ArgumentParser):
                 message += f" (one that begins with a minus: {flag}={typed})"
         if message.startswith("unrecognized arguments: -"):
             given = message.split()[2].partition("=")[0]
-            known = _flags(self) - {given}  # it may be another command's
-            close = difflib.get_close_matches(given, known, n=1, cutoff=0.6)
+            close = difflib.get_close_matches(given, _flags(self, sys.argv[1:]), n=1, cutoff=0.6)
             message += f". Did you mean {close[0]}?" if close else ""
         print(f"{self.prog}: {message}", file=sys.stderr)
         raise SystemExit(BAD_INPUT)
@@ -57,14 +56,15 @@ def _after(flag: str) -> str:
     return typed[0] if typed else ""
 
 
-def _flags(parser: argparse.ArgumentParser) -> set[str]:
-    """All options of a parser and of those below it."""
+def _flags(parser: argparse.ArgumentParser, words: Sequence[str]) -> set[str]:
+    """The options of the command that was typed; of all commands if none was."""
     found: set[str] = set()
     for action in parser._actions:
         found.update(action.option_strings)
         if isinstance(action, argparse._SubParsersAction):
-            for below in action.choices.values():
-                found |= _flags(below)
+            meant = [word for word in words if word in action.choices]
+            for name in meant[:1] or action.choices:
+                found |= _flags(action.choices[name], words)
     return found
 
 

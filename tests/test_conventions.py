@@ -85,7 +85,10 @@ FACTS = {
     },
     "damping": {
         "mujoco": {"a body at 1 m/s": "keeps it", "a joint at 200 rad/s": "keeps it"},
-        "pybullet": {"a body at 1 m/s": "loses 7.5 %", "a joint at 200 rad/s": "cut to 100 rad/s"},
+        "pybullet": {
+            "a body at 1 m/s": "loses 7.5 % in 1 s",
+            "a joint at 200 rad/s": "cut to 100 rad/s",
+        },
         "pinocchio": {"": NO_ANSWER},
     },
     "write": {
@@ -373,7 +376,7 @@ def test_a_body_that_is_not_damped_and_one_that_is(
 
     monkeypatch.setattr(mj, "mj_step", damped)
     assert answers("damping", "mujoco") == {
-        "a body at 1 m/s": "loses 10.0 %",
+        "a body at 1 m/s": "loses 10.0 % in 1 s",
         "a joint at 200 rad/s": "cut to 50 rad/s",
     }
     monkeypatch.setattr(pb, "loadURDF", free)

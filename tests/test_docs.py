@@ -118,7 +118,7 @@ def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
     assert "mj_forward" in (reference / "calls.html").read_text()
     assert "✗" not in (reference / "calls.html").read_text()
     hold = (tmp_path / "o" / "comparisons" / "hold.html").read_text()
-    assert "one count of the servos" in hold
+    assert "one count of a 12-bit encoder" in hold
     assert "servo law" in (tmp_path / "o" / "comparisons" / "hold-why.html").read_text()
     assert "--realtime" in (tmp_path / "o" / "path" / "09-time.html").read_text()
 

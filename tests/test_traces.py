@@ -10,7 +10,7 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -106,6 +106,24 @@ def test_contacts_are_those_of_the_step(box: Trace) -> None:
     assert all(rows.all() for rows in touches.values())
 
 
+@pytest.mark.parametrize("defaults", ["model", "engine"])
+def test_a_short_run_is_the_beginning_of_a_long_one(
+    backend: str, defaults: Literal["model", "engine"]
+) -> None:
+    model = sm.load("so101/scene_box", backend=backend, defaults=defaults)
+    # Energies stand on what `load` was given.
+    long = record_scenario(SCENARIOS["box"], model, seconds=0.5, defaults=defaults)
+    short = record_scenario(SCENARIOS["box"], model, seconds=0.25, defaults=defaults)
+    # The last row of one is in the middle of the other: its contacts have a past.
+    kept = long["contact_row"] < len(short)
+    for name in short.columns:
+        rows = long[name][kept] if name.startswith("contact") else long[name][: len(short)]
+        if name == "energy" or backend == "pybullet":
+            assert rows.tobytes() == short[name].tobytes(), name
+        else:
+            assert np.allclose(rows, short[name], rtol=1e-12, atol=1e-12, equal_nan=True), name
+
+
 def test_energies_of_a_pendulum_are_those_on_paper(tmp_path: Path) -> None:
     file = tmp_path / "pendulum.xml"
     file.write_text(
@@ -130,6 +148,15 @@ def test_energies_of_both_engines_are_measured_by_one_yardstick() -> None:
     engine = record_scenario(SCENARIOS["droop"], raw, seconds=0.1, defaults="engine")
     # It has no gravity there; its states are weighed by the model's.
     assert engine["energy"][0].tolist() == one["energy"][0].tolist()
+    # Unless it was given one: then that is both sides'.
+    moon = {"gravity": [0.0, 0.0, -1.62]}
+    there = [
+        record_scenario(SCENARIOS["droop"], sm.load("so101/scene"), seconds=0.1, options=moon),
+        record_scenario(SCENARIOS["droop"], raw, seconds=0.1, defaults="engine", options=moon),
+    ]
+    there = [trace["energy"][0, 1] for trace in there]
+    assert there[0] == there[1]
+    assert there[0] == pytest.approx(one["energy"][0, 1] * 1.62 / 9.81, rel=1e-12)
 
 
 def test_an_engine_that_does_not_tell_leaves_nan() -> None:
@@ -424,8 +451,11 @@ def test_what_is_no_trace_at_all(tmp_path: Path, box: Trace) -> None:
                 read(path)
     with pytest.raises(BadInputError, match=r"\.npz or \.parquet"):
         read(tmp_path / "box.csv")
-    with pytest.raises(FileNotFoundError):
-        read(tmp_path / "nowhere.npz")
+    with pytest.raises(TraceError, match=r"there is no trace .*Did you mean empty.npz"):
+        read(tmp_path / "empt.npz")
+    (tmp_path / "folder.npz").mkdir()
+    with pytest.raises(TraceError, match="is a folder"):
+        read(tmp_path / "folder.npz")
     bomb = io.BytesIO()
     with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("qpos.npy", bytes(1000))
@@ -559,9 +589,10 @@ def late(time, data):
         (("record", "hold", "--seconds", "-1"), "seconds must be above 0", 2),
         (("record", "--controller", "c.py:late"), "c.py, line 7, at 0.100 s: ZeroDivision", 2),
         (("record", "--controller", "c.py:never"), "has no function never", 2),
-        (("record", "--controller", "d.py"), "no controller file d.py", 2),
-        (("record", "--controller", "e.py"), "e.py, line 1: SyntaxError", 2),
-        (("show", "c.npz"), "c.npz", 2),
+        (("record", "--controller", "cc.py"), "no controller file cc.py. Did you mean c.py?", 2),
+        (("record", "--controller", "e.py"), "e.py, line 1: SyntaxError: ", 2),
+        (("show", "c.npz"), "there is no trace c.npz", 2),
+        (("csv", "c.npz", "--contacts"), "unrecognized arguments: --contacts", 2),
         (("show", "c.py"), ".npz or .parquet", 2),
     ],
 )

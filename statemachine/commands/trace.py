@@ -19,7 +19,7 @@ from ._common import (
     one_line,
     show,
 )
-from .compare import EXPERIMENTS, add_defaults, add_run
+from .compare import EXPERIMENTS, add_defaults, add_run, experiments
 
 
 def add(commands: Any) -> None:
@@ -82,10 +82,11 @@ def _add_record(named: Any) -> None:
         "record",
         help="record an experiment, or a controller of your own",
         description=(
-            "Run it, then run it again with the recorded commands to read what the engine "
+            "Run it, then run it again with the recorded commands to read what the engine\n"
             "derives: the second run must end in the same bits."
         ),
-        epilog=f"Experiments: {', '.join(EXPERIMENTS)}.",
+        epilog=f"experiments:\n{experiments()}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("what", nargs="?", metavar="EXPERIMENT", help="what to do")
     parser.add_argument(
@@ -273,8 +274,9 @@ def _target(given: str | None, usual: str, suffixes: tuple[str, ...] = ()) -> Pa
 def _written(trace: Any, target: Path) -> int:
     from ..traces import write
 
+    again = " (the file that was there is replaced)" if target.exists() else ""
     path = write(trace, target)
-    what = f"{trace.header.experiment} on {trace.header.label}"
+    what = f"{trace.header.experiment} on {trace.header.label}{again}"
     print(one_line(f"{path}: {len(trace)} rows of {what}"))
     if trace.header.rewritten:
         print(

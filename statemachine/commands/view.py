@@ -166,12 +166,14 @@ def _announce(options: argparse.Namespace, port: int, what: str, drawing: Any) -
     address = f"http://{'localhost' if here else host}:{port}"
     if options.port not in (0, port):
         print(f"port {options.port} is taken, so it is {port}")
-    print(one_line(f"{address} shows {what}; Ctrl-C ends it"))
+    print(address)
+    print(one_line(f"shows {what}; Ctrl-C ends it"))
     if everywhere or not here:
         print(f"whoever reaches port {port} of this machine can move the sliders")
     else:
         machine = socket.gethostname() if os.environ.get("SSH_CONNECTION") else "HOST"
-        print(f"from another machine: ssh -L {port}:localhost:{port} {machine}, then {address}")
+        print("from another machine, first:")
+        print(f"ssh -L {port}:localhost:{port} {machine}")
     for left_out in drawing.left_out:
         print(f"not drawn: {left_out}")
     sys.stdout.flush()  # a pipe is read while this runs

@@ -31,11 +31,12 @@ class Agreement:
         kind: Which sort of quantity it is; unit: its SI unit.
         max: The largest difference; at: when [s from the start].
         rms: Root mean square of the difference over common time.
-        settled: Mean of the difference over the last tenth of common time.
+        settled: Mean of the difference over the last tenth of common time; of a force the
+            difference of the means.
         since: When it was first beyond the tolerance [s]; None if never.
         tolerance: What does not matter; reason: why that much.
-        verdict: "agrees" within tolerance always; "settles" beyond it on the way, within
-            it in the end; "differs" in the end too.
+        verdict: "agrees" within tolerance always; "settles" beyond it on the way, but
+            `settled` within; "differs" else.
         note: What the figures do not say, as which side never touched.
     """
 
@@ -58,12 +59,13 @@ class Side:
     """Whose trace it is.
 
     Attributes:
-        label: Engine, version, and what is unusual.
+        label: Engine, version, and what is unusual; backend: the engine's name alone.
         experiment: What was done.
         rows: How many rows it has; timestep: their distance [s].
+        defaults: What `load` was given.
         recorded: Whether it was read from a file.
         ended: Why it ended early, or "".
-        emulated: What of the contract the backend keeps instead of its engine.
+        provenance: What made it.
     """
 
     label: str

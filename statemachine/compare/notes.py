@@ -43,6 +43,11 @@ def notes_on(one: Trace, two: Trace, common: Common, found: Sequence[Agreement])
     yield from _of_time(one, two, common)
     if not np.allclose(a.gravity, b.gravity, rtol=0, atol=1e-12):
         yield f"gravity differs: {_vector(a.gravity)} and {_vector(b.gravity)} m/s²"
+    if any(header.defaults == "engine" and header.energy_by for header in (a, b)):
+        yield (
+            "energy is measured by one yardstick on both sides, masses, armature and gravity of "
+            f"the model ({a.energy_by or b.energy_by}), whatever an engine itself has"
+        )
     if a.actuators != b.actuators:
         yield "the actuators differ, in name or in order"
     elif _commands_differ(one, two, common):

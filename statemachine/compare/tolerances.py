@@ -8,14 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import BadInputError, unknown_name
+from ..records import Array
 from ..traces import Trace
 from .series import UNITS, Series
 
-# The SO-101's servos (Feetech STS3215) tell 4096 positions a turn.
+# A 12-bit encoder, as in the SO-101's servos (Feetech STS3215).
 COUNT = 2 * np.pi / 4096
-_COUNT_SAYS = "one count of the servos' encoders, 1/4096 turn: the robot itself tells no more"
+_COUNT_SAYS = "1/4096 turn, one count of a 12-bit encoder as in the SO-101's servos"
 _ENERGY = 0.01  # of what the run turns over
-_FORCE = 0.05  # of the largest
+_FORCE = 0.05  # of its mean while it acts
 _BODY, _BODY_TURN = 1e-3, np.radians(1.0)
 
 
@@ -49,7 +50,7 @@ def tolerance_for(
         reach = max(_reach(one, series), _reach(two, series))
         return Tolerance(
             COUNT * reach,
-            f"what one count of a servo's encoder moves it, {reach:.2f} m from the arm's foot",
+            f"what one count of a 12-bit encoder moves it, {reach:.2f} m from the arm's foot",
         )
     if kind == "body":
         return Tolerance(_BODY, "a millimetre: what a grasp of a box of centimetres forgives")
@@ -61,8 +62,12 @@ def tolerance_for(
             max(_ENERGY * range_, 1e-9), f"1 % of the {range_:.3g} J that the run turns over"
         )
     if kind == "force":
-        top = max(float(np.max(series.one)), float(np.max(series.two)))
-        return Tolerance(max(_FORCE * top, 1e-6), f"5 % of the largest, {top:.3g} N")
+        # Not of its peak: that of an impact is its impulse over the timestep, whatever that is.
+        acting = max(_mean_acting(values) for values in (series.one, series.two))
+        return Tolerance(
+            max(_FORCE * acting, 1e-6),
+            f"5 % of {acting:.3g} N, the mean while they touch",
+        )
     longest = max(one.header.timestep, two.header.timestep)
     return Tolerance(
         longest * (1 + 1e-9),
@@ -83,13 +88,15 @@ def parse_tolerances(words: list[str]) -> dict[str, float]:
         kind = kind.replace("-", " ")
         if kind not in UNITS:
             raise unknown_name("kind of quantity", kind, UNITS)
-        scale, unit = 1.0, UNITS[kind]
+        unit, scale = UNITS[kind], 0.0
         for suffix, factor, of in _SUFFIXES:
             if text.endswith(suffix):
-                if of != unit:
-                    raise BadInputError(f"{kind} is in {unit}, not in {suffix}: {word!r}")
                 text, scale = text.removesuffix(suffix), factor
+                if of != unit:
+                    raise BadInputError(f"{kind} is measured in {_units(unit)}, not in {suffix}")
                 break
+        if not scale:
+            raise BadInputError(f"{word!r} needs a unit: {kind} is measured in {_units(unit)}")
         try:
             value = float(text) * scale
         except ValueError:
@@ -104,6 +111,7 @@ _SUFFIXES = (
     ("deg", np.pi / 180, "rad"),
     ("rad", 1.0, "rad"),
     ("mm", 1e-3, "m"),
+    ("cm", 1e-2, "m"),
     ("ms", 1e-3, "s"),
     ("mJ", 1e-3, "J"),
     ("m", 1.0, "m"),
@@ -111,6 +119,17 @@ _SUFFIXES = (
     ("J", 1.0, "J"),
     ("N", 1.0, "N"),
 )
+
+
+def _units(unit: str) -> str:
+    """What a quantity may be given in."""
+    return ", ".join(suffix for suffix, _, of in _SUFFIXES if of == unit)
+
+
+def _mean_acting(force: Array) -> float:
+    """Mean of a force over the moments at which it acts [N]; 0 if it never does."""
+    acts = force[force > 0]
+    return float(acts.mean()) if len(acts) else 0.0
 
 
 def _reach(trace: Trace, series: Series) -> float:

@@ -135,7 +135,10 @@ def _faster(found: list[Difference]) -> Iterator[Block]:
         side = "B" if worst.two is None or not worst.two else "A"
         times = 1 / (1 - worst.share)
         shown = f"{times:,.0f}" if times >= 100 else f"{times:.3g}"
-        yield Text(f"The same torque accelerates {worst.where} {shown} times as fast in {side}.")
+        yield Text(
+            "By this alone, and with the other joints held, the same torque accelerates "
+            f"{worst.where} {shown} times as fast in {side}."
+        )
 
 
 def _together(subject: str, found: Sequence[Difference]) -> Iterator[list[str]]:

@@ -14,6 +14,8 @@ _BAR = 16  # characters of the longest bar
 _WORTH = 0.005  # the least part of the gap that the conclusion speaks of
 _ENOUGH = 0.1  # what may stay unexplained without the answer being no
 _OPENS = 1.5  # times the gap of equal settings: a setting put back that opens more is named
+_OTHERWISE = 0.05  # of the gap: a part that changes by more with the order is given both ways
+_AT_TOUCH = ("contact", "limits", "surfaces")  # what does nothing before something is met
 _KINDS = {"rad": "joint", "m": "body"}
 
 
@@ -128,7 +130,7 @@ def _alone(result: Attribution) -> Table:
         "brought to",
         "gap",
         "explains",
-        "put back" if set_back else f"{result.names[0]} moves",
+        "put back" if set_back else f"moves {result.names[0]} by",
     )
     return Table(headers, rows, "One at a time: what happens to the gap", frozenset({0, 1}))
 
@@ -151,8 +153,8 @@ def _astray(result: Attribution, value: float | None) -> bool:
 
 
 def _another(trial: Trial) -> bool:
-    """Whether the experiment has become another one: its motion changed by more than the gap."""
-    return bool(trial.moved and trial.worst is not None and trial.moved > 0 and trial.way != "none")
+    """Whether one itself moves otherwise with it: then the gap is that of another motion."""
+    return bool(trial.moved) and trial.worst is not None
 
 
 def _notes(result: Attribution) -> list[str]:
@@ -164,6 +166,12 @@ def _notes(result: Attribution) -> list[str]:
             "below zero, the gap grows. Put back: the gap when all settings are the same and "
             "this one is as it came. The parts need not add up: one setting can hide another."
         )
+    found += [
+        f"{_upper(FACTORS[trial.factor].title)}, put back, takes {_titles(trial.along)} back "
+        "with it: they can be set only where it is."
+        for trial in result.alone
+        if trial.along
+    ]
     if any(_another(trial) for trial in result.alone):
         found.append(
             f"* This moves {one} itself, so the gap is that of another motion. A smaller gap "
@@ -197,7 +205,7 @@ def _ladder(result: Attribution) -> Table:
                 f"+ {FACTORS[trial.factor].title}",
                 trial.did.removesuffix(", both"),
                 amount(result, trial.worst),
-                trial.note if trial.explains is None and trial.worst else percent(trial.explains),
+                _rung(trial),
                 "" if trial.worst is None else _bar(trial.worst, longest),
             )
         )
@@ -209,6 +217,12 @@ def _ladder(result: Attribution) -> Table:
         frozenset({0, 1, 4}),
         frozenset({len(rows) - 1}),
     )
+
+
+def _rung(trial: Trial) -> str:
+    if trial.explains is None and trial.worst:
+        return trial.note
+    return percent(trial.explains) + ("*" if _another(trial) else "")
 
 
 def _bar(value: float, longest: float) -> str:
@@ -235,6 +249,7 @@ def conclusion(result: Attribution) -> list[str]:
             f"Of the {gap}, one on top of the other: {', '.join(parts)}. "
             f"With all of it the same or left out, {left} stays."
         )
+    found += _other_orders(result, worth)
     most = max((t.worst or 0.0 for t in counted), default=0.0)
     if most > 1.05 * result.gap:
         found.append(
@@ -263,7 +278,7 @@ def conclusion(result: Attribution) -> list[str]:
         touch = result.touch
         if touch is not None and touch.before < 1e-3 * result.gap:
             acting = [t.factor for t in result.alone if t.way in ("off", "one side")]
-            named = [FACTORS[name].title for name in acting if name not in ("contact", "limits")]
+            named = [FACTORS[name].title for name in acting if name not in _AT_TOUCH]
             what = touch.what.split("; ", maxsplit=1)[0]
             found.append(
                 f"The motion as it comes says the same. Until {what}, at "
@@ -278,6 +293,30 @@ def conclusion(result: Attribution) -> list[str]:
             "the table, masses and shapes first."
         )
     return found
+
+
+def _other_orders(result: Attribution, worth: Sequence[Trial]) -> list[str]:
+    """What settings explain if they come first or last, where that is another part."""
+    alone = {trial.factor: trial for trial in result.alone}
+    parts = []
+    for rung in worth:
+        if rung.way != "parity" or rung.explains is None:
+            continue
+        by_itself = alone[rung.factor]
+        # Brought to the same it can come first only if it can be without the others.
+        first = by_itself.explains if by_itself.way == "parity" else None
+        last = result.last(by_itself)
+        known = [each for each in (first, last) if each is not None]
+        if any(abs(each - rung.explains) > _OTHERWISE for each in known):
+            along = f" (and {_titles(by_itself.along)} with it)" if by_itself.along else ""
+            said = [f"{percent(first)} if it comes first"] if first is not None else []
+            said += [f"{percent(last)} if last{along}"] if last is not None else []
+            parts.append(f"{FACTORS[rung.factor].title} {', '.join(said)}")
+    return [f"In another order the parts are others: {'; '.join(parts)}."] if parts else []
+
+
+def _titles(names: Sequence[str]) -> str:
+    return _and([FACTORS[name].title for name in names])
 
 
 def _and(words: Sequence[str]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,20 +15,25 @@ from ..verbs import make_data
 
 
 def energies(
-    model: Model, defaults: Literal["model", "engine"], qpos: Array, qvel: Array
+    model: Model,
+    defaults: Literal["model", "engine"],
+    qpos: Array,
+    qvel: Array,
+    gravity: Any = None,
 ) -> tuple[Array, str]:
     """Kinetic and potential energy of states.
 
     They are those of the model's masses, rotors (armature) and gravity, computed by MuJoCo
     whatever engine the states come from: so two runs are measured by one yardstick. An
     engine that leaves something out (PyBullet as it comes has no rotors, and no gravity
-    until it is set) is measured by the file's.
+    until it is set) is measured by the file's, or by the gravity that it was given.
 
     Args:
         model: What the states are of.
         defaults: What `load` was given for it.
         qpos: (n, nq) positions [rad or m]; qvel: (n, nv) velocities.
         qvel: See qpos.
+        gravity: (3,) that `Model.replace` was given for it [m/s²]; None for none.
 
     Returns:
         (n, 2) kinetic and potential energy [J], and the engine and version that gave them;
@@ -44,6 +49,8 @@ def energies(
                 return unknown
             if defaults == "model":
                 yardstick = yardstick.replace(gravity=model.gravity, armature=model.dof_armature)
+            elif gravity is not None:
+                yardstick = yardstick.replace(gravity=gravity)
     except (MissingEngineError, StateMachineError):
         return unknown
     found = np.empty((len(qpos), 2))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import difflib
 import importlib
 import itertools
 import os
@@ -53,13 +54,13 @@ def read(path: str | os.PathLike[str]) -> Trace:
     """Open a trace. No engine is needed; nothing in the file is run.
 
     Raises:
-        TraceError: The file is no trace.
+        TraceError: The file is not there, or is no trace.
         MissingEngineError: Parquet, and pyarrow is not installed.
-        OSError: It is not there, or cannot be read.
+        OSError: It cannot be read.
     """
     source = _known(path)
-    with open(source, "rb"):  # what is not there is said in the system's words
-        pass
+    if not source.is_file():
+        raise _missing(source)
     reader = _read_parquet if source.suffix.lower() == ".parquet" else _read_npz
     try:
         text, columns = reader(source)
@@ -166,6 +167,18 @@ def _known(path: str | os.PathLike[str]) -> Path:
     if found.suffix.lower() not in SUFFIXES:
         raise BadInputError(f"a trace is a file {' or '.join(SUFFIXES)}; got {found.name!r}")
     return found
+
+
+def _missing(path: Path) -> TraceError:
+    """The error for a file that is not there, with the nearest name beside it."""
+    message = f"there is no trace {path}"
+    if path.is_dir():
+        message = f"{path} is a folder, not a trace"
+    elif path.parent.is_dir():
+        beside = [file.name for file in path.parent.iterdir() if file.suffix in SUFFIXES]
+        close = difflib.get_close_matches(path.name, beside, n=1, cutoff=0.6)
+        message += f". Did you mean {close[0]}?" if close else ""
+    return TraceError(message)
 
 
 def _write_rows(out: BinaryIO, labels: list[str], rows: Iterable[list[Any]]) -> None:

@@ -24,7 +24,7 @@ from ..experiments._common import Progress, part_of, provenance, silent, steps_i
 from ..experiments.scenarios import Controller, Scenario
 from ..interface import Data, Model
 from ..records import DERIVED, Array, State
-from ..verbs import forward, make_data, reset, set_state, step
+from ..verbs import forward, get_state, make_data, reset, set_state, step
 from .energy import energies
 from .trace import COLUMNS, CONTACTS, Header, Trace
 
@@ -103,7 +103,9 @@ def record(
         if rewritten and controller is None:
             raise _not_repeated(rewritten)
         columns |= told
-        columns["energy"], energy_by = energies(model, defaults, inputs["qpos"], inputs["qvel"])
+        columns["energy"], energy_by = energies(
+            model, defaults, inputs["qpos"], inputs["qvel"], (options or {}).get("gravity")
+        )
     header = Header(
         experiment=experiment or getattr(controller, "__name__", "") or "run",
         says=says,
@@ -326,14 +328,15 @@ def _derive(
             data.ctrl[:] = inputs["ctrl"][k]
             if data.time != inputs["time"][k]:
                 data.time = float(inputs["time"][k])
-            last = k == rows - 1
-            if last or not after:
+            if not after:
                 forward(model, data)
                 _read(data, k, kept, contacts)
-            if not last:
+            if k < rows - 1:
                 step(model, data)
-                if after:
-                    _read(data, k, kept, contacts)
+            elif after:
+                _one_more(model, data)
+            if after:
+                _read(data, k, kept, contacts)
             if k % 32 == 0:
                 progress(k / rows)
     progress(1.0)
@@ -342,6 +345,20 @@ def _derive(
         kind = np.int64 if name in ("contact_row", "contact_geom") else np.float64
         columns[name] = np.array(contacts[name], dtype=kind).reshape(-1, *width)
     return columns, rewritten
+
+
+def _one_more(model: Model, data: Data) -> None:
+    """The step that the last row would begin, so that it too is of the run itself.
+
+    `forward` may start afresh: PyBullet's contacts then lack what the run has built up.
+    A state that no step stands, as the last of a run that diverged, has nothing better.
+    """
+    state = get_state(model, data)
+    try:
+        step(model, data)
+    except DivergedError:
+        set_state(model, data, state)
+        forward(model, data)
 
 
 def _read(

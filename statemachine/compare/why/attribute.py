@@ -172,17 +172,22 @@ def _alone(runs: Runs, one: Changes, two: Changes) -> tuple[Trial, ...]:
         if not gaps and not note and move.way != "alike":
             note = runs.ended
         trial = _trial(runs, factor, move, gaps, runs.first, changes[0], note)
-        found.append(replace(trial, put_back=_put_back(runs, factor, one, two)))
+        gap, along = _put_back(runs, factor, one, two)
+        found.append(replace(trial, put_back=gap, along=along))
     return tuple(found)
 
 
-def _put_back(runs: Runs, factor: Factor, one: Changes, two: Changes) -> float | None:
-    """The gap with one factor as it came, all other settings the same."""
+def _put_back(
+    runs: Runs, factor: Factor, one: Changes, two: Changes
+) -> tuple[float | None, tuple[str, ...]]:
+    """The gap with one factor as it came, all other settings the same; what went with it."""
     if factor.name not in one and factor.name not in two:
-        return None
+        return None, ()
     without = [runs.one.without(factor, one), runs.two.without(factor, two)]
+    kept = {factor.name, *without[0], *without[1]}
+    along = tuple(name for name in FACTORS if name in {*one, *two} - kept)
     gaps = runs.gaps(*without)
-    return gaps[runs.quantity].worst if gaps else None
+    return (gaps[runs.quantity].worst if gaps else None), along
 
 
 def _one_sided(runs: Runs, factor: Factor) -> _Move | None:

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import BadInputError, DivergedError
+from ...errors import BadInputError, DivergedError, TraceError
 from ...interface import Model
 from ...records import Array, Ints, JointType
 from ...traces import Trace
 from ...verbs import forward, make_data
+from ..align import common_moments
 
 _SAME = 1e-6  # of a timestep: two moments nearer than this are one
-_FEW = 20  # common moments below which rows are interpolated instead
 
 
 @dataclass(frozen=True)
@@ -58,13 +58,12 @@ class Ruler:
         """Of two runs as they come; `model` is what poses are computed with."""
         if (model.nq, model.joint_names) != (two.header.nq, two.header.joints):
             raise BadInputError("the two models have other joints: there is nothing to attribute")
-        times = [trace.time - trace.time[0] for trace in (one, two)]
-        slack = _SAME * min(one.header.timestep, two.header.timestep)
-        near = times[1][_nearest(times[1], times[0])]
-        common = times[0][np.abs(near - times[0]) <= slack + 1e-9]
-        self.between = len(common) < min(_FEW, len(one), len(two))
-        end = min(times[0][-1], times[1][-1])
-        self.time = times[0][times[0] <= end + slack] if self.between else common
+        try:
+            self.between, self.time = False, common_moments(one, two).time
+        except TraceError:  # too few: rows of the second are made up between its own
+            time, end = one.time - one.time[0], two.time[-1] - two.time[0]
+            slack = _SAME * one.header.timestep
+            self.between, self.time = True, time[time <= end + slack]
         self._model = model
         kinds, places = model.jnt_type, model.jnt_qposadr
         self._hinges = places[kinds == int(JointType.HINGE)]

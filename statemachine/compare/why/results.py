@@ -26,11 +26,11 @@ class Trial:
         worst: Of these, that of the attribution's quantity; None if there is none.
         explains: The part of the first gap that it took away: below zero if it made it wider;
             None where nothing was run, or in a rung that stands only with the next.
-        moved: How far one's own motion is then from its motion as it comes; above the gap,
-            the experiment has become another.
+        moved: How far one's own motion is then from its motion as it comes [unit]; above
+            zero, the gap is that of another motion.
         put_back: The gap if all is as at the end of the settings of the ladder, and this
-            factor alone (with what cannot be without it) is as it came; None where nothing
-            was set.
+            factor alone is as it came; None where nothing was set.
+        along: The factors that went back with it, since they cannot be without it.
         note: Why there is no gap, or what else is to be said.
     """
 
@@ -43,6 +43,7 @@ class Trial:
     explains: float | None
     moved: float | None
     put_back: float | None = None
+    along: tuple[str, ...] = ()
     note: str = ""
 
 
@@ -116,6 +117,12 @@ class Attribution:
         rungs = [trial for trial in self.ladder if trial.way == "parity"]
         known = [trial.worst for trial in rungs if trial.worst is not None]
         return known[-1] if known else self.gap
+
+    def last(self, trial: Trial) -> float | None:
+        """The part of the gap that a factor explains if it comes last of the settings."""
+        if trial.put_back is None or not self.gap:
+            return None
+        return (trial.put_back - self.settings_same) / self.gap
 
     @property
     def unexplained(self) -> float:

@@ -22,7 +22,7 @@ _SAME = 1e-6
 
 def _kept(of: str, start: float, end: float) -> Finding:
     share = end / start
-    answer = "keeps it" if abs(share - 1) < _SAME else f"loses {100 * (1 - share):.1f} %"
+    answer = "keeps it" if abs(share - 1) < _SAME else f"loses {100 * (1 - share):.1f} % in 1 s"
     return Finding(answer, (Figure("left after 1 s", share),), of)
 
 
