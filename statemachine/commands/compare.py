@@ -131,8 +131,6 @@ def run(options: argparse.Namespace) -> int:
             f"compare what? An experiment ({', '.join(EXPERIMENTS)}) or traces: "
             f"{PROGRAM} compare hold"
         )
-    if len(options.what) == 2 and options.backends and not options.why:
-        raise BadInputError("--backends is of a run, and two traces are runs that were made")
     if options.quantity and not (options.why or options.html):
         raise BadInputError("--quantity belongs to --why")
     if options.why and not options.html:
@@ -157,6 +155,8 @@ def _run_compare(options: argparse.Namespace) -> int:
 
     tolerances = parse_tolerances(options.tolerance)
     request = request_of(options)
+    if request.is_traces and len(request.what) == 2 and options.backends:
+        raise BadInputError("--backends is of a run, and two traces are runs that were made")
     wanted = pictures.checked(options)
     with progress("compare") as told:
         (one, two), said = sides_of(request, told)
