@@ -712,3 +712,12 @@ def test_an_effort_of_a_servo_is_what_it_can_exert(tmp_path: Path) -> None:
     assert (found[""].one, found[""].two) == ("unlimited", 8.0)
     assert found["forcerange"].two == (-4.0, 4.0)
     assert found["gear"].size == 1.0
+
+
+def test_the_floor_is_there_on_both_engines() -> None:
+    need_engine("pybullet")
+    sides = [read("so101/scene", engine) for engine in ("mujoco", "pybullet")]
+    for robot in sides:
+        (world,) = (link for link in robot.links if not link.parent)
+        assert [shape.kind for shape in world.shapes] == ["plane"], robot.reader
+        assert np.allclose(world.shapes[0].place.mat[:, 2], [0, 0, 1])

@@ -134,8 +134,8 @@ def read(
             with from_bullet.loaded(path) as (client, bodies):
                 return from_bullet.read(client, bodies, name)
         with make_data(load(path, backend="pybullet", defaults="engine")) as data:
-            bodies = [tree.body for tree in data.raw.trees]
-            return from_bullet.read(data.raw.client, bodies, name)
+            client = data.raw.client
+            return from_bullet.read(client, from_bullet.everything(client), name)
     try:
         loaded = load(path, backend="mujoco", defaults="engine")
     except ModelError:

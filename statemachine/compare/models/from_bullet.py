@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +49,12 @@ def loaded(path: Path) -> Iterator[tuple[int, list[int]]]:
         pb.disconnect(client)
 
 
+def everything(client: int) -> list[int]:
+    """The ids of all bodies in a world, what the backend adds to the robot among them."""
+    pb = require("pybullet")
+    return [pb.getBodyUniqueId(k, client) for k in range(pb.getNumBodies(client))]
+
+
 def read(client: int, bodies: Sequence[int], name: str) -> Robot:
     """The description of all bodies in a world, joints put to zero.
 
@@ -60,10 +67,17 @@ def read(client: int, bodies: Sequence[int], name: str) -> Robot:
     world = next((base for _, (base, still) in bases if still and base == "world"), None)
     links.append(Link("world", "", HERE, None, None))
     names: set[str] = {"world"}
+    around: list[Shape] = []
     for body, (base, still) in bases:
-        for index in range(pb.getNumJoints(body, client)):
+        count = pb.getNumJoints(body, client)
+        if still and (base == "world" or not count):
+            around += _standing(pb, client, body)
+        if still and not count and base != "world":  # a floor that the backend adds
+            continue
+        for index in range(count):
             pb.resetJointState(body, index, 0.0, physicsClientId=client)
         links += _body(pb, client, body, base, still, names)
+    links[0] = replace(links[0], shapes=tuple(around))
     if world is not None:  # that of the robot's own file
         links = [links[0], *(link for link in links[1:] if link.name != "world")]
     return Robot(
@@ -76,6 +90,16 @@ def read(client: int, bodies: Sequence[int], name: str) -> Robot:
         settings=_settings(pb),
         rooted=True,
     )
+
+
+def _standing(pb: Any, client: int, body: int) -> Iterator[Shape]:
+    """The shapes of a base that stands in the world, in its axes."""
+    dynamics = {-1: pb.getDynamicsInfo(body, -1, client)}
+    inner = {-1: _pose(*dynamics[-1][3:5])}
+    centre = _pose(*pb.getBasePositionAndOrientation(body, client))
+    link = _link(pb, client, body, -1, "world", "", HERE, None, dynamics, inner)
+    for shape in link.shapes:
+        yield replace(shape, place=centre @ inner[-1].inverse @ shape.place)
 
 
 def _base(pb: Any, client: int, body: int) -> tuple[str, bool]:
