@@ -44,7 +44,7 @@ class _Parser(argparse.ArgumentParser):
                 message += f" (one that begins with a minus: {flag}={typed})"
         if message.startswith("unrecognized arguments: -"):
             given = message.split()[2].partition("=")[0]
-            close = difflib.get_close_matches(given, _flags(self), n=1, cutoff=0.6)
+            close = difflib.get_close_matches(given, _flags(self, sys.argv[1:]), n=1, cutoff=0.6)
             message += f". Did you mean {close[0]}?" if close else ""
         print(f"{self.prog}: {message}", file=sys.stderr)
         raise SystemExit(BAD_INPUT)
@@ -56,14 +56,15 @@ def _after(flag: str) -> str:
     return typed[0] if typed else ""
 
 
-def _flags(parser: argparse.ArgumentParser) -> set[str]:
-    """All options of a parser and of those below it."""
+def _flags(parser: argparse.ArgumentParser, words: Sequence[str]) -> set[str]:
+    """The options of the command that was typed; of all commands if none was."""
     found: set[str] = set()
     for action in parser._actions:
         found.update(action.option_strings)
         if isinstance(action, argparse._SubParsersAction):
-            for below in action.choices.values():
-                found |= _flags(below)
+            meant = [word for word in words if word in action.choices]
+            for name in meant[:1] or action.choices:
+                found |= _flags(action.choices[name], words)
     return found
 
 
@@ -76,15 +77,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):  # a console without Unicode must not end a lesson
             stream.reconfigure(errors="replace")
     warnings.showwarning = _show_warning
-    parser = _parser()
-    words = list(sys.argv[1:] if arguments is None else arguments)
-    for k, word in enumerate(words[1:], start=1):
-        if words[k - 1] == "lesson":  # a station may be called by its number
-            words[k] = lesson.by_number(word)
-    options = parser.parse_args(words)
-    if getattr(options, "run", None) is None:
-        options.run = lesson.overview
     try:
+        options = _options(list(sys.argv[1:] if arguments is None else arguments))
         code = options.run(options)
         sys.stdout.flush()
         return code
@@ -104,6 +98,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return complain(error, BAD_INPUT)
         _let_go_of_output()
         return complain(OSError(f"the output cannot be written: {error.strerror}"), NO_OUTPUT)
+
+
+def _options(words: list[str]) -> argparse.Namespace:
+    parser = _parser()
+    for k, word in enumerate(words[1:], start=1):
+        if words[k - 1] == "lesson":  # a station may be called by its number
+            words[k] = lesson.by_number(word)
+    options = parser.parse_args(words)
+    if getattr(options, "run", None) is None:
+        options.run = lesson.overview
+    return options
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *where: Any) -> None:

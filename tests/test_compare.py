@@ -22,6 +22,7 @@ from statemachine.compare import (
     parse_tolerances,
     series,
     sides_of,
+    touches,
     witness,
 )
 from statemachine.compare.tolerances import COUNT
@@ -184,6 +185,28 @@ def test_a_touch_that_is_late_and_one_that_never_comes(hold: Trace) -> None:
     assert name not in by_name(compare(later(10_000), later(10_000)))
 
 
+def test_what_becomes_of_a_contact(box: Trace, hold: Trace) -> None:
+    found = {touch.pair: touch for touch in touches(box, box)}
+    grip = found["gripper – box"].one
+    assert (grip.first, grip.share, grip.ends) == (0.0, 1.0, True)
+    assert grip.last == pytest.approx(0.5)
+    # Two jaws press the box against each other: the same force, and that of the servo.
+    other = found["moving_jaw_so101_v1 – box"].one
+    assert grip.force == pytest.approx(other.force, rel=0.05)
+    assert touches(hold, box)[0].two.first is None
+
+
+def test_the_hold_ends_pressed_on_one_engine_and_free_on_the_other() -> None:
+    need_engine("pybullet")
+    (one, two), _ = sides_of("hold")
+    (touch,) = touches(one, two)
+    assert touch.one.ends
+    assert touch.one.force > 10
+    assert not touch.two.ends
+    assert touch.two.last is not None
+    assert touch.two.last < 0.5
+
+
 def test_moments_that_both_have_are_compared_and_no_others() -> None:
     one = traced("waves", seconds=1.0)
     two = traced("waves", seconds=1.0, options={"timestep": 1 / 240})
@@ -246,7 +269,14 @@ def test_joints_without_names_are_each_compared(tmp_path: Path) -> None:
 
 
 def test_tolerances_are_read_in_their_units(hold: Trace) -> None:
-    words = ["joint=0.5deg", "tip=2mm", "energy=3mJ", "contact=10ms", "force=1N", "tip-rotation=1"]
+    words = [
+        "joint=0.5deg",
+        "tip=2mm",
+        "energy=3mJ",
+        "contact=10ms",
+        "force=1N",
+        "tip-rotation=1rad",
+    ]
     given = parse_tolerances(words)
     assert given["joint"] == pytest.approx(np.radians(0.5))
     assert [given[kind] for kind in ("tip", "energy", "contact", "force")] == [2e-3, 3e-3, 1e-2, 1]
@@ -258,7 +288,18 @@ def test_tolerances_are_read_in_their_units(hold: Trace) -> None:
 
 
 @pytest.mark.parametrize(
-    "word", ["joint", "joint=", "joint=x", "joint=-1", "joint=nan", "joint=1mm", "tip=1deg"]
+    "word",
+    [
+        "joint",
+        "joint=",
+        "joint=x",
+        "joint=-1",
+        "joint=nandeg",
+        "joint=1mm",
+        "tip=1deg",
+        "joint=5",
+        "joint=-1deg",
+    ],
 )
 def test_what_is_no_tolerance(word: str) -> None:
     with pytest.raises(BadInputError):
@@ -376,7 +417,7 @@ def test_what_was_not_recorded_needs_the_engine(no_pybullet: None) -> None:
 
 
 def test_the_help_knows_the_experiments() -> None:
-    assert tuple(SCENARIOS) == EXPERIMENTS
+    assert tuple(SCENARIOS) == tuple(EXPERIMENTS)
 
 
 def test_the_command(cli: Cli) -> None:
@@ -384,7 +425,7 @@ def test_the_command(cli: Cli) -> None:
     done = cli("compare", "hold")
     assert (done.returncode, done.stderr) == (1, "")
     assert max(map(len, done.stdout.splitlines())) <= 80
-    for text in ("wrist_flex", "2.6", "DIFFERS", "12-bit encoder", "✗"):
+    for text in ("wrist_flex", "2.6", "DIFFER", "12-bit encoder", "✗"):
         assert text in done.stdout
     if has_witness():
         assert "a third party was asked where gripperframe is" in " ".join(done.stdout.split())
@@ -418,7 +459,7 @@ def test_it_compares_an_engine_with_itself(cli: Cli) -> None:
         (("hold", "x.npz"), "'hold' is no trace"),
         (("x.npz",), "x.npz"),
         (("hold", "--backends", "mujoco", "bullet"), "no backend named 'bullet'"),
-        (("hold", "--tolerance", "joint=1mm"), "joint is in rad"),
+        (("hold", "--tolerance", "joint=1mm"), "joint is measured in deg, rad, not in mm"),
         (("hold", "--timestep", "-1"), "timestep must be above 0"),
         (("hold", "--seconds", "0"), "seconds must be above 0"),
         (("hold", "--model", "so101/scene_box", "--defaults", "both"), "both"),

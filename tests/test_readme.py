@@ -31,7 +31,7 @@ SAYS_NO = (
     "python exercises/step_loop.py --gravity",
 )
 # The engines differ there.
-DIFFERS = re.compile(r"statemachine compare (hold(?!.*--why)|--models|waves.npz mine.npz)")
+DIFFERS = re.compile(r"statemachine compare (hold(?!.*--why)|--models)")
 
 
 def test_there_are_commands() -> None:
@@ -61,7 +61,7 @@ def test_command(cli: Cli, command: str, request: pytest.FixtureRequest, tmp_pat
         need_engine("pybullet")
     if "view" in words:
         words += ["--seconds", "1", "--port", "0"]
-    if any(word in ("waves.npz", "mine.npz") or word == "my_controller.py" for word in words):
+    if {"waves.npz", "played.npz", "my_controller.py"} & set(words):
         _make_traces(cli, tmp_path, words)
     if command.startswith("python"):
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -72,7 +72,7 @@ def test_command(cli: Cli, command: str, request: pytest.FixtureRequest, tmp_pat
         done = cli(*words)
     no = command in SAYS_NO or DIFFERS.match(command)
     assert done.returncode == (1 if no else 0), done.stderr
-    assert done.stdout
+    assert done.stdout or words[:2] == ["trace", "plot"]
 
 
 def _make_traces(cli: Cli, folder: Path, words: list[str]) -> None:
@@ -82,9 +82,9 @@ def _make_traces(cli: Cli, folder: Path, words: list[str]) -> None:
     )
     for name, line in (
         ("waves.npz", "trace record waves --seed 3 -o waves.npz"),
-        ("mine.npz", "trace record --controller my_controller.py --backend pybullet -o mine.npz"),
+        ("played.npz", "trace play waves.npz --backend pybullet -o played.npz"),
     ):
-        if name in words and "-o" not in words:
+        if name in words and words[-2:] != ["-o", name]:
             assert cli(*line.split()).returncode == 0
 
 

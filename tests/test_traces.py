@@ -451,8 +451,11 @@ def test_what_is_no_trace_at_all(tmp_path: Path, box: Trace) -> None:
                 read(path)
     with pytest.raises(BadInputError, match=r"\.npz or \.parquet"):
         read(tmp_path / "box.csv")
-    with pytest.raises(FileNotFoundError):
-        read(tmp_path / "nowhere.npz")
+    with pytest.raises(TraceError, match=r"there is no trace .*Did you mean empty.npz"):
+        read(tmp_path / "empt.npz")
+    (tmp_path / "folder.npz").mkdir()
+    with pytest.raises(TraceError, match="is a folder"):
+        read(tmp_path / "folder.npz")
     bomb = io.BytesIO()
     with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("qpos.npy", bytes(1000))
@@ -586,9 +589,10 @@ def late(time, data):
         (("record", "hold", "--seconds", "-1"), "seconds must be above 0", 2),
         (("record", "--controller", "c.py:late"), "c.py, line 7, at 0.100 s: ZeroDivision", 2),
         (("record", "--controller", "c.py:never"), "has no function never", 2),
-        (("record", "--controller", "d.py"), "no controller file d.py", 2),
-        (("record", "--controller", "e.py"), "e.py, line 1: SyntaxError", 2),
-        (("show", "c.npz"), "c.npz", 2),
+        (("record", "--controller", "cc.py"), "no controller file cc.py. Did you mean c.py?", 2),
+        (("record", "--controller", "e.py"), "e.py, line 1: SyntaxError: ", 2),
+        (("show", "c.npz"), "there is no trace c.npz", 2),
+        (("csv", "c.npz", "--contacts"), "unrecognized arguments: --contacts", 2),
         (("show", "c.py"), ".npz or .parquet", 2),
     ],
 )

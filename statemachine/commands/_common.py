@@ -17,8 +17,16 @@ SAYS_NO, BAD_INPUT, MISSING, NO_OUTPUT = 1, 2, 3, 74
 
 def complain(error: Exception | str, code: int) -> int:
     """Say it in one line on standard error; returns `code`."""
-    print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
+    print(f"{PROGRAM}: {one_line(error)}", file=sys.stderr)
     return code
+
+
+def one_line(text: object) -> str:
+    """Text in one line, with nothing in it that a terminal would do instead of show.
+
+    A name may come from a file that somebody else made.
+    """
+    return "".join(c if c.isprintable() else "?" for c in " ".join(str(text).split()))
 
 
 def add_json(parser: argparse.ArgumentParser, what: str = "result", default: Any = False) -> None:

@@ -25,7 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--rename", action="append", default=[], metavar="A=B", help="a joint or link that is B's"
     )
     group.add_argument(
-        "--digits", type=int, default=6, metavar="N", help="equal means to so many digits (6)"
+        "--digits", type=int, default=None, metavar="N", help="equal means to so many digits (6)"
     )
     group.add_argument("--all", action="store_true", help="a row for every figure that differs")
 
@@ -56,8 +56,9 @@ def run(options: argparse.Namespace) -> int:
     if len(given) != 2 or len(options.models) > 2:
         hint = "two models, or one and --backends A B"
         raise BadInputError(f"--models wants {hint}; got {len(options.models)}")
-    if not 1 <= options.digits <= 17:
-        raise BadInputError(f"--digits wants a number from 1 to 17; got {options.digits}")
+    digits = 6 if options.digits is None else options.digits
+    if not 1 <= digits <= 17:
+        raise BadInputError(f"--digits wants a number from 1 to 17; got {digits}")
     if options.seed < 0:
         raise BadInputError(f"--seed must not be negative; got {options.seed}")
     with progress("compare"):
@@ -67,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
             engines=(given[0][1], given[1][1]),
             frames=_pairs(options.frame, "--frame"),
             rename=_pairs(options.rename, "--rename"),
-            digits=options.digits,
+            digits=digits,
             seed=options.seed,
             menagerie=options.menagerie,
         )
@@ -79,6 +80,8 @@ def refuse_alone(options: argparse.Namespace) -> None:
     for name in ("frame", "rename", "all"):
         if getattr(options, name):
             raise BadInputError(f"--{name} goes with --models")
+    if options.digits is not None:
+        raise BadInputError("--digits goes with --models")
 
 
 def _pairs(given: list[str], option: str) -> dict[str, str]:

@@ -17,11 +17,15 @@ def add(commands: Any) -> None:
         "compare",
         help="where two engines part, by how much, and why",
         description=(
-            "Run an experiment on two engines, or open recorded traces, and compare: each "
-            "quantity with its tolerance and a verdict. One trace: its ctrl is played on the "
-            "other engine."
+            "Run an experiment on two engines, or open recorded traces, and compare: each\n"
+            "quantity with its tolerance and a verdict. One trace: its ctrl is played on\n"
+            "the other engine."
         ),
-        epilog=f"Experiments: {', '.join(EXPERIMENTS)}. Exit code 1: something differs.",
+        epilog=(
+            f"experiments:\n{experiments()}\n\n"
+            "Exit code 1: something differs; with --why: something stays unexplained."
+        ),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "what",
@@ -59,7 +63,19 @@ def add(commands: Any) -> None:
 
 
 # As `experiments.scenarios.SCENARIOS`, which needs NumPy; a test compares them.
-EXPERIMENTS = ("hold", "gravity", "droop", "fall", "box", "waves")
+EXPERIMENTS = {
+    "hold": "go to one pose; a finger meets the floor",
+    "gravity": "servos off: the arm falls onto the floor",
+    "droop": "nobody writes ctrl: the servos hold the arm",
+    "fall": "servos off, nothing can touch",
+    "box": "the jaws hold a box while the arm swings",
+    "waves": "every joint follows waves that a seed draws",
+}
+
+
+def experiments() -> str:
+    """A line for each experiment."""
+    return "\n".join(f"  {name:<9} {says}" for name, says in EXPERIMENTS.items())
 
 
 def add_defaults(parser: argparse.ArgumentParser) -> None:
@@ -115,6 +131,8 @@ def run(options: argparse.Namespace) -> int:
             f"compare what? An experiment ({', '.join(EXPERIMENTS)}) or traces: "
             f"{PROGRAM} compare hold"
         )
+    if len(options.what) == 2 and options.backends:
+        raise BadInputError("--backends is of a run, and two traces are runs that were made")
     if options.quantity and not (options.why or options.html):
         raise BadInputError("--quantity belongs to --why")
     if options.why and not options.html:
@@ -133,7 +151,7 @@ def _run_why(options: argparse.Namespace) -> int:
 
 
 def _run_compare(options: argparse.Namespace) -> int:
-    from ..compare import compare, parse_tolerances, sides_of, witness
+    from ..compare import compare, parse_tolerances, sides_of, touches, witness
     from ..report import compare as report
     from ..report.progress import progress
 
@@ -149,7 +167,9 @@ def _run_compare(options: argparse.Namespace) -> int:
     asked = witness(one, two)
     if options.html:
         _compare_html.write(options, request, found, (one, two), said, asked)
-    page = report.page(found, one.header.says, said, asked)
-    code = show(page, {"comparison": found, "witness": asked}, options.json)
+    page = report.page(found, one.header.says, said, asked, touches(one, two))
+    code = show(
+        page, {"comparison": found, "witness": asked, "touches": touches(one, two)}, options.json
+    )
     pictures.write(wanted, options, one, two, found)
     return code

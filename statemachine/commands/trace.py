@@ -9,8 +9,17 @@ from typing import Any
 
 from ..errors import BadInputError
 from . import _compare_pictures as pictures
-from ._common import PROGRAM, SAYS_NO, add_backend, add_json, add_menagerie, complain, show
-from .compare import EXPERIMENTS, add_defaults, add_run
+from ._common import (
+    PROGRAM,
+    SAYS_NO,
+    add_backend,
+    add_json,
+    add_menagerie,
+    complain,
+    one_line,
+    show,
+)
+from .compare import EXPERIMENTS, add_defaults, add_run, experiments
 
 
 def add(commands: Any) -> None:
@@ -73,10 +82,11 @@ def _add_record(named: Any) -> None:
         "record",
         help="record an experiment, or a controller of your own",
         description=(
-            "Run it, then run it again with the recorded commands to read what the engine "
+            "Run it, then run it again with the recorded commands to read what the engine\n"
             "derives: the second run must end in the same bits."
         ),
-        epilog=f"Experiments: {', '.join(EXPERIMENTS)}.",
+        epilog=f"experiments:\n{experiments()}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("what", nargs="?", metavar="EXPERIMENT", help="what to do")
     parser.add_argument(
@@ -167,28 +177,47 @@ def run_play(options: argparse.Namespace) -> int:
     """Play a trace's commands on an engine, and write what came of it."""
     from ..backends import load
     from ..report.progress import progress
-    from ..traces import play, read
+    from ..traces import model_file, play, read
 
     trace = read(options.file)
     target = _target(options.output, f"{Path(options.file).stem}.{options.backend}.npz")
+    file, same = options.model, True
+    if file is None:
+        file, same = model_file(trace.header, options.menagerie, options.file)
     model = load(
-        options.model or trace.header.provenance.model_file,
+        file,
         backend=options.backend,
         defaults=options.defaults,
-        menagerie=options.menagerie,
+        menagerie=options.menagerie if options.model else None,
     )
+    if not same:
+        complain(
+            f"{trace.header.provenance.model_file} as it is here is not the file that the trace "
+            "was recorded with: its digest is another",
+            0,
+        )
     if trace.header.options:
         model = model.replace(**trace.header.options)
     with progress(f"play on {options.backend}") as told:
         played = play(
             trace,
             model,
-            command=f"{PROGRAM} trace play {Path(options.file).name} --backend {options.backend}",
+            command=_typed_play(options),
             defaults=options.defaults,
             options=trace.header.options,
             progress=told,
         )
     return _written(played, target)
+
+
+def _typed_play(options: argparse.Namespace) -> str:
+    """The command that plays this again, without paths of this machine."""
+    words = [PROGRAM, "trace", "play", Path(options.file).name, "--backend", options.backend]
+    if options.defaults != "model":
+        words += ["--defaults", options.defaults]
+    if options.model:
+        words += ["--model", Path(options.model).name]
+    return " ".join(words)
 
 
 def run_show(options: argparse.Namespace) -> int:
@@ -245,8 +274,10 @@ def _target(given: str | None, usual: str, suffixes: tuple[str, ...] = ()) -> Pa
 def _written(trace: Any, target: Path) -> int:
     from ..traces import write
 
+    again = " (the file that was there is replaced)" if target.exists() else ""
     path = write(trace, target)
-    print(f"{path}: {len(trace)} rows of {trace.header.experiment} on {trace.header.label}")
+    what = f"{trace.header.experiment} on {trace.header.label}{again}"
+    print(one_line(f"{path}: {len(trace)} rows of {what}"))
     if trace.header.rewritten:
         print(
             f"{trace.header.rewritten} rows do not follow from the step before: the controller "

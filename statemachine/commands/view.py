@@ -10,7 +10,7 @@ from contextlib import suppress
 from typing import Any
 
 from ..errors import BadInputError, TraceError
-from ._common import PROGRAM, add_backend, add_menagerie
+from ._common import PROGRAM, add_backend, add_menagerie, complain, one_line
 
 _PORT = 8080
 _MODEL = "so101/scene_box"
@@ -94,7 +94,7 @@ def _play(options: argparse.Namespace, port: int) -> int:
     """One recording or two."""
     from ..backends import load
     from ..drawing import drawing_of
-    from ..traces import read
+    from ..traces import model_file, read
     from ..view.recording import Recording
 
     if len(options.traces) > 2:
@@ -104,8 +104,14 @@ def _play(options: argparse.Namespace, port: int) -> int:
             raise BadInputError(f"--{name} is for a simulation, and a trace is a recording")
     recording = Recording([read(path) for path in options.traces])
     header = recording.header
-    name = options.model or header.provenance.model_file.removesuffix(".xml")
-    model = load(name, menagerie=options.menagerie)
+    name, same = options.model or header.provenance.model_file.removesuffix(".xml"), True
+    if options.model:
+        model = load(name, menagerie=options.menagerie)
+    else:
+        file, same = model_file(header, options.menagerie, options.traces[0])
+        model = load(file)
+    if not same:
+        complain(f"shown is {name} as it is here; the trace was recorded with another", 0)
     if model.body_names != header.bodies:
         raise TraceError(f"the trace is of another model than {name}: say which with --model")
     what = f"{header.experiment or 'a run'} of {name}, recorded on {' and '.join(recording.labels)}"
@@ -160,12 +166,14 @@ def _announce(options: argparse.Namespace, port: int, what: str, drawing: Any) -
     address = f"http://{'localhost' if here else host}:{port}"
     if options.port not in (0, port):
         print(f"port {options.port} is taken, so it is {port}")
-    print(f"{address} shows {what}; Ctrl-C ends it")
+    print(address)
+    print(one_line(f"shows {what}; Ctrl-C ends it"))
     if everywhere or not here:
         print(f"whoever reaches port {port} of this machine can move the sliders")
     else:
         machine = socket.gethostname() if os.environ.get("SSH_CONNECTION") else "HOST"
-        print(f"from another machine: ssh -L {port}:localhost:{port} {machine}, then {address}")
+        print("from another machine, first:")
+        print(f"ssh -L {port}:localhost:{port} {machine}")
     for left_out in drawing.left_out:
         print(f"not drawn: {left_out}")
     sys.stdout.flush()  # a pipe is read while this runs

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from ..errors import TraceError
 from ..experiments._common import Provenance
 from ..records import Array
-from ..traces import Header, Trace
-from .series import UNITS, Kind, Series, series
+from ..traces import Trace
+from .align import SAME, common_moments
+from .notes import notes_on
+from .series import UNITS, Kind, Series, same_pairs, series
 from .tolerances import tolerance_for
 
 Verdict = Literal["agrees", "settles", "differs"]
@@ -97,13 +99,24 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether every quantity agrees at every moment."""
-        return all(found.verdict == "agrees" for found in self.agreements)
+        """Whether every quantity agrees at every moment, and both runs came to their end."""
+        return not self.ended and all(found.verdict == "agrees" for found in self.agreements)
+
+    @property
+    def ended(self) -> bool:
+        """Whether a side ended before its time: nobody knows what it would have done."""
+        return bool(self.one.ended or self.two.ended)
 
     @property
     def worst(self) -> Agreement | None:
         """The quantity that is farthest beyond its tolerance; None if nothing was compared."""
-        return max(self.agreements, key=lambda found: found.max / found.tolerance, default=None)
+        return max(self.agreements, key=_beyond, default=None)
+
+
+def _beyond(found: Agreement) -> float:
+    """How many tolerances; what is no number is beyond all of them."""
+    share = found.max / found.tolerance
+    return np.inf if np.isnan(share) else share
 
 
 def compare(
@@ -128,14 +141,16 @@ def compare(
     if not any(curve.kind in ("joint", "slide", "body", "body rotation") for curve in curves):
         raise TraceError("the traces have no joint in common: nothing can be compared")
     found = [_of_curve(curve, one, two, tolerances) for curve in curves]
-    found += _touches(one, two, float(curves[0].time[-1]), tolerances)
+    common = common_moments(one, two)
+    if "contact_row" in one and "contact_row" in two:
+        found += _touches(one, two, float(common.time[-1]), tolerances)
     return Comparison(
         one=_side(one),
         two=_side(two),
         moments=len(curves[0].time),
         until=float(curves[0].time[-1]),
         agreements=tuple(found),
-        notes=tuple(_notes(one, two)),
+        notes=tuple(notes_on(one, two, common, found)),
     )
 
 
@@ -144,17 +159,18 @@ def _of_curve(
 ) -> Agreement:
     allowed = tolerance_for(curve, one, two, given)
     apart, time = curve.difference, curve.time
-    worst = int(np.argmax(apart))
+    strange = int(np.count_nonzero(~np.isfinite(apart)))
+    worst = int(np.argmax(np.nan_to_num(apart, nan=np.inf)))
     tail = time >= time[-1] - SETTLED * (time[-1] - time[0])
     # Of a force the mean counts: stiff contacts ring from step to step.
     if curve.kind == "force":
         settled = abs(float(curve.one[tail].mean()) - float(curve.two[tail].mean()))
     else:
         settled = float(apart[tail].mean())
-    beyond = np.flatnonzero(apart > allowed.value)
+    beyond = np.flatnonzero(~(apart <= allowed.value))  # what is no number is not within
     verdict: Verdict = "agrees"
     if len(beyond):
-        verdict = "differs" if settled > allowed.value else "settles"
+        verdict = "settles" if settled <= allowed.value and not strange else "differs"
     return Agreement(
         name=curve.name,
         kind=curve.kind,
@@ -167,6 +183,7 @@ def _of_curve(
         tolerance=allowed.value,
         reason=allowed.reason,
         verdict=verdict,
+        note=f"no number at {strange} of {len(apart)} moments" if strange else "",
     )
 
 
@@ -175,7 +192,8 @@ def _touches(
 ) -> list[Agreement]:
     """When each pair of bodies first touches, on either side."""
     found = []
-    touches = [trace.touches() for trace in (one, two)]
+    touches = [one.touches(), two.touches()]
+    touches[1] = same_pairs(touches[0], touches[1])
     for pair in dict.fromkeys([*touches[0], *touches[1]]):
         first = [
             _first(touch.get(pair), trace, until)
@@ -191,7 +209,9 @@ def _touches(
             missing, seen = (one, first[1]) if first[0] is None else (two, first[0])
             # As late as can be: it had not touched when the comparison ended.
             gap, at = until - float(seen or 0.0), float(seen or 0.0)
-            note = f"never on {missing.header.backend}"
+            later = touches[0 if missing is one else 1].get(pair)
+            word = "never" if later is None or not later.any() else "later"
+            note = f"{word} on {missing.header.backend}"
             verdict: Verdict = "differs"
         else:
             gap, at = abs(first[0] - first[1]), min(first[0], first[1])
@@ -220,7 +240,7 @@ def _first(touching: NDArray[np.bool_] | None, trace: Trace, until: float) -> fl
     if touching is None or not touching.any():
         return None
     time = float(trace.time[int(np.argmax(touching))] - trace.time[0])
-    return time if time <= until else None
+    return time if time <= until + SAME * trace.header.timestep else None
 
 
 def _side(trace: Trace) -> Side:
@@ -236,53 +256,3 @@ def _side(trace: Trace) -> Side:
         ended=header.ended,
         provenance=header.provenance,
     )
-
-
-def _notes(one: Trace, two: Trace) -> list[str]:
-    a, b = one.header, two.header
-    notes = []
-    if a.provenance.model_sha256 != b.provenance.model_sha256:
-        notes.append(
-            f"the models are two: {a.provenance.model_file} and {b.provenance.model_file} "
-            "have other digests"
-        )
-    only = [*_lacking(a, b), *_lacking(b, a)]
-    if only:
-        notes.append(f"compared is what both have; missing on one side: {', '.join(only)}")
-    elif not np.array_equal(one.qpos[0], two.qpos[0]) or not np.array_equal(
-        one.qvel[0], two.qvel[0]
-    ):
-        notes.append("the runs do not start in the same state")
-    if a.experiment != b.experiment:
-        notes.append(f"the experiments are two: {a.experiment} and {b.experiment}")
-    if a.timestep != b.timestep:
-        notes.append(
-            f"timesteps differ, {1000 * a.timestep:.4g} and {1000 * b.timestep:.4g} ms: compared "
-            "are the moments that both have, nothing is interpolated"
-        )
-    if not np.allclose(a.gravity, b.gravity, rtol=0, atol=1e-12):
-        notes.append(f"gravity differs: {_vector(a.gravity)} and {_vector(b.gravity)} m/s²")
-    if any(header.defaults == "engine" and header.energy_by for header in (a, b)):
-        notes.append(
-            f"energy is measured by one yardstick on both sides, masses, armature and gravity of "
-            f"the model ({a.energy_by or b.energy_by}), whatever an engine itself has"
-        )
-    commands = [np.array(trace.ctrl[:-1] if len(trace) > 1 else trace.ctrl) for trace in (one, two)]
-    if commands[0].shape == commands[1].shape and not np.array_equal(commands[0], commands[1]):
-        notes.append("the commands differ: the controllers saw different states, or are two")
-    for header in (a, b):
-        if header.ended:
-            notes.append(f"{header.label} ended early: {header.ended}")
-        if header.single:
-            notes.append(
-                f"the recorded run of {header.backend} keeps all but its state in single precision"
-            )
-    return notes
-
-
-def _lacking(a: Header, b: Header) -> list[str]:
-    return [f"{name} ({a.label})" for name in a.joints if name not in b.joints]
-
-
-def _vector(values: tuple[float, ...]) -> str:
-    return " ".join(f"{value:g}" for value in values)

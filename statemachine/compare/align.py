@@ -10,7 +10,7 @@ from ..errors import TraceError
 from ..records import Array, Ints
 from ..traces import Trace
 
-_SAME = 1e-6  # of a timestep: two moments nearer than this are one
+SAME = 1e-6  # of a timestep: two moments nearer than this are one
 _FEW = 20  # common moments below which a comparison says nothing
 
 
@@ -45,7 +45,7 @@ def common_moments(one: Trace, two: Trace) -> Common:
         left = np.abs(times[1][near - 1] - times[0]) < np.abs(times[1][near] - times[0])
         near = near - left
     # A time is a sum of timesteps: its rounding grows with their number.
-    slack = _SAME * min(steps) + 1e-12 * np.arange(len(times[0]))
+    slack = SAME * min(steps) + 1e-12 * np.arange(len(times[0]))
     rows = np.flatnonzero(np.abs(times[1][near] - times[0]) <= slack)
     least = min(_FEW, len(one), len(two))
     if len(rows) < least:

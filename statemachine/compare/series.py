@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from .align import Common, common_moments
 Kind = Literal[
     "joint", "slide", "tip", "tip rotation", "body", "body rotation", "energy", "contact", "force"
 ]
+_T = TypeVar("_T")
 UNITS: dict[str, str] = {
     "joint": "rad",
     "slide": "m",
@@ -69,16 +71,18 @@ def series(one: Trace, two: Trace, tip: str | None = None) -> list[Series]:
         if other is not None:
             found += _joint(name or f"joint {place}", (place, other), one, two, common)
     site = default_tip(one.header, two.header) if tip is None else tip
-    if site and "site_xpos" in one and "site_xpos" in two:
+    if site and tell(one, two, "site_xpos") and tell(one, two, "site_xmat"):
         found += _site(site, one, two, common)
-    if "energy" in one and "energy" in two:
+    if tell(one, two, "energy"):
         totals = [
             trace["energy"].sum(axis=1)[rows]
             for trace, rows in ((one, common.one), (two, common.two))
         ]
-        if np.isfinite(totals).all():
-            found.append(_scalar("energy", "energy", common, totals[0], totals[1]))
-    forces = [normal_forces(trace) for trace in (one, two)]
+        found.append(_scalar("energy", "energy", common, totals[0], totals[1]))
+    if not tell(one, two, "contact_force"):
+        return found
+    forces = [normal_forces(one), normal_forces(two)]
+    forces[1] = same_pairs(forces[0], forces[1])
     for pair in dict.fromkeys([*forces[0], *forces[1]]):
         values = [
             force.get(pair, np.zeros(len(trace)))[rows]
@@ -100,7 +104,7 @@ def normal_forces(trace: Trace) -> dict[str, Array]:
     found: dict[str, Array] = {}
     if "contact_row" not in trace:
         return found
-    header = trace.header
+    header, labels = trace.header, trace.header.body_labels
     for row, (one, two), force in zip(
         trace["contact_row"].tolist(),
         trace["contact_geom"].tolist(),
@@ -108,8 +112,34 @@ def normal_forces(trace: Trace) -> dict[str, Array]:
         strict=True,
     ):
         bodies = sorted((header.geom_bodyid[one], header.geom_bodyid[two]))
-        name = " – ".join(header.bodies[body] for body in bodies)
+        name = " – ".join(labels[body] for body in bodies)
         found.setdefault(name, np.zeros(len(trace)))[row] += force
+    return found
+
+
+def tell(one: Trace, two: Trace, column: str) -> bool:
+    """Whether both traces tell a column: an engine that does not leaves it out, or NaN in it.
+
+    Of contacts a run without any tells all that there is.
+    """
+    for trace in (one, two):
+        if column not in trace:
+            return False
+        array = trace[column]
+        if array.size and np.isnan(array).all():
+            return False
+    return True
+
+
+def same_pairs(one: Mapping[str, _T], two: Mapping[str, _T]) -> dict[str, _T]:
+    """What `two` has by pair of bodies, the pairs called as in `one`.
+
+    A pair is named in the order of its model's bodies, and two models may have other orders.
+    """
+    found = {}
+    for pair, value in two.items():
+        turned = " – ".join(reversed(pair.split(" – ")))
+        found[turned if turned in one and pair not in one else pair] = value
     return found
 
 
@@ -144,10 +174,11 @@ def _joint(
         apart = np.linalg.norm(a[:, :3] - b[:, :3], axis=1)
         label = f"{name}, position"
         found.append(Series(label, "body", common.time, a[:, :3], b[:, :3], apart))
-    turned = [
-        matrix_from_quat(q[:, -4:] / np.linalg.norm(q[:, -4:], axis=1, keepdims=True))
-        for q in (a, b)
-    ]
+    with np.errstate(invalid="ignore"):  # all zero is no rotation: NaN, which never agrees
+        turned = [
+            matrix_from_quat(q[:, -4:] / np.linalg.norm(q[:, -4:], axis=1, keepdims=True))
+            for q in (a, b)
+        ]
     angle = angle_between(*turned)
     none = np.empty((0,))
     found.append(Series(f"{name}, rotation", "body rotation", common.time, none, none, angle))

@@ -11,7 +11,7 @@ from ..backends import backend_names, load
 from ..errors import BadInputError, MissingEngineError, StateMachineError, unknown_name
 from ..experiments._common import Progress, part_of, silent
 from ..experiments.scenarios import SCENARIOS, scenario
-from ..traces import Trace, play, read, record_scenario, shipped
+from ..traces import Trace, model_file, play, read, record_scenario, shipped
 from ..traces.files import SUFFIXES
 
 
@@ -145,14 +145,30 @@ def _of_traces(request: Request, progress: Progress) -> tuple[tuple[Trace, Trace
             hint = " (an experiment runs on both engines alone)" if word in SCENARIOS else ""
             raise BadInputError(f"{word!r} is no trace{hint}: a trace ends in .npz or .parquet")
     opened = [read(word) for word in request.what]
+    refused = {
+        "seconds": request.seconds is not None,
+        "seed": request.seed != 0,
+        "timestep": len(opened) == 2 and "timestep" in request.options,
+        "defaults": len(opened) == 2 and request.defaults != "model",
+    }
+    for name, given in refused.items():
+        if given:
+            raise BadInputError(f"--{name} is of a run, and a trace is a run that was made")
     if len(opened) == 2:
         return (opened[0], opened[1]), ()
     (trace,) = opened
     others = [name for name in request.backends if name != trace.header.backend]
     if not others:
         raise BadInputError(f"the trace is of {trace.header.backend}: name another with --backends")
-    name = request.model or trace.header.provenance.model_file
-    model = load(name, backend=others[0], defaults=request.defaults, menagerie=request.menagerie)
+    name: str | Path | None = request.model
+    if name is None:
+        name, _ = model_file(trace.header, request.menagerie, request.what[0])
+    model = load(
+        name,
+        backend=others[0],
+        defaults=request.defaults,
+        menagerie=request.menagerie if request.model else None,
+    )
     options = {**trace.header.options, **request.options}
     if options:
         model = model.replace(**options)

@@ -88,13 +88,15 @@ def parse_tolerances(words: list[str]) -> dict[str, float]:
         kind = kind.replace("-", " ")
         if kind not in UNITS:
             raise unknown_name("kind of quantity", kind, UNITS)
-        scale, unit = 1.0, UNITS[kind]
+        unit, scale = UNITS[kind], 0.0
         for suffix, factor, of in _SUFFIXES:
             if text.endswith(suffix):
-                if of != unit:
-                    raise BadInputError(f"{kind} is in {unit}, not in {suffix}: {word!r}")
                 text, scale = text.removesuffix(suffix), factor
+                if of != unit:
+                    raise BadInputError(f"{kind} is measured in {_units(unit)}, not in {suffix}")
                 break
+        if not scale:
+            raise BadInputError(f"{word!r} needs a unit: {kind} is measured in {_units(unit)}")
         try:
             value = float(text) * scale
         except ValueError:
@@ -109,6 +111,7 @@ _SUFFIXES = (
     ("deg", np.pi / 180, "rad"),
     ("rad", 1.0, "rad"),
     ("mm", 1e-3, "m"),
+    ("cm", 1e-2, "m"),
     ("ms", 1e-3, "s"),
     ("mJ", 1e-3, "J"),
     ("m", 1.0, "m"),
@@ -116,6 +119,11 @@ _SUFFIXES = (
     ("J", 1.0, "J"),
     ("N", 1.0, "N"),
 )
+
+
+def _units(unit: str) -> str:
+    """What a quantity may be given in."""
+    return ", ".join(suffix for suffix, _, of in _SUFFIXES if of == unit)
 
 
 def _mean_acting(force: Array) -> float:

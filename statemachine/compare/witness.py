@@ -10,8 +10,7 @@ import numpy as np
 
 from ..errors import StateMachineError
 from ..kinematics import Kinematics
-from ..models import resolve
-from ..traces import Header, Trace
+from ..traces import Header, Trace, model_file
 from .series import default_tip
 
 
@@ -42,17 +41,25 @@ def witness(one: Trace, two: Trace, path: Path | None = None) -> Witness | None:
         path: The model's file; by default the one that the headers name.
 
     Returns:
-        None where Pinocchio is missing, or cannot read the model.
+        None where Pinocchio is missing, where it cannot read the model, and where the file
+        that the traces were recorded with is not here.
     """
     site = default_tip(one.header, two.header)
     if not site or "site_xpos" not in one or "site_xpos" not in two:
         return None
+    ours, theirs = (trace.header.provenance.model_sha256 for trace in (one, two))
+    if path is None and ours != theirs:
+        return None  # one model cannot be the witness of two
     try:
-        file = resolve(one.header.provenance.model_file) if path is None else path
+        file, same = (path, True) if path else model_file(one.header)
+        if not same:
+            return None
         kinematics = _readable(file, one.header)
         if kinematics is None:
             return None
         gaps = [_gap(kinematics, trace, site) for trace in (one, two)]
+        if not np.isfinite(gaps).all():
+            return None
     except StateMachineError:
         return None
     return Witness(f"pinocchio {kinematics.version}", site, *gaps, rows=len(one) + len(two))

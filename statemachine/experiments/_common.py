@@ -60,13 +60,18 @@ def provenance(model: Model, seed: int | None = None, **others: str) -> Provenan
     }
     # The folder and name, not the machine's path: a result is read elsewhere.
     name = "/".join(model.path.parts[-2:])
-    digest = hashlib.sha256(b"".join(_with_includes(model.path))).hexdigest()
+    digest = model_digest(model.path)
     emulated = tuple(
         name
         for name, behaviour in model.capabilities.behaviours.items()
         if behaviour.support == "emulated"
     )
     return Provenance(model.backend, versions, name, digest, model.timestep, emulated, seed)
+
+
+def model_digest(path: Path) -> str:
+    """SHA-256 of a model's file and of those it includes."""
+    return hashlib.sha256(b"".join(_with_includes(path))).hexdigest()
 
 
 @dataclass(frozen=True)

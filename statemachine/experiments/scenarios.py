@@ -67,6 +67,8 @@ def _untouched(_model: Model, _seed: int) -> Controller:
 
 def _waves(model: Model, seed: int) -> Controller:
     """Every actuator follows a sum of three sines within the middle of its range."""
+    if seed < 0:
+        raise BadInputError(f"seed must not be negative; got {seed}")
     low, high = np.nan_to_num(model.actuator_ctrlrange, posinf=1.0, neginf=-1.0).T
     draw = np.random.default_rng(seed)
     frequency = draw.uniform(0.2, 1.5, (3, model.nu))  # Hz

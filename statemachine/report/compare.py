@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ..compare import Agreement, Comparison, Witness
+from ..compare import Agreement, Comparison, Contact, Touch, Witness
 from ..page import Page, Table, Text, Verdict
-from .figures_of import quantity, short_time
+from .figures_of import figure, quantity, short_time
 
 # Of the promises that a backend may emulate, those that move the arm.
 _PHYSICS = ("position servo", "armature", "joint damping", "dry friction", "joint limits")
-_WORDS = {"agrees": "agrees", "settles": "settles", "differs": "DIFFERS"}
+_WORDS = {"agrees": "agree", "settles": "settle", "differs": "DIFFER"}
 
 
 def page(
@@ -19,6 +19,7 @@ def page(
     says: str = "",
     said: Sequence[str] = (),
     witness: Witness | None = None,
+    touches: Sequence[Touch] = (),
 ) -> Page:
     """Figures and verdicts, then the reasons of the tolerances.
 
@@ -27,6 +28,7 @@ def page(
         says: What happens in the experiment.
         said: What stood in for a run, line by line.
         witness: What a third party says of both sides' fingertips.
+        touches: Who touches whom on each side.
     """
     one, two = comparison.one, comparison.two
     blocks: list[Any] = []
@@ -35,9 +37,9 @@ def page(
     blocks += [Text(_sentence(line)) for line in (*said, *comparison.notes)]
     blocks.append(
         Table(
-            ("quantity", "max", "at", "RMS", "settled", "beyond from", "verdict"),
+            ("quantity", "max", "at", "RMS", "settled", "from", "verdict"),
             [_row(found) for found in comparison.agreements],
-            title=f"{one.label} against {two.label}: how far apart",
+            title=f"{one.label} against {two.label}: how far apart (times in s)",
             words=frozenset({0, 6}),
             emphasis=frozenset(
                 k for k, found in enumerate(comparison.agreements) if found.verdict == "differs"
@@ -45,12 +47,15 @@ def page(
         )
     )
     blocks.append(Text(_summary(comparison)))
+    told = [_touch(touch, one.backend, two.backend) for touch in touches]
+    if told:
+        blocks.append(Text(" ".join(told)))
     blocks.append(
         Text(
             f"Compared at {comparison.moments} moments over {comparison.until:g} s. Settled is "
-            "the mean over the last tenth of them (of forces: how far apart the means are). "
-            "A quantity agrees if it is never beyond its tolerance, settles if what is settled "
-            "is not beyond it, and differs otherwise."
+            "the mean over the last tenth of them (of forces: how far apart the means are); from "
+            "is when it is first beyond its tolerance. A quantity agrees if it is never beyond "
+            "it, settles if what is settled is not beyond it, and differs otherwise."
         )
     )
     blocks.append(
@@ -89,12 +94,12 @@ def _row(found: Agreement) -> tuple[str, ...]:
     kind = found.kind
     if kind == "contact":
         gap = found.note or quantity(found.max, kind)
-        return (found.name, gap, short_time(found.at), "", "", "", _WORDS[found.verdict])
-    since = "" if found.since is None else short_time(found.since)
+        return (found.name, gap, f"{found.at:.3f}", "", "", "", _WORDS[found.verdict])
+    since = "" if found.since is None else f"{found.since:.3f}"
     return (
         found.name,
         quantity(found.max, kind),
-        short_time(found.at),
+        f"{found.at:.3f}",
         quantity(found.rms, kind),
         quantity(found.settled, kind),
         since,
@@ -135,7 +140,7 @@ def _summary(comparison: Comparison) -> str:
     total = len(comparison.agreements)
     if counts[0] == total:
         worst = comparison.worst
-        text = f"All {total} quantities agree at every moment"
+        text = f"All {total} quantities agree at every moment that was compared"
         if worst is not None:
             text += (
                 f"; nearest to its tolerance comes {worst.name}, with "
@@ -152,12 +157,34 @@ def _summary(comparison: Comparison) -> str:
     return text
 
 
+def _touch(touch: Touch, one: str, two: str) -> str:
+    """What becomes of a contact on each side, in a sentence."""
+    first, second = _end(touch.one, one), _end(touch.two, two)
+    return f"{touch.pair}: {first}; {second}."
+
+
+def _end(contact: Contact, backend: str) -> str:
+    if contact.last is None:
+        return f"on {backend} they never touch"
+    if contact.ends:
+        return f"on {backend} in touch at the end, pressed with {figure(contact.force)} N"
+    return f"on {backend} last in touch at {short_time(contact.last)}"
+
+
 def _verdict(comparison: Comparison) -> str:
     if comparison.agrees:
         return f"{comparison.one.backend} and {comparison.two.backend} agree within tolerance"
-    beyond = [found.name for found in comparison.agreements if found.verdict != "agrees"]
-    few = ", ".join(beyond[:4]) + (f" and {len(beyond) - 4} more" if len(beyond) > 4 else "")
-    return f"all quantities agree within tolerance (not: {few})"
+    if comparison.ended:
+        sides = [side.backend for side in (comparison.one, comparison.two) if side.ended]
+        return f"both runs come to their end (not: {' and '.join(sides)})"
+    found = comparison.agreements
+    parts = []
+    for verdict, word in (("differs", "differ"), ("settles", "settle")):
+        names = [each.name for each in found if each.verdict == verdict]
+        if names:
+            few = "; ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
+            parts.append(f"{len(names)} {word}: {few}")
+    return f"not within tolerance always: of {len(found)} quantities {'. '.join(parts)}"
 
 
 def _origin(comparison: Comparison) -> str:

@@ -7,6 +7,8 @@ import math
 
 def quantity(value: float, kind: str) -> str:
     """A difference as text: degrees, millimetres, joules, seconds or newtons."""
+    if math.isnan(value):
+        return "none"
     scale, unit = scale_of(kind)
     return f"{figure(value * scale)}{unit}"
 
@@ -24,6 +26,8 @@ def figure(value: float) -> str:
     """A number with three significant digits; tiny ones with their power of ten."""
     if value == 0:
         return "0"
+    if not math.isfinite(value):
+        return "no number" if math.isnan(value) else str(value)
     size = abs(value)
     if size < 1e-3 or size >= 1e5:
         return f"{value:.0e}".replace("e-0", "e-").replace("e+0", "e")

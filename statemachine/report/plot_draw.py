@@ -167,7 +167,8 @@ def _value_axis(axes: Any, panel: Panel) -> None:
     from matplotlib.ticker import MaxNLocator
 
     values = np.concatenate([curve[1] for _, curve in panel.curves])
-    low, high = float(values.min()), float(values.max())
+    values = values[np.isfinite(values)]
+    low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
     # What does not matter is not blown up to the height of the panel.
     least = 20 * panel.tolerance if panel.tolerance else 1e-3 * max(abs(high), abs(low), 1e-3)
     if high - low < least:
@@ -184,7 +185,9 @@ def _apart(axes: Any, panel: Panel) -> None:
 
     assert panel.apart is not None
     time, values = panel.apart
-    marks = values[values > 0].tolist() + ([panel.tolerance] if panel.tolerance else [])
+    marks = values[(values > 0) & np.isfinite(values)].tolist() + (
+        [panel.tolerance] if panel.tolerance else []
+    )
     most, least = (max(marks), min(marks)) if marks else (1.0, 1.0)
     top = math.ceil(math.log10(most) + 0.1)
     bottom = max(math.floor(math.log10(least)), top - _DECADES)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..backends import backend_names, load
-from ..compare import Request, compare, series, sides_of, witness
+from ..compare import Request, compare, series, sides_of, touches, witness
 from ..compare.why import attribute
 from ..engines import available
 from ..errors import MissingEngineError
@@ -94,7 +94,7 @@ def make_comparisons(folder: Path, say: Callable[[str], None] = print) -> list[P
         say(f"comparing: {name} ...")
         (one, two), said = sides_of(Request((name,)))
         asked = witness(one, two)
-        page = comparison.page(compare(one, two), one.header.says, said, asked)
+        page = comparison.page(compare(one, two), one.header.says, said, asked, touches(one, two))
         curves = {
             curve.name: (curve.time.tolist(), (curve.difference * scale_of(curve.kind)[0]).tolist())
             for curve in series(one, two)

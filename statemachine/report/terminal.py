@@ -122,7 +122,7 @@ def _print(console: Console, blocks: Sequence[Block], heading: Page | None, foot
                 console.print()
                 if block.title:
                     console.print(f"[italic]{escape(block.title)}[/]")
-                console.print(_grid(block, plain, escape))
+                console.print(_grid(block, plain, escape, console.width))
             case Verdict(text, holds):
                 console.print()
                 mark = f"[green]{good}[/]" if holds else f"[red]{bad}[/]"
@@ -156,7 +156,7 @@ def _plain() -> bool:
     return (sys.stdout.encoding or "utf-8").lower().replace("-", "") != "utf8"
 
 
-def _grid(block: Table, plain: bool, escape: Callable[[str], str]) -> object:
+def _grid(block: Table, plain: bool, escape: Callable[[str], str], width: int) -> object:
     from rich import box
     from rich.table import Table as Grid
 
@@ -165,13 +165,36 @@ def _grid(block: Table, plain: bool, escape: Callable[[str], str]) -> object:
         pad_edge=False,
         show_edge=False,
     )
+    name = _whole_name(block, width)
     for k, header in enumerate(block.headers):
         grid.add_column(
-            escape(header), justify="left" if k in block.words else "right", overflow="fold"
+            escape(header),
+            justify="left" if k in block.words else "right",
+            overflow="fold",
+            min_width=name if k == 0 else None,
         )
     for k, row in enumerate(block.rows):
         grid.add_row(*map(escape, row), style="bold" if k in block.emphasis else None)
     return grid
+
+
+def _whole_name(block: Table, width: int) -> int | None:
+    """The least width of a first column of names that breaks none, if there is room for it."""
+    from rich.cells import cell_len
+
+    if 0 not in block.words or not block.rows:
+        return None
+    columns = list(zip(block.headers, *block.rows, strict=True))
+    longest = max(cell_len(word) for cell in columns[0] for word in cell.split() or [""])
+    # Words of other columns may wrap; numbers must not.
+    others = sum(
+        max(cell_len(part) for cell in column for part in (cell.split() or [""]))
+        if k in block.words
+        else max(map(cell_len, column))
+        for k, column in enumerate(columns)
+        if k
+    )
+    return longest if longest + others + 3 * len(columns) - 3 <= width else None
 
 
 def _hanging(mark: str, text: str) -> object:

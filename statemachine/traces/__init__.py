@@ -10,6 +10,7 @@ A recorder stands on the public face of the core; a file is npz, or parquet with
 from __future__ import annotations
 
 from .files import export_csv, read, write
+from .models import model_file
 from .recorder import play, record, record_scenario
 from .shipped import shipped, shipped_names
 from .trace import COLUMNS, CONTACTS, Header, Trace
@@ -20,6 +21,7 @@ __all__ = [
     "Header",
     "Trace",
     "export_csv",
+    "model_file",
     "play",
     "read",
     "record",

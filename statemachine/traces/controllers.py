@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import importlib.util
 import sys
 import traceback
@@ -27,7 +28,7 @@ def controller_from(spec: str) -> Controller:
         file, name = spec, "controller"
     path = Path(file)
     if path.suffix != ".py" or not path.is_file():
-        raise BadInputError(f"there is no controller file {file}: it reads like FILE.py:NAME")
+        raise _missing(path, spec)
     module_spec = importlib.util.spec_from_file_location(f"controller_{path.stem}", path)
     if module_spec is None or module_spec.loader is None:
         raise BadInputError(f"{path.name} cannot be loaded as Python")
@@ -52,6 +53,15 @@ def controller_from(spec: str) -> Controller:
     return controller
 
 
+def _missing(path: Path, spec: str) -> BadInputError:
+    if path.suffix != ".py":
+        return BadInputError(f"a controller is given as FILE.py or FILE.py:NAME; got {spec!r}")
+    beside = [f.name for f in path.parent.glob("*.py")] if path.parent.is_dir() else []
+    close = difflib.get_close_matches(path.name, beside, n=1, cutoff=0.6)
+    hint = f". Did you mean {close[0]}?" if close else ""
+    return BadInputError(f"there is no controller file {path}{hint}")
+
+
 def _failed(error: Exception, path: Path, time: float | None = None) -> BadInputError:
     """What went wrong in the file, and at which of its lines."""
     lines = [
@@ -63,4 +73,6 @@ def _failed(error: Exception, path: Path, time: float | None = None) -> BadInput
         lines = [error.lineno]
     where = path.name + (f", line {lines[-1]}" if lines else "")
     when = "" if time is None else f", at {time:.3f} s"
-    return BadInputError(f"{where}{when}: {type(error).__name__}: {error}")
+    # A SyntaxError's text names file and line once more.
+    said = error.msg if isinstance(error, SyntaxError) else str(error)
+    return BadInputError(f"{where}{when}: {type(error).__name__}: {said}")

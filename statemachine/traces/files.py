@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import difflib
 import importlib
 import itertools
 import os
@@ -53,13 +54,13 @@ def read(path: str | os.PathLike[str]) -> Trace:
     """Open a trace. No engine is needed; nothing in the file is run.
 
     Raises:
-        TraceError: The file is no trace.
+        TraceError: The file is not there, or is no trace.
         MissingEngineError: Parquet, and pyarrow is not installed.
-        OSError: It is not there, or cannot be read.
+        OSError: It cannot be read.
     """
     source = _known(path)
-    with open(source, "rb"):  # what is not there is said in the system's words
-        pass
+    if not source.is_file():
+        raise _missing(source)
     reader = _read_parquet if source.suffix.lower() == ".parquet" else _read_npz
     try:
         text, columns = reader(source)
@@ -168,6 +169,18 @@ def _known(path: str | os.PathLike[str]) -> Path:
     return found
 
 
+def _missing(path: Path) -> TraceError:
+    """The error for a file that is not there, with the nearest name beside it."""
+    message = f"there is no trace {path}"
+    if path.is_dir():
+        message = f"{path} is a folder, not a trace"
+    elif path.parent.is_dir():
+        beside = [file.name for file in path.parent.iterdir() if file.suffix in SUFFIXES]
+        close = difflib.get_close_matches(path.name, beside, n=1, cutoff=0.6)
+        message += f". Did you mean {close[0]}?" if close else ""
+    return TraceError(message)
+
+
 def _write_rows(out: BinaryIO, labels: list[str], rows: Iterable[list[Any]]) -> None:
     lines = _Lines(out)
     writer = csv.writer(lines, lineterminator="\n")
@@ -199,26 +212,46 @@ def _write_npz(trace: Trace, out: BinaryIO) -> None:
 def _read_npz(path: Path) -> tuple[str, dict[str, Any]]:
     try:
         with zipfile.ZipFile(path) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-        if size > _MOST:
-            raise TraceError(f"unfolds into {size / 2**30:.1f} GB; at most {_MOST >> 30}")
+            entries = archive.infolist()
+        _bearable(sum(entry.file_size for entry in entries))
+        strange = [entry.filename for entry in entries if not entry.filename.endswith(".npy")]
+        if strange:
+            raise TraceError(f"holds {strange[0][:40]!r}, which is no array")
         with np.load(path, allow_pickle=False) as file:
             if "header" not in file:
                 raise TraceError("has no header: it is no trace")
-            text = file["header"].astype(np.uint8).tobytes().decode()
+            if file["header"].dtype != np.uint8:
+                raise TraceError("has a header that is no text: it is no trace")
+            text = file["header"].tobytes().decode()
             columns = {
                 name: _as_column(name, file[name]) for name in file.files if name != "header"
             }
     except TraceError:
         raise
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+    except (
+        OSError,
+        ValueError,
+        EOFError,
+        KeyError,
+        RuntimeError,  # a password; NotImplementedError: another packing
+        MemoryError,  # an array that says it is larger than it is
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
         raise TraceError(f"is no trace: {error or type(error).__name__}") from None
     return text, columns
 
 
+def _bearable(size: int) -> None:
+    if size > _MOST:
+        raise TraceError(f"unfolds into {size / 2**30:.1f} GB; at most {_MOST >> 30}")
+
+
 def _as_column(name: str, array: Any) -> Any:
-    if array.dtype.kind not in "fiu":
-        raise TraceError(f"column {name!r} holds {array.dtype}, not numbers")
+    kinds = "iu" if name in WHOLE else "fiu"
+    if array.dtype.kind not in kinds:
+        what = "whole numbers" if name in WHOLE else "numbers"
+        raise TraceError(f"column {name!r} holds {array.dtype}, not {what}")
     return array.astype(np.int64 if name in WHOLE else np.float64)
 
 
@@ -268,7 +301,10 @@ def _read_parquet(path: Path) -> tuple[str, dict[str, Any]]:
     arrow = _pyarrow()
     parquet = importlib.import_module("pyarrow.parquet")
     try:
-        table = parquet.read_table(path)
+        with parquet.ParquetFile(path) as file:
+            groups = (file.metadata.row_group(k) for k in range(file.metadata.num_row_groups))
+            _bearable(sum(group.total_byte_size for group in groups))
+            table = file.read()
         text = (table.schema.metadata or {}).get(_KEY, b"").decode()
         if not text:
             raise TraceError("has no header: it is no trace")
@@ -287,7 +323,14 @@ def _read_parquet(path: Path) -> tuple[str, dict[str, Any]]:
                 columns[name] = np.empty((table.num_rows, *header.shape(name)))
     except TraceError:
         raise
-    except (OSError, ValueError, TypeError, AttributeError, arrow.ArrowException) as error:
+    except (
+        OSError,
+        ValueError,
+        TypeError,
+        AttributeError,
+        MemoryError,
+        arrow.ArrowException,
+    ) as error:
         raise TraceError(f"is no trace: {str(error).splitlines()[0]}") from None
     return text, columns
 

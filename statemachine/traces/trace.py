@@ -15,6 +15,7 @@ from ..checks import index_of
 from ..errors import TraceError
 from ..experiments._common import Provenance
 from ..records import Array
+from .checked import check_header, check_places
 
 SCHEMA = 1
 # Columns of numbers, one row for each moment; widths are numbers or counts of the header.
@@ -152,22 +153,32 @@ class Header:
         try:
             facts = json.loads(text)
             if facts.get("schema") != SCHEMA:
-                raise TraceError(
-                    f"this trace has schema {facts.get('schema')!r}; this version reads {SCHEMA}"
-                )
+                given = repr(facts.get("schema"))[:20]
+                raise TraceError(f"this trace has schema {given}; this version reads {SCHEMA}")
             known = {field.name for field in dataclasses.fields(Provenance)}
             by = {key: _frozen(value) for key, value in _known(facts["provenance"], known).items()}
             facts["provenance"] = Provenance(**by)
             known = {field.name for field in dataclasses.fields(cls)}
             header = cls(**{name: _frozen(value) for name, value in _known(facts, known).items()})
             header._check()
-        except (ValueError, TypeError, AttributeError, KeyError) as error:
-            if isinstance(error, TraceError):
-                raise
+        except TraceError:
+            raise
+        except (ValueError, TypeError, AttributeError, KeyError, RecursionError) as error:
             raise TraceError(f"this is no header of a trace: {error}") from None
         return header
 
+    @property
+    def joint_labels(self) -> tuple[str, ...]:
+        """A name for each joint: its own, or "joint 0" by its number."""
+        return tuple(name or f"joint {k}" for k, name in enumerate(self.joints))
+
+    @property
+    def body_labels(self) -> tuple[str, ...]:
+        """A name for each body: its own, or "body 1" by its number."""
+        return tuple(name or f"body {k}" for k, name in enumerate(self.bodies))
+
     def _check(self) -> None:
+        check_header(self)
         for name in ("nq", "nv", "nu", "substeps"):
             value = getattr(self, name)
             if not isinstance(value, int) or not 0 <= value < 10**6:
@@ -187,6 +198,7 @@ class Header:
         for name, length in lengths.items():
             if len(getattr(self, name)) != length:
                 raise TraceError(f"{name} of the trace has {len(getattr(self, name))} entries")
+        check_places(self)
 
 
 def _known(facts: Mapping[str, Any], names: set[str]) -> dict[str, Any]:
@@ -215,9 +227,10 @@ class Trace:
     columns: Mapping[str, NDArray[Any]]
 
     def __post_init__(self) -> None:
-        rows = len(self.columns["time"]) if "time" in self.columns else -1
-        if rows < 1:
+        time = self.columns.get("time")
+        if time is None or time.ndim != 1 or not len(time):
             raise TraceError("a trace has at least one row, and a column 'time'")
+        rows = len(time)
         for name, array in self.columns.items():
             if name not in COLUMNS and name not in CONTACTS:
                 raise TraceError(f"a trace has no column {name!r}")
@@ -233,6 +246,9 @@ class Trace:
                 raise TraceError(f"a trace needs the column {name!r}")
             if not np.isfinite(self.columns[name]).all():
                 raise TraceError(f"column {name!r} has an entry that is not a finite number")
+        if not (np.diff(time) > 0).all():
+            row = int(np.argmin(np.diff(time) > 0))
+            raise TraceError(f"time does not go on after row {row}, at {time[row]:g} s")
         contact = [name for name in CONTACTS if name in self.columns]
         if contact and len(contact) != len(CONTACTS):
             raise TraceError(f"of the contacts only {', '.join(contact)} are there")
@@ -293,10 +309,11 @@ class Trace:
         found: dict[str, NDArray[np.bool_]] = {}
         if "contact_row" not in self:
             return found
+        labels = self.header.body_labels
         for row, (one, two) in zip(
             self["contact_row"].tolist(), self["contact_geom"].tolist(), strict=True
         ):
             bodies = sorted((self.header.geom_bodyid[one], self.header.geom_bodyid[two]))
-            name = " – ".join(self.header.bodies[body] for body in bodies)
+            name = " – ".join(labels[body] for body in bodies)
             found.setdefault(name, np.zeros(len(self), dtype=bool))[row] = True
         return found

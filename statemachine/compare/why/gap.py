@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import BadInputError, DivergedError, TraceError
 from ...interface import Model
-from ...records import Array, JointType, usual_site
+from ...records import Array, Ints, JointType, usual_site
 from ...traces import Trace
 from ...verbs import forward, make_data
 from ..align import common_moments
@@ -81,6 +81,8 @@ class Ruler:
             self.units[model.body_names[body]] = "m"
             if self._tip is not None:
                 self.units[self._in_hand(body)] = "m"
+        if not self.units:
+            raise BadInputError(f"nothing can be measured in {model.path.name}: it has no joint")
 
     @property
     def _tip_name(self) -> str:
@@ -162,10 +164,16 @@ class Ruler:
         return {name: self.gap(name, one, two) for name in self.units}
 
 
-def _rows(time: Array, values: Array, wanted: Array, timestep: float) -> Array:
-    """Rows at moments: of the run itself where it has them, else between two of them."""
+def _nearest(time: Array, wanted: Array) -> Ints:
+    """The row of the time (n,), ascending, that is nearest to each that is wanted (k,)."""
     near = np.clip(np.searchsorted(time, wanted), 0, len(time) - 1)
     near -= (near > 0) & (np.abs(time[near - 1] - wanted) < np.abs(time[near] - wanted))
+    return near
+
+
+def _rows(time: Array, values: Array, wanted: Array, timestep: float) -> Array:
+    """Rows at moments: of the run itself where it has them, else between two of them."""
+    near = _nearest(time, wanted)
     found = values[near].copy()
     off = np.flatnonzero(np.abs(time[near] - wanted) > _SAME * timestep + 1e-9)
     if len(off):

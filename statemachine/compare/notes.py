@@ -1,0 +1,137 @@
+"""What makes a comparison less than one of two engines on one model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..records import JointType
+from ..traces import Header, Trace
+from .align import SAME, Common
+from .series import tell
+
+if TYPE_CHECKING:
+    from .agreement import Agreement
+
+# Columns that are compared, and what a page calls them.
+_COMPARED = {
+    "site_xpos": "fingertip",
+    "site_xmat": "fingertip",
+    "energy": "energy",
+    "contact_row": "contacts",
+    "contact_force": "contact forces",
+}
+
+
+def notes_on(one: Trace, two: Trace, common: Common, found: Sequence[Agreement]) -> Iterator[str]:
+    """A line for each thing that a reader of the figures must know."""
+    a, b = one.header, two.header
+    if a.provenance.model_sha256 != b.provenance.model_sha256:
+        yield (
+            f"the models are two: {a.provenance.model_file} and {b.provenance.model_file} "
+            "have other digests"
+        )
+    yield from _of_joints(one, two)
+    yield from _of_columns(one, two)
+    for each in found:
+        if each.note.startswith("no number"):
+            yield f"{each.name}: {each.note}, so it cannot agree"
+    if a.experiment != b.experiment:
+        yield f"the experiments are two: {a.experiment} and {b.experiment}"
+    yield from _of_time(one, two, common)
+    if not np.allclose(a.gravity, b.gravity, rtol=0, atol=1e-12):
+        yield f"gravity differs: {_vector(a.gravity)} and {_vector(b.gravity)} m/s²"
+    if any(header.defaults == "engine" and header.energy_by for header in (a, b)):
+        yield (
+            "energy is measured by one yardstick on both sides, masses, armature and gravity of "
+            f"the model ({a.energy_by or b.energy_by}), whatever an engine itself has"
+        )
+    if a.actuators != b.actuators:
+        yield "the actuators differ, in name or in order"
+    elif _commands_differ(one, two, common):
+        yield "the commands differ: the controllers saw different states, or are two"
+    for header in (a, b):
+        if header.ended:
+            yield f"{header.label} ended early: {header.ended}"
+        if header.rewritten:
+            yield (
+                f"{header.label}: in {header.rewritten} rows the state was written, by the "
+                "controller; that is no part of the commands"
+            )
+        if header.single:
+            yield (
+                f"the recorded run of {header.backend} keeps all but its state in single precision"
+            )
+
+
+def _of_joints(one: Trace, two: Trace) -> Iterator[str]:
+    a, b = one.header, two.header
+    only = [*_lacking(a, b), *_lacking(b, a)]
+    if only:
+        yield f"compared is what both have; missing on one side: {', '.join(only)}"
+    shared = [name for name in a.joint_labels if name in b.joint_labels]
+    other = [name for name in shared if len({_place(header, name)[0] for header in (a, b)}) > 1]
+    if other:
+        yield f"not compared, for they are joints of another kind: {', '.join(other)}"
+    if any(
+        not np.array_equal(_start(one, name, column), _start(two, name, column))
+        for name in shared
+        if name not in other
+        for column in ("qpos", "qvel")
+    ):
+        yield "the runs do not start in the same state"
+
+
+def _of_columns(one: Trace, two: Trace) -> Iterator[str]:
+    missing = dict.fromkeys(
+        what
+        for column, what in _COMPARED.items()
+        if not tell(one, two, column) and (column in one or column in two)
+    )
+    if missing:
+        yield f"not compared, for one side does not tell it: {', '.join(missing)}"
+
+
+def _of_time(one: Trace, two: Trace, common: Common) -> Iterator[str]:
+    steps = [trace.header.timestep for trace in (one, two)]
+    if steps[0] != steps[1]:
+        yield (
+            f"timesteps differ, {1000 * steps[0]:.4g} and {1000 * steps[1]:.4g} ms: compared "
+            "are the moments that both have, nothing is interpolated"
+        )
+    ends = [float(trace.time[-1] - trace.time[0]) for trace in (one, two)]
+    if abs(ends[0] - ends[1]) > max(steps) * (1 + SAME):
+        longer = (one, two)[ends[1] > ends[0]].header
+        yield (
+            f"the runs are {ends[0]:g} and {ends[1]:g} s long: what {longer.label} does after "
+            f"{common.time[-1]:g} s is not compared"
+        )
+
+
+def _commands_differ(one: Trace, two: Trace, common: Common) -> bool:
+    # The command of a last row is never carried out.
+    used = (common.one < len(one) - 1) & (common.two < len(two) - 1)
+    return not np.array_equal(one.ctrl[common.one[used]], two.ctrl[common.two[used]])
+
+
+def _place(header: Header, name: str) -> tuple[int, int, int]:
+    """Kind of a joint, and its places in qpos and qvel."""
+    number = header.joint_labels.index(name)
+    return header.jnt_type[number], header.jnt_qposadr[number], header.jnt_dofadr[number]
+
+
+def _start(trace: Trace, name: str, column: str) -> np.ndarray:
+    """Where a joint is in the first row, or how fast."""
+    kind, qpos, dof = _place(trace.header, name)
+    start, width = (qpos, JointType(kind).nq) if column == "qpos" else (dof, JointType(kind).nv)
+    return trace[column][0, start : start + width]
+
+
+def _lacking(a: Header, b: Header) -> list[str]:
+    return [f"{name} ({a.label})" for name in a.joint_labels if name not in b.joint_labels]
+
+
+def _vector(values: tuple[float, ...]) -> str:
+    return " ".join(f"{value:g}" for value in values)

@@ -1,0 +1,392 @@
+"""Traces that are broken, cut short, edited or foreign: nothing of them may pass for agreement."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine import compare as comparing
+from statemachine.compare import Agreement, Comparison, compare, witness
+from statemachine.errors import BadInputError, ModelFileError, TraceError
+from statemachine.experiments.scenarios import SCENARIOS
+from statemachine.records import JointType
+from statemachine.report import compare as report
+from statemachine.report import terminal
+from statemachine.traces import Trace, model_file, read, record, write
+
+from .conftest import Cli, need_engine
+
+
+@pytest.fixture(scope="module")
+def box() -> Trace:
+    return record(sm.load("so101/scene_box"), seconds=0.3, keyframe="held", experiment="box")
+
+
+def changed(trace: Trace, header: dict[str, Any] | None = None, **columns: Any) -> Trace:
+    return Trace(dataclasses.replace(trace.header, **(header or {})), {**trace.columns, **columns})
+
+
+def cut(trace: Trace, rows: int, **header: Any) -> Trace:
+    kept = {n: a[:rows] for n, a in trace.columns.items() if not n.startswith("contact_")}
+    touching = trace["contact_row"] < rows
+    kept |= {n: a[touching] for n, a in trace.columns.items() if n.startswith("contact_")}
+    return Trace(dataclasses.replace(trace.header, **header), kept)
+
+
+def named(found: Comparison) -> dict[str, Agreement]:
+    return {each.name: each for each in found.agreements}
+
+
+def with_nan(array: Any, row: int) -> Any:
+    copy = np.array(array)
+    copy[row] = np.nan
+    return copy
+
+
+@pytest.mark.parametrize(
+    ("column", "quantity"),
+    [
+        ("site_xpos", "gripperframe, position"),
+        ("site_xmat", "gripperframe, rotation"),
+        ("energy", "energy"),
+        ("contact_force", "gripper – box, force"),
+    ],
+)
+def test_what_is_no_number_never_agrees(
+    column: str, quantity: str, box: Trace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = compare(box, changed(box, None, **{column: with_nan(box[column], 20)}))
+    assert not found.agrees
+    assert named(found)[quantity].verdict == "differs"
+    assert found.worst is not None
+    assert found.worst.name == quantity
+    assert any(note.startswith(f"{quantity}: no number at 1 of") for note in found.notes)
+    terminal.show(report.page(found))
+    assert "nan" not in capsys.readouterr().out
+
+
+def test_a_column_that_is_not_told_is_not_compared_and_that_is_said(box: Trace) -> None:
+    for column, what in (("site_xpos", "fingertip"), ("contact_force", "contact forces")):
+        silent = changed(box, None, **{column: np.full_like(box[column], np.nan)})
+        found = compare(box, silent)
+        assert f"not compared, for one side does not tell it: {what}" in found.notes
+        assert len(found.agreements) < len(compare(box, box).agreements)
+    bare = {n: a for n, a in box.columns.items() if not n.startswith("contact_")}
+    found = compare(box, Trace(box.header, bare))
+    assert not any(each.kind in ("contact", "force") for each in found.agreements)
+
+
+def test_a_rotation_that_is_none_differs(box: Trace) -> None:
+    qpos = np.array(box.qpos)
+    at = box.header.jnt_qposadr[box.header.joints.index("box")]
+    qpos[:, at + 3 : at + 7] = 0.0
+    assert named(compare(box, changed(box, qpos=qpos)))["box, rotation"].verdict == "differs"
+
+
+def test_who_ended_early_does_not_agree(box: Trace) -> None:
+    found = compare(box, cut(box, 5, ended="it diverged"))
+    assert {each.verdict for each in found.agreements} == {"agrees"}
+    assert found.ended
+    assert not found.agrees
+    page = report.page(found)
+    assert not page.holds
+    assert any("0.02 s is not compared" in note for note in found.notes)
+
+
+def test_a_shorter_run_is_compared_as_far_as_it_goes_and_that_is_said(box: Trace) -> None:
+    found = compare(cut(box, 30), box)
+    assert found.agrees
+    said = [note for note in found.notes if "s long" in note]
+    assert said == [
+        "the runs are 0.145 and 0.3 s long: what "
+        f"{box.header.label} does after 0.145 s is not compared"
+    ]
+    # Other commands are found in runs of other lengths, too.
+    ctrl = np.array(box.ctrl)
+    ctrl[3] += 0.1
+    notes = compare(cut(box, 30), changed(box, ctrl=ctrl)).notes
+    assert any("the commands differ" in note for note in notes)
+
+
+def test_bodies_in_another_order_are_the_same_bodies(box: Trace) -> None:
+    header = box.header
+    order = [0, *range(len(header.bodies) - 1, 0, -1)]
+    place = {body: k for k, body in enumerate(order)}
+    turned = changed(
+        box,
+        {
+            "bodies": tuple(header.bodies[body] for body in order),
+            "body_parentid": tuple(place[header.body_parentid[body]] for body in order),
+            "geom_bodyid": tuple(place[body] for body in header.geom_bodyid),
+        },
+        xpos=box["xpos"][:, order],
+        xquat=box["xquat"][:, order],
+    )
+    there, back = compare(box, turned), compare(turned, box)
+    assert there.agrees
+    assert back.agrees
+    assert set(named(there)) == set(named(compare(box, box)))
+
+
+def test_bodies_without_names_are_told_apart(tmp_path: Path) -> None:
+    path = tmp_path / "two.xml"
+    path.write_text(
+        '<mujoco><worldbody><geom type="plane" size="1 1 .1"/>'
+        '<body pos="0 0 .05"><freejoint/><geom size=".05"/></body>'
+        '<body pos="1 0 .05"><freejoint/><geom size=".05"/></body></worldbody></mujoco>'
+    )
+    trace = record(sm.load(path), seconds=0.2)
+    assert set(trace.touches()) == {"world – body 1", "world – body 2"}
+    force = {
+        each.name: each.tolerance
+        for each in compare(trace, trace).agreements
+        if each.kind == "force"
+    }
+    assert set(force) == {"world – body 1, force", "world – body 2, force"}
+
+
+def test_joints_of_other_kinds_and_written_states_are_said(box: Trace) -> None:
+    slide = (int(JointType.SLIDE), *box.header.jnt_type[1:])
+    notes = compare(box, changed(box, {"jnt_type": slide})).notes
+    assert "not compared, for they are joints of another kind: shoulder_pan" in notes
+    notes = compare(box, changed(box, {"rewritten": 7})).notes
+    assert any("in 7 rows the state was written" in note for note in notes)
+
+
+def _with_header(trace: Trace, path: Path, change: Any) -> Path:
+    facts = json.loads(trace.header.as_json())
+    change(facts)
+    columns = {name: np.array(array) for name, array in trace.columns.items()}
+    text = np.frombuffer(json.dumps(facts).encode(), dtype=np.uint8)
+    np.savez_compressed(path, header=text, **columns)  # type: ignore[arg-type]
+    return path
+
+
+_VALUES: tuple[Any, ...] = (None, 3.5, "x", [], {}, [None] * 7, ["x"] * 7, [[1]], [10**6] * 7)
+
+
+def test_a_header_is_refused_or_can_be_shown(box: Trace, tmp_path: Path) -> None:
+    """Whatever stands in it: what opens can be compared with itself, and shown."""
+    short, path = cut(box, 25), tmp_path / "edited.npz"
+    facts = json.loads(box.header.as_json())
+    places = [(facts, name) for name in facts]
+    places += [(facts["provenance"], name) for name in facts["provenance"]]
+    refused = 0
+    for owner, name in places:
+        for value in _VALUES:
+
+            def change(made: Any, owner: Any = owner, name: str = name, value: Any = value) -> None:
+                (made if owner is facts else made["provenance"])[name] = value
+
+            _with_header(short, path, change)
+            try:
+                trace = read(path)
+            except TraceError:
+                refused += 1
+                continue
+            terminal.show(report.page(compare(trace, trace)))
+            trace.touches()
+    assert refused > len(places) * len(_VALUES) / 2
+
+
+def test_names_that_stand_twice_and_places_that_are_not_there(box: Trace, tmp_path: Path) -> None:
+    path = tmp_path / "edited.npz"
+
+    def change(name: str, value: Any) -> Any:
+        return lambda facts: facts[name].__setitem__(0, value)
+
+    for name, value, says in (
+        ("joints", "gripper", "two joints of the trace are called 'gripper'"),
+        ("jnt_qposadr", 99, "no place in qpos"),
+        ("jnt_type", 9, "no known kind"),
+        ("geom_bodyid", 99, "names one that is not there"),
+    ):
+        with pytest.raises(TraceError, match=says):
+            read(_with_header(box, path, change(name, value)))
+
+
+def test_time_goes_on(box: Trace, tmp_path: Path) -> None:
+    time = np.array(box.time)
+    time[7] = time[6]
+    with pytest.raises(TraceError, match="time does not go on after row 6"):
+        changed(box, time=time)
+
+    def back(_time: float, data: sm.Data) -> None:
+        data.time = 0.0
+
+    with pytest.raises(TraceError, match="time does not go on"):
+        record(sm.load("so101"), back, 0.1)
+
+
+def test_a_strange_archive_is_one_line(box: Trace, tmp_path: Path) -> None:
+    good = write(box, tmp_path / "good.npz")
+    with zipfile.ZipFile(good) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    huge = b"{'descr': '<f8', 'fortran_order': False, 'shape': (100000000000000,), }"
+    huge = b"\x93NUMPY\x01\x00" + (len(huge) + 1).to_bytes(2, "little") + huge + b"\n"
+    deep = np.frombuffer(b"[" * 100_000, dtype=np.uint8)
+    np.savez(tmp_path / "deep.npz", header=deep)
+    for name, change in (
+        ("more", {"notes.txt": b"hello"}),
+        ("bare", {"header": b"{}"}),
+        ("huge", {"time.npy": huge}),
+        ("deep", None),
+    ):
+        path = tmp_path / f"{name}.npz"
+        if change is not None:
+            with zipfile.ZipFile(path, "w") as archive:
+                for part, content in (parts | change).items():
+                    archive.writestr(part, content)
+        with pytest.raises(TraceError) as caught:
+            read(path)
+        assert "\n" not in str(caught.value)
+
+
+def test_a_name_from_a_file_does_nothing_to_a_terminal(
+    box: Trace, tmp_path: Path, cli: Cli
+) -> None:
+    evil = "\x1b]0;owned\x07\u202e"
+    path = write(changed(box, {"experiment": evil}), tmp_path / "evil.npz")
+    played = cli("trace", "play", path, "-o", tmp_path / "played.npz")
+    names = write(changed(box, {"actuators": (evil, *box.header.actuators[1:])}), path)
+    refused = cli("trace", "play", names, "-o", tmp_path / "played.npz")
+    assert (played.returncode, refused.returncode) == (0, 2)
+    for text in (played.stdout, refused.stderr):
+        assert text
+        assert not {"\x1b", "\x07", "\u202e"} & set(text)
+
+
+def test_options_of_a_run_are_refused_with_traces(box: Trace, tmp_path: Path, cli: Cli) -> None:
+    path = str(write(box, tmp_path / "box.npz"))
+    for words in (
+        (path, path, "--seconds", "1"),
+        (path, path, "--timestep", "0.01"),
+        (path, path, "--defaults", "engine"),
+        (path, path, "--backends", "mujoco", "mujoco"),
+        (path, "--seed", "3"),
+        ("hold", "--digits", "3"),
+        ("waves", "--seed=-1"),
+        ("waves", "--why", "--seed=-1"),
+    ):
+        ran = cli("compare", *words)
+        assert ran.returncode == 2, words
+        assert len(ran.stderr.splitlines()) == 1, ran.stderr
+
+
+def test_the_model_of_a_trace_is_looked_for_by_its_digest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Cli
+) -> None:
+    text = (
+        '<mujoco><worldbody><body name="b"><joint name="j" axis="0 1 0"/>'
+        '<geom size=".1" pos=".3 0 0"/><site name="tip" pos=".3 0 0"/></body></worldbody></mujoco>'
+    )
+    robots = tmp_path / "robots"
+    robots.mkdir()
+    (robots / "one.xml").write_text(text)
+    trace = record(sm.load(robots / "one.xml"), seconds=0.2, experiment="swing")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    monkeypatch.chdir(elsewhere)
+    monkeypatch.delenv("MENAGERIE", raising=False)
+    with pytest.raises(ModelFileError, match="say which it is with --model"):
+        model_file(trace.header)
+    assert model_file(trace.header, menagerie=tmp_path) == (robots / "one.xml", True)
+    assert model_file(trace.header, beside=robots / "t.npz") == (robots / "one.xml", True)
+    # Another file of that name here does not take the place of the one that it was.
+    (elsewhere / "one.xml").write_text(text.replace(".3 0 0", ".4 0 0"))
+    assert model_file(trace.header, menagerie=tmp_path) == (robots / "one.xml", True)
+    assert model_file(trace.header) == (elsewhere / "one.xml", False)
+    assert witness(trace, trace) is None
+    (robots / "one.xml").unlink()
+    write(trace, elsewhere / "swing.npz")
+    ran = cli("trace", "play", "elsewhere/swing.npz", "-o", "played.npz")
+    assert ran.returncode == 0
+    assert "is not the file that the trace was recorded with" in ran.stderr
+    again = read(tmp_path / "played.npz").header
+    assert again.provenance.model_sha256 != trace.header.provenance.model_sha256
+
+
+def test_the_command_of_a_played_trace_says_what_was_asked(
+    box: Trace, tmp_path: Path, cli: Cli
+) -> None:
+    path, out = write(box, tmp_path / "box.npz"), tmp_path / "played.npz"
+    cli("trace", "play", path, "--defaults", "engine", "--model", "so101/scene_box", "-o", out)
+    assert read(out).header.command == (
+        "statemachine trace play box.npz --backend mujoco --defaults engine --model scene_box"
+    )
+
+
+def test_a_controller_gives_real_numbers() -> None:
+    with pytest.raises(BadInputError, match="real numbers"):
+        record(sm.load("so101"), lambda _time, data: np.zeros(len(data.ctrl)) * 1j, 0.1)
+
+
+def test_why_of_what_cannot_move_is_one_line(tmp_path: Path, cli: Cli) -> None:
+    need_engine("pybullet")
+    (tmp_path / "empty.xml").write_text("<mujoco/>")
+    ran = cli("compare", "waves", "--why", "--model", tmp_path / "empty.xml", "--seconds", "0.1")
+    assert ran.returncode == 2
+    assert "nothing can be measured" in ran.stderr
+
+
+def test_why_finds_common_moments_without_a_table_of_all_pairs() -> None:
+    """A table of 60 000 × 60 000 numbers would be 29 GB."""
+    from statemachine.compare.why.gap import Ruler
+
+    model = sm.load("so101")
+    short = record(model, seconds=0.1, derive=False)
+    rows = 60_000
+    time = np.arange(rows) * 0.005
+    long = Trace(
+        short.header,
+        {n: np.broadcast_to(short[n][0], (rows, *short[n].shape[1:])).copy()
+         for n in ("qpos", "qvel", "ctrl")} | {"time": time},
+    )  # fmt: skip
+    ruler = Ruler(model, long, long)
+    assert np.array_equal(ruler.time, time)
+    assert not ruler.between
+
+
+def test_models_compare_alike_whatever_strings_hash_to() -> None:
+    texts = []
+    for seed in ("1", "77"):
+        words = [sys.executable, "-m", "statemachine", "compare", "--models", "so101", "so101"]
+        ran = subprocess.run(
+            [*words, "--json"],
+            env={**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": str(_ROOT)},
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=True,
+        )
+        texts.append(ran.stdout)
+    assert texts[0] == texts[1]
+
+
+_ROOT = Path(comparing.__file__).resolve().parents[2]
+
+
+def test_a_seed_is_not_negative() -> None:
+    with pytest.raises(BadInputError, match="seed"):
+        SCENARIOS["waves"].controller(sm.load("so101"), -1)
+
+
+def test_a_picture_of_what_is_no_number(box: Trace, tmp_path: Path, cli: Cli) -> None:
+    pytest.importorskip("matplotlib")
+    one = write(box, tmp_path / "one.npz")
+    two = write(changed(box, site_xpos=with_nan(box["site_xpos"], 3)), tmp_path / "two.npz")
+    ran = cli("compare", one, two, "--plot", tmp_path / "p.svg", "--html", tmp_path / "p.html")
+    assert ran.returncode == 1, ran.stderr
+    assert "Traceback" not in ran.stderr
+    assert (tmp_path / "p.svg").is_file()
+    assert (tmp_path / "p.html").is_file()
