@@ -9,7 +9,8 @@ A recorder stands on the public face of the core; a file is npz, or parquet with
 
 from __future__ import annotations
 
-from .files import export_csv, read, write
+from .csv_files import export_csv
+from .files import read, write
 from .models import model_file
 from .recorder import play, record, record_scenario
 from .shipped import shipped, shipped_names

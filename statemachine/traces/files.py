@@ -1,17 +1,15 @@
-"""Traces in files: npz, which NumPy reads, or parquet, which tables read; and CSV out."""
+"""Traces in files: npz, which NumPy reads, or parquet, which tables read."""
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import difflib
 import importlib
-import itertools
 import os
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -19,7 +17,6 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..errors import BadInputError, MissingEngineError, TraceError
-from ..records import JointType
 from .trace import COLUMNS, CONTACTS, INPUTS, WHOLE, Header, Trace
 
 SUFFIXES = (".npz", ".parquet")
@@ -70,81 +67,6 @@ def read(path: str | os.PathLike[str]) -> Trace:
         raise TraceError(f"{source.name}: {error}") from None
 
 
-def export_csv(trace: Trace, path: str | os.PathLike[str]) -> list[Path]:
-    """Write the columns as CSV, one row for each moment, units SI.
-
-    Columns are named after joints, bodies, sites and actuators: "qpos.elbow_flex",
-    "site_xpos.gripperframe.x". Contacts, which are many to a moment, go into a second
-    file beside it, NAME.contacts.csv.
-
-    Returns:
-        The files that were written.
-    """
-    target = Path(path)
-    names = [name for name in COLUMNS if name in trace]
-    labels = list(itertools.chain.from_iterable(column_labels(trace.header, n) for n in names))
-    flat = np.hstack([np.asarray(trace[n]).reshape(len(trace), -1) for n in names])
-    replace_file(target, lambda out: _write_rows(out, labels, flat.tolist()))
-    if "contact_row" not in trace:
-        return [target]
-    beside = target.with_name(f"{target.stem}.contacts.csv")
-    geoms, header = trace["contact_geom"].tolist(), trace.header
-    labels = ["time", "geom_1", "geom_2", "body_1", "body_2", "dist"]
-    labels += [f"pos.{axis}" for axis in "xyz"]
-    labels += ["force.normal", "force.tangent_1", "force.tangent_2"]
-
-    def rows() -> Iterator[list[Any]]:
-        for k, row in enumerate(trace["contact_row"].tolist()):
-            one, two = geoms[k]
-            yield [
-                float(trace.time[row]),
-                header.geoms[one] or f"geom {one}",
-                header.geoms[two] or f"geom {two}",
-                header.bodies[header.geom_bodyid[one]],
-                header.bodies[header.geom_bodyid[two]],
-                float(trace["contact_dist"][k]),
-                *trace["contact_pos"][k].tolist(),
-                *trace["contact_force"][k].tolist(),
-            ]
-
-    replace_file(beside, lambda out: _write_rows(out, labels, rows()))
-    return [target, beside]
-
-
-def column_labels(header: Header, column: str) -> list[str]:
-    """A name for each number of a row of a column: "qpos.box.qw"."""
-    if column == "time":
-        return ["time"]
-    if column == "energy":
-        return ["energy.kinetic", "energy.potential"]
-    if column == "ctrl":
-        return [f"ctrl.{name or k}" for k, name in enumerate(header.actuators)]
-    if column in ("qpos", "qvel") or column.startswith("qfrc"):
-        return [f"{column}.{label}" for label in coordinate_labels(header, column == "qpos")]
-    names = header.bodies if column in ("xpos", "xquat") else header.sites
-    parts = {
-        "xpos": "xyz",
-        "site_xpos": "xyz",
-        "xquat": ("qw", "qx", "qy", "qz"),
-        "site_xmat": [f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)],
-    }[column]
-    return [f"{column}.{name or k}.{part}" for k, name in enumerate(names) for part in parts]
-
-
-def coordinate_labels(header: Header, positions: bool) -> list[str]:
-    """A name for each coordinate: the joint's, with parts where it has several."""
-    found = []
-    ball = ("qw", "qx", "qy", "qz") if positions else ("wx", "wy", "wz")
-    parts = {
-        int(JointType.FREE): (*"xyz", *ball) if positions else ("vx", "vy", "vz", *ball),
-        int(JointType.BALL): ball,
-    }
-    for k, (name, kind) in enumerate(zip(header.joints, header.jnt_type, strict=True)):
-        label = name or f"joint {k}"
-        found += [f"{label}.{part}" for part in parts.get(kind, ())] or [label]
-    return found
-
-
 def replace_file(target: Path, fill: Callable[[BinaryIO], None]) -> None:
     """Write a file beside its place and rename it: whole or not at all."""
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
@@ -179,23 +101,6 @@ def _missing(path: Path) -> TraceError:
         close = difflib.get_close_matches(path.name, beside, n=1, cutoff=0.6)
         message += f". Did you mean {close[0]}?" if close else ""
     return TraceError(message)
-
-
-def _write_rows(out: BinaryIO, labels: list[str], rows: Iterable[list[Any]]) -> None:
-    lines = _Lines(out)
-    writer = csv.writer(lines, lineterminator="\n")
-    writer.writerow(labels)
-    writer.writerows(rows)
-
-
-class _Lines:
-    """What csv writes its text into."""
-
-    def __init__(self, out: BinaryIO) -> None:
-        self._out = out
-
-    def write(self, text: str) -> None:
-        self._out.write(text.encode())
 
 
 def _write_npz(trace: Trace, out: BinaryIO) -> None:

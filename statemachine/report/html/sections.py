@@ -83,9 +83,10 @@ def agreements(comparison: Comparison) -> Html:
                 "p",
                 kept(
                     f"Compared at {comparison.moments} moments over {comparison.until:g} s. "
-                    f"Settled is the mean over {window(comparison)}. A quantity agrees if it is "
-                    "within its tolerance always, settles if it is so in the end, and differs "
-                    f"otherwise. {coarsely(comparison)}"
+                    f"Settled is the mean over {window(comparison)} (of forces: how far apart "
+                    "the means are). A quantity agrees if it is never beyond its tolerance, "
+                    "settles if what is settled is not beyond it, and differs otherwise. "
+                    f"{coarsely(comparison)}"
                 ),
             ),
             tag("h3", "What does not matter, and why"),

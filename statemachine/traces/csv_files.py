@@ -1,0 +1,108 @@
+"""A trace as CSV: a name for every number."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from ..records import JointType
+from .files import replace_file
+from .trace import COLUMNS, Header, Trace
+
+
+def export_csv(trace: Trace, path: str | os.PathLike[str]) -> list[Path]:
+    """Write the columns as CSV, one row for each moment, units SI.
+
+    Columns are named after joints, bodies, sites and actuators: "qpos.elbow_flex",
+    "site_xpos.gripperframe.x". Contacts, which are many to a moment, go into a second
+    file beside it, NAME.contacts.csv.
+
+    Returns:
+        The files that were written.
+    """
+    target = Path(path)
+    names = [name for name in COLUMNS if name in trace]
+    labels = list(itertools.chain.from_iterable(column_labels(trace.header, n) for n in names))
+    flat = np.hstack([np.asarray(trace[n]).reshape(len(trace), -1) for n in names])
+    replace_file(target, lambda out: _write_rows(out, labels, flat.tolist()))
+    if "contact_row" not in trace:
+        return [target]
+    beside = target.with_name(f"{target.stem}.contacts.csv")
+    geoms, header = trace["contact_geom"].tolist(), trace.header
+    labels = ["time", "geom_1", "geom_2", "body_1", "body_2", "dist"]
+    labels += [f"pos.{axis}" for axis in "xyz"]
+    labels += ["force.normal", "force.tangent_1", "force.tangent_2"]
+
+    def rows() -> Iterator[list[Any]]:
+        for k, row in enumerate(trace["contact_row"].tolist()):
+            one, two = geoms[k]
+            yield [
+                float(trace.time[row]),
+                header.geoms[one] or f"geom {one}",
+                header.geoms[two] or f"geom {two}",
+                header.bodies[header.geom_bodyid[one]],
+                header.bodies[header.geom_bodyid[two]],
+                float(trace["contact_dist"][k]),
+                *trace["contact_pos"][k].tolist(),
+                *trace["contact_force"][k].tolist(),
+            ]
+
+    replace_file(beside, lambda out: _write_rows(out, labels, rows()))
+    return [target, beside]
+
+
+def column_labels(header: Header, column: str) -> list[str]:
+    """A name for each number of a row of a column: "qpos.box.qw"."""
+    if column == "time":
+        return ["time"]
+    if column == "energy":
+        return ["energy.kinetic", "energy.potential"]
+    if column == "ctrl":
+        return [f"ctrl.{name or k}" for k, name in enumerate(header.actuators)]
+    if column in ("qpos", "qvel") or column.startswith("qfrc"):
+        return [f"{column}.{label}" for label in coordinate_labels(header, column == "qpos")]
+    names = header.bodies if column in ("xpos", "xquat") else header.sites
+    parts = {
+        "xpos": "xyz",
+        "site_xpos": "xyz",
+        "xquat": ("qw", "qx", "qy", "qz"),
+        "site_xmat": [f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)],
+    }[column]
+    return [f"{column}.{name or k}.{part}" for k, name in enumerate(names) for part in parts]
+
+
+def coordinate_labels(header: Header, positions: bool) -> list[str]:
+    """A name for each coordinate: the joint's, with parts where it has several."""
+    found = []
+    ball = ("qw", "qx", "qy", "qz") if positions else ("wx", "wy", "wz")
+    parts = {
+        int(JointType.FREE): (*"xyz", *ball) if positions else ("vx", "vy", "vz", *ball),
+        int(JointType.BALL): ball,
+    }
+    for k, (name, kind) in enumerate(zip(header.joints, header.jnt_type, strict=True)):
+        label = name or f"joint {k}"
+        found += [f"{label}.{part}" for part in parts.get(kind, ())] or [label]
+    return found
+
+
+def _write_rows(out: BinaryIO, labels: list[str], rows: Iterable[list[Any]]) -> None:
+    lines = _Lines(out)
+    writer = csv.writer(lines, lineterminator="\n")
+    writer.writerow(labels)
+    writer.writerows(rows)
+
+
+class _Lines:
+    """What csv writes its text into."""
+
+    def __init__(self, out: BinaryIO) -> None:
+        self._out = out
+
+    def write(self, text: str) -> None:
+        self._out.write(text.encode())
