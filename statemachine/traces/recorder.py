@@ -247,7 +247,7 @@ def _run(
 ) -> tuple[dict[str, Array], str]:
     """The inputs of each row, as they are when the step begins, and why it ended early."""
     qpos, qvel, ctrl = data.qpos, data.qvel, data.ctrl
-    fast, times = (ctrl.shape, ctrl.dtype), [0.0] * 0
+    plain, shape, real, times = np.ndarray, ctrl.shape, ctrl.dtype, [0.0] * 0
     kept: tuple[list[bytes], ...] = ([], [], [])
     keep_qpos, keep_qvel, keep_ctrl = (rows.append for rows in kept)
     keep_time = times.append
@@ -259,7 +259,7 @@ def _run(
             wanted = controller(now, data)
             if wanted is not None:
                 # The fast way for what is an array already; the other one checks.
-                if wanted.__class__ is np.ndarray and (wanted.shape, wanted.dtype) == fast:
+                if wanted.__class__ is plain and wanted.dtype is real and wanted.shape == shape:
                     ctrl[:] = wanted
                 else:
                     _command(data, wanted, now)
