@@ -357,7 +357,7 @@ def test_one_trace_is_played_on_the_other_engine(tmp_path: Any) -> None:
     assert "was played on pybullet" in said[0]
 
 
-def test_a_third_party_is_asked_about_both(hold: Trace, box: Trace) -> None:
+def test_a_third_party_is_asked_about_both(hold: Trace, box: Trace, tmp_path: Path) -> None:
     need_engine("pinocchio")
     for trace in (hold, box):  # its scene includes the arm, which is what Pinocchio can read
         tip = trace.header.sites.index("gripperframe")
@@ -368,6 +368,9 @@ def test_a_third_party_is_asked_about_both(hold: Trace, box: Trace) -> None:
         assert found.one < 1e-12
         assert found.two == pytest.approx(0.001, rel=1e-9)
         assert found.rows == 2 * len(trace)
+    binary = tmp_path / "hold.mjb"  # which Pinocchio does not read, and nobody as XML
+    binary.write_bytes(b"\x00binary")
+    assert witness(hold, hold, binary) is None
     unknown = dataclasses.replace(
         hold.header,
         provenance=dataclasses.replace(hold.header.provenance, model_file="no/such.xml"),

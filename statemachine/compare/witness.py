@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 
 from ..errors import StateMachineError
+from ..experiments._common import model_files
 from ..kinematics import Kinematics
 from ..traces import Header, Trace, model_file
 from .series import default_tip
@@ -67,17 +67,10 @@ def witness(one: Trace, two: Trace, path: Path | None = None) -> Witness | None:
 
 def _readable(file: Path, header: Header) -> Kinematics | None:
     """The robot from a scene's file or from one that it includes."""
-    waiting, seen = [file], set()
-    while waiting:
-        path = waiting.pop(0)
-        if path in seen or not path.is_file():
-            continue
-        seen.add(path)
+    for path in model_files(file):
         try:
             found = Kinematics(path)
         except StateMachineError:
-            includes = ElementTree.parse(path).iter("include")
-            waiting += [file.parent / name for i in includes if (name := i.get("file"))]
             continue
         if set(found.joint_names) <= set(header.joints):
             shared = [name for name in header.joints if name in found.joint_names]

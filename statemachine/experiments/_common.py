@@ -71,7 +71,7 @@ def provenance(model: Model, seed: int | None = None, **others: str) -> Provenan
 
 def model_digest(path: Path) -> str:
     """SHA-256 of a model's file and of those it includes."""
-    return hashlib.sha256(b"".join(_with_includes(path))).hexdigest()
+    return hashlib.sha256(b"".join(file.read_bytes() for file in model_files(path))).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def ask_itself(model: Model, *questions: str) -> tuple[Itself, ...]:
     )
 
 
-def _with_includes(path: Path) -> Iterator[bytes]:
+def model_files(path: Path) -> Iterator[Path]:
     """A model's file, then those it includes, theirs and so on, each once.
 
     MuJoCo looks an included file up beside the one that was loaded.
@@ -105,10 +105,9 @@ def _with_includes(path: Path) -> Iterator[bytes]:
         if file in seen or not file.is_file():
             continue
         seen.add(file)
-        content = file.read_bytes()
-        yield content
+        yield file
         try:
-            includes = ElementTree.fromstring(content).iter("include")
+            includes = ElementTree.parse(file).iter("include")
         except ElementTree.ParseError:  # a binary model
             continue
         waiting += [path.parent / name for i in includes if (name := i.get("file"))]

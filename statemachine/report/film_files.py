@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import tempfile
 from collections.abc import Iterator
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from ..errors import EngineError
-from ..traces.files import replace_file
+from ..traces.files import beside, replace_file
 
 SUFFIXES = (".webp", ".mp4")
 _QUALITY = 70  # of WebP, 0 to 100
@@ -58,26 +57,14 @@ def write_mp4(path: Path, pictures: Iterator[Any], size: tuple[int, int], fps: f
     """
     import imageio_ffmpeg
 
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".mp4")
-    os.close(handle)
     command = [
         *(imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error"),
         *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", f"{fps:g}"),
         *("-i", "-", "-an", "-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p"),
         *("-movflags", "+faststart", "-fflags", "+bitexact", "-flags:v", "+bitexact"),
-        *("-f", "mp4", name),
     ]
-    try:
-        with tempfile.TemporaryFile() as said:
-            _feed(command, pictures, said)
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(name, 0o666 & ~mask)
-        os.replace(name, path)
-    except BaseException:
-        with suppress(OSError):
-            os.unlink(name)
-        raise
+    with beside(path) as name, tempfile.TemporaryFile() as said:
+        _feed([*command, "-f", "mp4", name], pictures, said)
 
 
 def _feed(command: list[str], pictures: Iterator[Any], said: Any) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from ..lessons.session import page_of_lesson, take
 from ..page import Page, Picture, Traces, Verdict
 from ..probes import phrasebook
 from ..probes.conventions import probe
+from ..traces.files import replace_file
 from . import compare as comparison
 from . import conventions, why
 from .figures import svg
@@ -154,6 +154,4 @@ def _save(path: Path, text: str) -> None:
     """Write beside, then rename: a page is never half there."""
     if path.exists() and path.read_text(encoding="utf-8") == text:
         return
-    beside = path.with_name(path.name + ".part")
-    beside.write_text(text, encoding="utf-8")
-    os.replace(beside, path)
+    replace_file(path, lambda out: out.write(text.encode()))

@@ -9,8 +9,8 @@ import os
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -67,12 +67,18 @@ def read(path: str | os.PathLike[str]) -> Trace:
         raise TraceError(f"{source.name}: {error}") from None
 
 
-def replace_file(target: Path, fill: Callable[[BinaryIO], None]) -> None:
-    """Write a file beside its place and rename it: whole or not at all."""
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+@contextmanager
+def beside(target: Path) -> Iterator[str]:
+    """The name of a new file beside a place, which is renamed to it: whole or not at all.
+
+    It ends as the target does, for programs that go by that.
+    """
+    handle, name = tempfile.mkstemp(
+        dir=target.parent, prefix=f".{target.name}.", suffix=target.suffix
+    )
+    os.close(handle)
     try:
-        with os.fdopen(handle, "wb") as out:
-            fill(out)
+        yield name
         # mkstemp gives a file that its owner alone may read.
         mask = os.umask(0)
         os.umask(mask)
@@ -82,6 +88,12 @@ def replace_file(target: Path, fill: Callable[[BinaryIO], None]) -> None:
         with suppress(OSError):
             os.unlink(name)
         raise
+
+
+def replace_file(target: Path, fill: Callable[[BinaryIO], object]) -> None:
+    """Write a file beside its place and rename it: whole or not at all."""
+    with beside(target) as name, open(name, "wb") as out:
+        fill(out)  # closed before it is renamed
 
 
 def _known(path: str | os.PathLike[str]) -> Path:
@@ -97,8 +109,8 @@ def _missing(path: Path) -> TraceError:
     if path.is_dir():
         message = f"{path} is a folder, not a trace"
     elif path.parent.is_dir():
-        beside = [file.name for file in path.parent.iterdir() if file.suffix in SUFFIXES]
-        close = difflib.get_close_matches(path.name, beside, n=1, cutoff=0.6)
+        names = [file.name for file in path.parent.iterdir() if file.suffix in SUFFIXES]
+        close = difflib.get_close_matches(path.name, names, n=1, cutoff=0.6)
         message += f". Did you mean {close[0]}?" if close else ""
     return TraceError(message)
 
