@@ -40,7 +40,7 @@ for name, seconds in (
     ("step by step", wall(calls={steps}, nstep=1)),
 ):
     factor = {steps} * model.timestep / seconds
-    print(f"{{name}}: {{seconds:.3f}} s, {{factor:.0f}} × real time")
+    print(f"{{name}}: {{seconds:.3f}} s, {{factor:.0f}} times real time")
 """
 
 
