@@ -547,7 +547,7 @@ def test_a_page_shows_the_same_line_in_both_engines_words() -> None:
     assert max(map(len, text.splitlines())) <= 80
     for words_ in ("pybullet: No call yet. All that is derived", "Changed: data.qpos[1], and"):
         assert words_ in text
-    assert "No call. Nothing changed." not in text
+    assert "pybullet: No call. Nothing changed." not in text
     assert 'backend="mujoco"' in text
     assert 'backend="pybullet"' in text
     assert "import statemachine" not in text
