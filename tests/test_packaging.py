@@ -83,7 +83,7 @@ def test_the_installed_wheel_runs_a_lesson_from_another_folder(wheel: Path, tmp_
     assert not list(elsewhere.iterdir())
 
 
-def test_any_python_that_numpy_has_is_let_in() -> None:
+def test_python_3_11_is_the_oldest() -> None:
     assert PROJECT["requires-python"] == ">=3.11"
 
 
