@@ -60,7 +60,7 @@ def _machine(platform: str) -> tuple[str, str]:
     return _SYSTEMS[system], _MACHINES.get(platform, processor)
 
 
-def _asked(platform: str, python: str, lines: Iterable[str]) -> dict[str, Requirement]:
+def asked(platform: str, python: str, lines: Iterable[str]) -> dict[str, Requirement]:
     """The requirements whose markers hold there, by name; no name twice."""
     system, machine = _machine(platform)
     environment = {
@@ -99,10 +99,10 @@ def _resolve(
 
 @pytest.mark.parametrize(("platform", "python"), PLATFORMS)
 def test_markers_name_the_engines_of_each_platform(platform: str, python: str) -> None:
-    found = _asked(platform, python, PROJECT["dependencies"])
+    found = asked(platform, python, PROJECT["dependencies"])
     assert "mujoco" in found
     assert set(found) & NAMES == {name.partition("==")[0] for name in PLATFORMS[platform, python]}
-    pinned = _asked(platform, python, PINS)
+    pinned = asked(platform, python, PINS)
     for wanted in PLATFORMS[platform, python]:
         name, _, version = wanted.partition("==")
         assert version in str(pinned[name].specifier)
@@ -115,7 +115,7 @@ def test_markers_name_the_engines_of_each_platform(platform: str, python: str) -
 def test_what_the_engines_say_to_install_is_what_the_markers_take(
     platform: str, minor: int
 ) -> None:
-    found = _asked(platform, f"3.{minor}", PROJECT["dependencies"])
+    found = asked(platform, f"3.{minor}", PROJECT["dependencies"])
     for engine in ENGINES.values():
         said = [wheel for wheel in engine.wheels if wheel.fits(*_machine(platform), minor)]
         assert {wheel.distribution for wheel in said} == set(found) & set(engine.distributions)

@@ -94,9 +94,7 @@ def test_every_letter_that_is_printed_has_a_spelling() -> None:
         for node in ast.walk(tree):
             if isinstance(node, ast.Constant) and id(node) not in docs:
                 text = node.value if isinstance(node.value, str) else ""
-                lacking = {
-                    c for c in text if c.isprintable() and ord(c) > 126 and ord(c) not in known
-                }
+                lacking = {c for c in text if ord(c) > 126 and c.isprintable()} - known
                 assert not lacking, f"{path.name}:{node.lineno}: {lacking}"
 
 

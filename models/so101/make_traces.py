@@ -1,7 +1,7 @@
 """Record on PyBullet every scenario of `statemachine compare`: `make traces`.
 
-PyBullet has wheels for one platform. Elsewhere its side of a comparison comes from these
-files, which are part of the package. A test records them anew and compares.
+Where PyBullet has no wheel its side of a comparison comes from these files, which are
+part of the package. A test records them anew and compares.
 """
 
 from __future__ import annotations
