@@ -81,10 +81,8 @@ def spelled(error: UnicodeError) -> tuple[str, int]:
     """
     if not isinstance(error, UnicodeEncodeError):
         raise error
-    lacking = error.object[error.start : error.end]
-    return "".join(
-        letter if letter.isascii() else "?" for letter in lacking.translate(ASCII)
-    ), error.end
+    lacking = error.object[error.start : error.end].translate(ASCII)
+    return lacking.encode("ascii", "replace").decode(), error.end
 
 
 def _judged(question: Question, choice: int) -> Verdict:
