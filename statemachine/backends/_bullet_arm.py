@@ -129,7 +129,8 @@ class Motors:
 
     def place(self, qpos: Array, qvel: Array, *_: Array) -> None:
         """Start from a state."""
-        self.angles, self.speed = qpos[self.tree.qpos], qvel[self.tree.qvel]
+        # Copies: a slice would follow what is written into the arrays.
+        self.angles, self.speed = qpos[self.tree.qpos].copy(), qvel[self.tree.qvel].copy()
 
     def read(self) -> None:
         """Take over what the engine made of the last step."""

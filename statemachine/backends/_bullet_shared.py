@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from functools import cached_property
 from typing import Any, Literal
@@ -24,13 +25,15 @@ class Shared:
     Attributes:
         plan: What every world is made from; raw: its compiled model.
         kind: "stepped" for the emulated contract, "engine" for PyBullet as it comes.
-        lock: Held while one of the shared worlds is used.
+        lock: Held while one of the shared worlds is used. One for all Models: PyBullet
+            takes one call at a time anyway.
     """
+
+    lock = threading.RLock()
 
     def __init__(self, plan: Plan, kind: Literal["stepped", "engine"]) -> None:
         self.plan, self.raw = plan, plan.raw
         self.kind: Literal["stepped", "engine"] = kind
-        self.lock = threading.RLock()
         self._ghost: World | None = None
         self._still_joints = np.zeros(plan.raw.nv)
 
@@ -84,6 +87,15 @@ class Shared:
                 site_xpos[site] = xpos[body] + turn @ raw.site_pos[site]
                 site_xmat[site] = (turn @ matrix_from_quat(raw.site_quat[site])).ravel()
         return dict(zip(POSES, (xpos, xquat, site_xpos, site_xmat), strict=True))
+
+
+def _renew() -> None:
+    """Start anew in the child of a fork: another thread may have held the lock."""
+    Shared.lock = threading.RLock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_renew)
 
 
 def free_dynamics(raw: mujoco.MjModel, body: int, turn: Array, qvel: Array) -> tuple[Array, Array]:
