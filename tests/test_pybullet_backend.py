@@ -1086,7 +1086,7 @@ def test_every_line_of_a_step_can_be_interrupted(defaults: Any) -> None:
         sm.set_state(model, data, state)
         sm.step(model, data)
         whole = {state, sm.get_state(model, data)}
-        torn, place = [], ""
+        torn, place, at = [], "", 0
         for at in range(1, 2_000):
             sm.set_state(model, data, state)
             place = _interrupted_at(at, lambda: sm.step(model, data))

@@ -19,6 +19,7 @@ from ..checks import HUGE, check_entries
 from ..errors import BadInputError, DivergedError
 from ..records import DERIVED, POSES, Array, Contacts
 from ..rotations import matrix_from_quat
+from . import _dense as dense
 from ._bullet_arm import Arm, Motors
 from ._bullet_client import pb
 from ._bullet_contacts import contacts
@@ -334,8 +335,9 @@ class Machine:
             found["qfrc_bias"][own] = bias
             if tree.root in touched:  # what it did beyond falling, contact did
                 rate = (self._left[1][own] - moment.qvel[own]) / self._timestep
-                found["qfrc_contact"][own] = inertia @ rate + bias
-            found["qacc"][own] = np.linalg.solve(inertia, found["qfrc_contact"][own] - bias)
+                found["qfrc_contact"][own] = dense.times(inertia, rate) + bias
+            pushed = found["qfrc_contact"][own] - bias
+            found["qacc"][own] = dense.solved(dense.factored(inertia), pushed)
         parts = ("contact", "friction", "limit")
         for part in parts:
             found["qfrc_constraint"] += found[f"qfrc_{part}"]
