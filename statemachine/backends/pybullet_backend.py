@@ -26,7 +26,7 @@ from ._bullet_plan import Plan
 from ._bullet_scope import check, ignored
 from ._bullet_shared import Shared
 from ._bullet_world import ENGINE_TIMESTEP, World
-from ._mjcf import compile_file, edited, facts, step_length, with_fingerprint
+from ._mjcf import compile_file, edited, facts, heard, step_length, with_fingerprint
 
 _EMULATED = {
     "stale after a write": "by copies of the adapter; the engine's own values follow a write",
@@ -100,7 +100,10 @@ def load(
         ModelError: It cannot be compiled, or PyBullet cannot read what was written.
         UnsupportedError: It has something that PyBullet has no counterpart for.
     """
-    raw = compile_file(path)
+    with heard() as texts:
+        raw = compile_file(path)
+    for text in texts:
+        warnings.warn(f"MuJoCo, which compiles {path}: {text}", EngineWarning, stacklevel=3)
     if defaults == "engine":
         raw.opt.gravity[:] = 0
         raw.opt.timestep = ENGINE_TIMESTEP
