@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import hashlib
 import io
 import json
+import math
 import subprocess
 import sys
 import zipfile
@@ -512,9 +514,20 @@ def test_each_scenario_was_recorded_with_both_defaults() -> None:
         shipped("hold", "mujoco")
 
 
+def _sines() -> str:
+    """A digest of the C library's sines, on which the last bits of every engine depend."""
+    digest = hashlib.sha256()
+    for k in range(1, 20_000):
+        x = k / 7e3
+        digest.update(repr((math.sin(x), math.cos(x), math.atan2(x, 1.3))).encode())
+    return digest.hexdigest()[:16]
+
+
 @pytest.mark.slow
 def test_recorded_traces_are_what_the_engine_does_here() -> None:
     need_engine("pybullet")
+    if _sines() != "f030af662a65fa1c":  # where they were recorded
+        pytest.skip("another C library, or a processor without FMA: its sines have other bits")
     sys.path.insert(0, str(ROOT / "models" / "so101"))
     try:
         import make_traces  # pyright: ignore[reportMissingImports]
