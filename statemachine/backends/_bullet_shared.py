@@ -115,7 +115,8 @@ def free_dynamics(raw: mujoco.MjModel, body: int, turn: Array, qvel: Array) -> t
     jacobian[:, :3], jacobian[:, 3:] = np.eye(3), dense.product(turn, cross.T)
     total = mass * dense.product(jacobian.T, jacobian)
     total[3:, 3:] += inertia
-    whirl = dense.times(turn, np.cross(spin, np.cross(spin, centre)))
+    around: Array = np.cross(spin, np.cross(spin, centre)).astype(np.float64)
+    whirl = dense.times(turn, around)
     bias = dense.times(jacobian.T, mass * (whirl - gravity(raw)))
     bias[3:] += np.cross(spin, dense.times(inertia, spin))
     return total, bias
