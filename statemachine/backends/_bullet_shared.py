@@ -112,11 +112,13 @@ def free_dynamics(raw: mujoco.MjModel, body: int, turn: Array, qvel: Array) -> t
     spin = qvel[3:]
     cross = np.cross(np.eye(3), centre)  # cross @ w = w × centre … of rows
     jacobian = np.zeros((3, 6))
-    jacobian[:, :3], jacobian[:, 3:] = np.eye(3), dense.product(turn, cross.T)
+    jacobian[:, :3], jacobian[:, 3:] = (
+        np.eye(3),
+        dense.product(turn, np.asarray(cross.T, dtype=np.float64)),
+    )
     total = mass * dense.product(jacobian.T, jacobian)
     total[3:, 3:] += inertia
-    around: Array = np.cross(spin, np.cross(spin, centre)).astype(np.float64)
-    whirl = dense.times(turn, around)
+    whirl = dense.times(turn, np.asarray(np.cross(spin, np.cross(spin, centre)), dtype=np.float64))
     bias = dense.times(jacobian.T, mass * (whirl - gravity(raw)))
     bias[3:] += np.cross(spin, dense.times(inertia, spin))
     return total, bias
