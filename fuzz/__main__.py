@@ -16,7 +16,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from ._tally import ROOT, Tally, environment
+from ._tally import ROOT, Tally, environment, limit_memory
 
 _FOLDER = Path(__file__).resolve().parent
 _GRACE = 120.0  # seconds that a target may take beyond its own, for the last input
@@ -64,6 +64,7 @@ def main() -> int:
     if unknown:
         parser.error(f"no target {unknown[0]!r}; known: {', '.join(targets())}")
     if options.child:
+        limit_memory()
         module = importlib.import_module(f"fuzz.{options.targets[0]}")
         tally = module.run(options.seed, options.seconds)
         Path(options.child).write_text(json.dumps(dataclasses.asdict(tally)))

@@ -62,7 +62,7 @@ def run_bounded(
             cwd=folder,
             env=environment(),
             timeout=patience,
-            preexec_fn=limit_memory if os.name == "posix" else None,  # noqa: PLW1509
+            preexec_fn=limit_memory if os.name == "posix" else None,
             check=False,
         )
     except subprocess.TimeoutExpired:
