@@ -134,8 +134,11 @@ class Law:
 
     def aim(self, ctrl: Array) -> Array:
         """What a command (nu,) of the whole model adds to the force of each actuator."""
-        goal = np.minimum(np.maximum(ctrl[self.ids], self._ctrl_low), self._ctrl_high)
-        return self._gain * goal
+        return self._gain * self.within(ctrl)
+
+    def within(self, ctrl: Array) -> Array:
+        """What the actuators take for a command (nu,) of the whole model: it within its range."""
+        return np.minimum(np.maximum(ctrl[self.ids], self._ctrl_low), self._ctrl_high)
 
     def solve(
         self,

@@ -159,7 +159,10 @@ class Machine:
         if steps >= 2**31:
             raise BadInputError(f"nstep {nstep} × {self._substeps} substeps is too large")
         if self.ctrl.tobytes() != self._commanded:
-            check_entries(self.ctrl, "ctrl", self._label)
+            reached = self.ctrl.copy()  # by the servos: what is infinite may end at a limit
+            for arm in self._arms:
+                arm.clamp(reached)
+            check_entries(reached, "ctrl", self._label)
             self._heed()
         if self._written:
             check_entries(self.qpos, "qpos", self._label)

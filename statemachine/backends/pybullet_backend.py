@@ -33,7 +33,7 @@ _EMULATED = {
     "stale after a step": "poses of the state before are computed when they are read",
     "zeros when fresh": "by the adapter; the engine has poses from the first moment",
     "position servo": "the adapter solves the model's servo and sends torques; the engine's own "
-    "way is POSITION_CONTROL",
+    "way is POSITION_CONTROL; an infinite ctrl is clamped to its range, or refused",
     "armature": "the engine has none: the adapter reckons with it, and gives the engine's links a "
     "part of it as inertia",
     "joint damping": "by the adapter, as the file's integrator treats it (RK4 as Euler); the "
@@ -57,7 +57,9 @@ _RESTORE = (
 _TOLD = ("qfrc_bias", "qfrc_actuator")  # of the forces, under defaults="engine"
 _AS_IT_COMES = {
     "position servo": Behaviour(
-        "native", "POSITION_CONTROL; with actuation off its motors hold every joint still"
+        "native",
+        "POSITION_CONTROL; with actuation off its motors hold every joint still; an infinite ctrl "
+        "is refused",
     ),
     "armature": Behaviour("unsupported", "the engine has none"),
     "joint damping": Behaviour("native", "that of the URDF, explicit, and 0.04 on every body"),
