@@ -100,6 +100,19 @@ def test_a_parquet_file_of_an_earlier_version_opens(box: Trace, tmp_path: Path) 
     assert same(read(path), box)
 
 
+def test_no_flipped_bit_of_an_archives_list_hides_a_column(box: Trace, tmp_path: Path) -> None:
+    path = write(box, tmp_path / "box.npz")
+    good = path.read_bytes()
+    place = good.rindex(b"PK\x01\x02", 0, good.rindex(b"PK\x01\x02"))
+    for offset in (30, 32):  # the lengths of what may follow a name: extra field, comment
+        for bit in range(8):
+            bad = bytearray(good)
+            bad[place + offset] ^= 1 << bit
+            path.write_bytes(bad)
+            with pytest.raises(TraceError):
+                read(path)
+
+
 # What a stranger's file may do.
 
 

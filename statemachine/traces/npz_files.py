@@ -52,6 +52,8 @@ def _entries(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
         name = entry.filename.removesuffix(".npy")
         if name == entry.filename:
             raise TraceError(f"holds {name[:40]!r}, which is no array")
+        if entry.comment or entry.extra:  # where a damaged list of contents hides its next entries
+            raise TraceError("has a damaged list of contents")
         if name in found:
             raise TraceError(f"holds two arrays {name[:40]!r}")
         found[name] = entry
