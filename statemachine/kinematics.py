@@ -8,7 +8,7 @@ two agree, neither has copied from the other.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -243,11 +243,9 @@ def _segments(
 
 
 def _names(given: Sequence[str]) -> tuple[str, ...]:
-    try:
-        names = tuple(given)
-    except TypeError:
-        names = (given,)
-    if isinstance(given, str) or not all(isinstance(name, str) for name in names):
+    listed = isinstance(given, Iterable) and not isinstance(given, str)
+    names = tuple(given) if listed else ()
+    if not listed or not all(isinstance(name, str) for name in names):
         raise BadInputError(f"joint_names must be a list of names; got {given!r}")
     return names
 
