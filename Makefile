@@ -1,5 +1,6 @@
 # make lesson       set everything up and walk the guided path
-# make test         set everything up and run all checks and tests
+# make test         set everything up, then run all checks and the tests that are quick
+# make test-slow    the other tests
 # make check        lint, format, layers and types only
 # make bench        the speed budget, as ratios
 # make fuzz         odd input for the parts that meet strangers; ends with what was tried
@@ -14,7 +15,7 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13 python3.14; 
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null \
 	&& { echo $$p; break; }; done)
 
-.PHONY: help lesson test test-fast test-pythons test-newest check format hooks bench fuzz picture extras report urdf traces docs notebook clean
+.PHONY: help lesson test test-slow test-pythons test-newest check format hooks bench fuzz picture extras report urdf traces docs notebook clean
 
 help:
 	@sed -n 's/^# make /  make /p' Makefile
@@ -34,14 +35,16 @@ lesson: $(VENV)/run.stamp
 	@echo "  statemachine compare hold --html hold.html     where two engines part, and why"
 	@echo "  statemachine doctor             what this machine has, and what to do"
 
+# worksteal: a process that has run its tests takes some of another's.
+PYTEST := python -m pytest -n auto --dist worksteal
+
 test: check
-	@$(BIN)/python -m pytest -n auto
+	@$(BIN)/$(PYTEST) -m "not slow"
 
-# make test-fast    without the slow tests
-test-fast: $(VENV)/test.stamp
-	@$(BIN)/python -m pytest -n auto -m "not slow"
+test-slow: $(VENV)/test.stamp
+	@$(BIN)/$(PYTEST) -m slow
 
-# make test-pythons the fast tests on each of these Pythons that is installed here
+# make test-pythons the quick tests on each of these Pythons that is installed here
 PYTHONS ?= 3.11 3.12 3.13
 test-pythons:
 	@failed=""; for version in $(PYTHONS); do \
@@ -52,15 +55,15 @@ test-pythons:
 	test -n "$$found" || { echo "Python $$version is not installed here: left out"; continue; }; \
 	echo "Python $$version: $$found"; \
 	{ make --no-print-directory VENV=.venv-$$version PYTHON="$$found" .venv-$$version/test.stamp \
-	&& .venv-$$version/bin/python -m pytest -n auto -m "not slow"; } || failed="$$failed $$version"; \
+	&& .venv-$$version/bin/$(PYTEST) -m "not slow"; } || failed="$$failed $$version"; \
 	done; test -z "$$failed" || { echo "failed on Python$$failed"; exit 1; }
 
-# make test-newest  the same tests with the newest versions that pyproject.toml allows
+# make test-newest  all tests with the newest versions that pyproject.toml allows
 test-newest:
 	@rm -f .venv-newest/*.stamp
 	@$(MAKE) --no-print-directory VENV=.venv-newest CONSTRAINTS="-U --upgrade-strategy eager" \
 	.venv-newest/test.stamp
-	@.venv-newest/bin/python -m pytest -n auto
+	@.venv-newest/bin/$(PYTEST)
 
 check: $(VENV)/test.stamp
 	@$(BIN)/ruff check .
