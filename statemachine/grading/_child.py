@@ -37,7 +37,7 @@ def main(job_file: str) -> None:
     path = Path(job["file"])
     sys.argv = [str(path)]
     try:
-        judge, worlds = _prepare(job["function"], job["backend"])
+        judge, worlds, rights = _prepare(job["function"], job["backend"])
     except Exception as error:
         answers.say("refused", kind=type(error).__name__, text=" ".join(str(error).split()))
         return
@@ -51,7 +51,7 @@ def main(job_file: str) -> None:
     faulthandler.dump_traceback_later(job["seconds"], exit=True, file=trace)
     sys.path.insert(0, str(path.parent))  # as when the file is run; engines are loaded by now
     answers.say("running")
-    verdict = examine(path, job["function"], judge, worlds)
+    verdict = examine(path, job["function"], judge, worlds, rights)
     remarks = [(text, False) for text in dict.fromkeys(guard.refused)]
     if not remarks:
         remarks = [(remark.text, remark.holds) for remark in verdict.remarks]
@@ -60,7 +60,7 @@ def main(job_file: str) -> None:
     os._exit(0)
 
 
-def _prepare(function: str, backend: str) -> tuple[Any, Any]:
+def _prepare(function: str, backend: str) -> tuple[Any, Any, Any]:
     """The judge and its worlds, with all that is right worked out."""
     from .judges import judge_of
     from .worlds import Scenes
@@ -68,4 +68,5 @@ def _prepare(function: str, backend: str) -> tuple[Any, Any]:
     judge = judge_of(function)
     folder = Path.cwd() / "worlds"
     folder.mkdir()
-    return judge, judge.worlds(Scenes(backend, folder))
+    worlds = judge.worlds(Scenes(backend, folder))
+    return judge, worlds, judge.right(worlds)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from .calls import FaultError, Function, Remark, find, load_file
+from .calls import FaultError, Function, Remark, call, find, load_file
 from .judges import Judge
 from .watch import engine_watched
 from .worlds import World
@@ -23,29 +24,34 @@ class Verdict:
     written: bool = True
 
 
-def examine(path: Path, name: str, judge: Judge, worlds: Sequence[World]) -> Verdict:
+def examine(
+    path: Path, name: str, judge: Judge, worlds: Sequence[World], rights: Sequence[Any]
+) -> Verdict:
     """The verdict on a function of a file, which is loaded here.
 
     Args:
         path: The student's file, absolute.
         name: Of the function.
-        judge: Its judge; worlds: what `judge.worlds` made, before anything here was loaded.
+        judge: Its judge.
         worlds: The first is the course's own.
+        rights: What `judge.right` found on each, before anything here was loaded.
     """
     with engine_watched(worlds[0].model.backend):
         try:
             function = find(load_file(path), name, worlds[0].arguments)
         except FaultError as fault:
             return Verdict((Remark(str(fault)),))
-        return judged(function, judge, worlds)
+        return judged(function, judge, worlds, rights)
 
 
-def judged(function: Function, judge: Judge, worlds: Sequence[World]) -> Verdict:
+def judged(
+    function: Function, judge: Judge, worlds: Sequence[World], rights: Sequence[Any]
+) -> Verdict:
     """The verdict on a function, called on world after world until one shows a fault."""
     right: list[str] = []
-    for world in worlds:
+    for world, right_there in zip(worlds, rights, strict=True):
         try:
-            remarks = judge.judge(function, world)
+            remarks = judge.judge(call(function, world), world, right_there)
         except FaultError as fault:
             remarks = [Remark(str(fault))]
             if not fault.written:

@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 from ..backends import load
 from ..interface import Model
 from ..models import resolve
-from .watch import Nudge, watched
+from .watch import Nudge
 
 ELSEWHERE = "on a scene with a crate before the arm"
 _CRATE = """
@@ -50,14 +50,12 @@ class World:
         where: What sets it apart; nothing on the course's own model.
         model: What the function gets.
         arguments: What it gets beside it.
-        expected: What a judge worked out before any code of the student's ran.
         nudge: See `watch.Watch`.
     """
 
     where: str
     model: Model
-    arguments: tuple[Any, ...]
-    expected: Any
+    arguments: tuple[Any, ...] = ()
     nudge: Nudge | None = None
 
 
@@ -82,7 +80,7 @@ class Scenes:
         edit(root)
         file = self._folder / f"{kind}_{name.rpartition('/')[2]}.xml"
         ElementTree.ElementTree(root).write(file)
-        return watched(load(file, backend=self._backend))
+        return load(file, backend=self._backend)
 
 
 def _merged(path: Path) -> ElementTree.Element:
