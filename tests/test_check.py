@@ -6,9 +6,11 @@ import functools
 import importlib
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -130,13 +132,102 @@ def test_what_never_returns_or_ends_the_process_is_reported(tmp_path: Path) -> N
         "def demo_replay(model, ctrl, nstep=600):\n    sum(range(10**15))",  # never lets go
         limit=1.0,
     )
-    assert "still running after 1 s: a loop that does not end?" in _one(found["gravity"])
+    assert "still running after 1 s of computing: a loop" in _one(found["gravity"])
     assert _one(found["gravity"]).startswith(("line 7:", "line 8:"))
     assert _one(found["state"]) == (
         "line 10: it ends the program (sys.exit with 0) where it should return (in `sys.exit(0)`)"
     )
     assert "it ended the process, with code 0" in _one(found["forward"])
     assert _one(found["replay"]).startswith("line 14: still running after 1 s")
+
+
+def test_what_waits_is_no_verdict_on_the_function(tmp_path: Path) -> None:
+    file = tmp_path / "student.py"
+    waits = "def {}(*_):\n    time.sleep(1e6)\n"
+    file.write_text("import time\n" + "".join(waits.format(name) for name in JUDGES))
+    grade = exercise.run(file, time_limit=1.0, wall_limit=1.5)
+    for judgement in grade.functions:
+        assert (judgement.judged, judgement.written) == (False, True)
+        assert "nothing could be judged: not at its end after 1.5 s on the clock" in _one(judgement)
+        assert "of which it computed for 0.0 s" in _one(judgement)
+    assert _one(grade.functions[0]).startswith("line 3: ")
+    assert (grade.cpu_limit, grade.wall_limit) == (1.0, 1.5)
+
+
+def test_what_does_not_get_ready_is_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(exercise, "_CHILD", "import os, sys; os._exit(7)")
+    for judgement in exercise.run(SOLUTION).functions:
+        assert not judgement.judged
+        text = _one(judgement)
+        assert "nothing could be judged: the judge itself ended with 7, 2 times" in text
+        assert "Your code was not run" in text
+    monkeypatch.undo()
+    # Now only the first time.
+    once = tmp_path / "once"
+    fails = f"open({str(once)!r}, 'x').close()"
+    flaky = f"import os\ntry: {fails}; os._exit(7)\nexcept FileExistsError: pass\n"
+    monkeypatch.setattr(exercise, "JUDGES", {"demo_state": JUDGES["demo_state"]})
+    monkeypatch.setattr(exercise, "_CHILD", flaky + exercise._CHILD)
+    assert exercise.run(SOLUTION).passed
+    assert once.exists()
+
+
+@pytest.mark.slow
+def test_a_right_answer_passes_on_a_busy_machine() -> None:
+    busy = "import time; end = time.monotonic() + 60\nwhile time.monotonic() < end: pass"
+    others = [subprocess.Popen([sys.executable, "-c", busy]) for _ in range(6)]
+    try:
+        grade = exercise.run(SOLUTION)
+    finally:
+        for other in others:
+            other.kill()
+            other.wait()
+    assert (grade.right, grade.passed) == (4, True)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+def test_a_signal_leaves_nothing_behind(number: signal.Signals, tmp_path: Path) -> None:
+    file = tmp_path / "student.py"
+    here = tmp_path / "temporary"
+    here.mkdir()
+    waits = "def {0}(*_):\n    print(open({1!r} + '/{0}', 'w').write(str(os.getpid())))\n"
+    waits += "    time.sleep(60)\n"
+    file.write_text(
+        "import os, time\n" + "".join(waits.format(name, str(tmp_path)) for name in JUDGES)
+    )
+    command = [sys.executable, "-m", "statemachine", "check", str(file)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(here)}
+    with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE) as process:
+        deadline = time.monotonic() + 60
+        while not all((tmp_path / name).exists() for name in JUDGES):
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        process.send_signal(number)
+        process.communicate(timeout=60)
+    assert process.returncode in (-number, 128 + number)
+    assert list(here.iterdir()) == []
+    for name in JUDGES:
+        with pytest.raises(ProcessLookupError):
+            os.kill(int((tmp_path / name).read_text()), 0)
+
+
+def test_an_error_in_another_file_is_told_with_its_name(tmp_path: Path) -> None:
+    (tmp_path / "helper.py").write_text("def helps():\n    return 1 / 0\n")
+    (tmp_path / "broken.py").write_text("def f(:\n")
+    found = _grade(
+        tmp_path,
+        "def demo_gravity(model, seconds=4):\n    import helper; return helper.helps()",
+        "def demo_state(model):\n    import broken",
+        "def demo_forward(model):\n    return sm.load('nowhere.xml')",
+        "def demo_replay(model, ctrl, nstep=600):\n    return np.zeros(3) @ np.zeros(2)",
+    )
+    assert _one(found["gravity"]).startswith("helper.py, line 2: ZeroDivisionError")
+    assert _one(found["state"]).startswith("broken.py, line 1: ")
+    assert _one(found["forward"]).startswith("line 11: ")
+    assert _one(found["replay"]).startswith("line 13: ValueError")
 
 
 def test_crashes_memory_and_other_processes_are_reported(tmp_path: Path) -> None:

@@ -194,6 +194,7 @@ def test_what_ends_under_a_fault_has_caught_it(
 ) -> None:
     monkeypatch.setattr(run, "_TIMES", 1.0)
     monkeypatch.setattr(run, "_AND", 10.0)
+    monkeypatch.setattr(run, "_CLOCK_AND", 10.0)
     found = examine(write(HANGS_OR_FALLS.format(what=what)), only=("no-forward", "xyzw"))
     caught, survived = found.trials
     assert not survived.caught
@@ -241,7 +242,7 @@ def test_tests_that_fail_on_the_healthy_arm_are_told(body: str, why: str, write:
 )
 def test_a_file_that_is_no_test_file_is_refused(text: str, message: str, write: Write) -> None:
     with pytest.raises(BadInputError, match=message) as caught:
-        examine(write(text), seconds=2 if "sleep" in text else 60)
+        examine(write(text), clock=2 if "sleep" in text else 300)
     assert "\n" not in str(caught.value)
 
 

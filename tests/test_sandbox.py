@@ -16,8 +16,8 @@ POSIX = pytest.mark.skipif(os.name != "posix", reason="limits and sessions are P
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
 
 
-def _python(code: str, seconds: float = 20.0, **more: object) -> sandbox.Outcome:
-    return sandbox.run([sys.executable, "-c", code], seconds=seconds, **more)  # type: ignore[arg-type]
+def _python(code: str, cpu: float = 20.0, wall: float = 120.0, **more: object) -> sandbox.Outcome:
+    return sandbox.run([sys.executable, "-c", code], cpu=cpu, wall=wall, **more)  # type: ignore[arg-type]
 
 
 def _lives(pid: int) -> bool:
@@ -41,15 +41,54 @@ def test_nothing_is_read_from_us() -> None:
 
 
 def test_a_loop_is_ended() -> None:
-    done = _python("print('on', flush=True)\nwhile True: pass", seconds=1.0)
-    assert (done.timed_out, done.returncode, done.signal) == (True, None, None)
+    done = _python("print('on', flush=True)\nwhile True: pass", cpu=1.0)
+    assert (done.out_of_cpu, done.timed_out, done.returncode, done.signal) == (
+        True,
+        False,
+        None,
+        None,
+    )
     assert done.stdout == "on\n"
+    if os.name == "posix":
+        assert 0.9 < done.cpu < 3
+
+
+def test_what_waits_is_ended_by_the_clock() -> None:
+    done = _python("print('on', flush=True)\nimport time; time.sleep(60)", wall=2.0)
+    assert (done.out_of_cpu, done.timed_out, done.returncode, done.signal) == (
+        False,
+        True,
+        None,
+        None,
+    )
+    assert done.cpu < 1.5 < done.wall
+
+
+def test_the_time_until_it_is_ready_does_not_count(tmp_path: Path) -> None:
+    code = "import time; time.sleep(1.5); open('ready', 'w').close(); time.sleep(0.2)"
+    ready = (tmp_path / "ready").exists
+    done = _python(code, wall=1.0, start=100.0, started=ready, cwd=tmp_path)
+    assert (done.started, done.timed_out, done.returncode) == (True, False, 0)
+    never = _python("import time; time.sleep(60)", start=0.5, started=lambda: False)
+    assert (never.started, never.timed_out) == (False, True)
+
+
+def test_where_a_process_cannot_limit_itself_it_is_watched(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pytest.importorskip("psutil")
+    monkeypatch.setattr(sandbox, "WATCHED", True)
+    busy = _python("import time\nwhile time.process_time() < 30: pass", cpu=1.0, start_cpu=60.0)
+    assert (busy.out_of_cpu, busy.timed_out) == (True, False)
+    assert busy.cpu < 10
+    idle = _python("import time; time.sleep(1.5)", cpu=1.0)
+    assert (idle.out_of_cpu, idle.returncode) == (False, 0)
 
 
 def test_it_is_ended_from_outside() -> None:
     stop = threading.Event()
     threading.Timer(0.3, stop.set).start()
-    assert _python("while True: pass", seconds=30.0, stop=stop).wall < 20
+    assert _python("while True: pass", cpu=30.0, stop=stop).wall < 20
 
 
 def test_a_flood_is_read_and_dropped() -> None:
@@ -108,7 +147,7 @@ def test_no_other_process_is_touched() -> None:
 
 @POSIX
 def test_a_program_that_is_not_there() -> None:
-    done = sandbox.run(["no-such-program"], seconds=5)
+    done = sandbox.run(["no-such-program"], cpu=5, wall=60)
     assert done.returncode == 1
     assert "no-such-program: " in done.stderr
 

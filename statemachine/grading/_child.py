@@ -11,6 +11,7 @@ import faulthandler
 import json
 import os
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -43,14 +44,15 @@ def main(job_file: str) -> None:
         return
     from .examine import examine
     from .guard import Guard
+    from .limits import limit_cpu
 
     # Both work where Python's own threads do not get their turn, and tell the line.
     trace = open(job["trace"], "w", encoding="utf-8")  # noqa: SIM115  (till the end)
     faulthandler.enable(trace)
     guard = Guard(path)
-    faulthandler.dump_traceback_later(job["seconds"], exit=True, file=trace)
     sys.path.insert(0, str(path.parent))  # as when the file is run; engines are loaded by now
-    answers.say("running")
+    answers.say("running", cpu=time.process_time())
+    limit_cpu(job["cpu"], job["wall"], trace)
     verdict = examine(path, job["function"], judge, worlds, rights)
     remarks = [(text, False) for text in dict.fromkeys(guard.refused)]
     if not remarks:

@@ -23,10 +23,13 @@ from ..engines import engine_version
 from ..errors import BadInputError, EngineError, StateMachineError
 from . import sandbox
 from .judges import JUDGES
+from .unwinding import unwinding
 
-TIME_LIMIT = 5.0  # [s] for a function, from when its worlds are ready
-# [s] for Python, the engine and the worlds to get ready, all functions at once.
-_START = 4.0
+TIME_LIMIT = 5.0  # [s] of computing for a function, from when its worlds are ready
+WALL_LIMIT = 120.0  # [s] on the clock for it, which a busy machine may need too
+_START = 60.0  # [s] on the clock for Python, the engine and the worlds to get ready
+_TRIES = 2  # to get ready
+_MARGIN = 5.0  # [s] that the process has to end itself, and tell the line
 _MEMORY_MOST = 2 * sandbox.GB
 _LARGEST = 1_000_000  # bytes of a student's file
 _PACKAGES = Path(__file__).resolve().parents[2]
@@ -50,12 +53,22 @@ class Judgement:
         written: False where it is still to be written.
         passed: Whether it does what it should.
         remarks: What is wrong with it, or what was verified, a line each.
+        judged: False where there is no verdict, for which the machine may be the reason.
     """
 
     function: str
     written: bool
     passed: bool
     remarks: tuple[str, ...]
+    judged: bool = True
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a function may compute, and what it may take on the clock [s]."""
+
+    cpu: float
+    wall: float
 
 
 @dataclass(frozen=True)
@@ -66,6 +79,8 @@ class Grade:
         file: Its name; sha256: the digest of its content.
         backend: The backend that it ran on; versions: of what it ran with.
         functions: One after the other, in the exercise's order.
+        cpu_limit: What each function might compute [s], and wall_limit, what it might take on
+            the clock [s].
     """
 
     file: str
@@ -73,6 +88,8 @@ class Grade:
     backend: str
     versions: dict[str, str]
     functions: tuple[Judgement, ...]
+    cpu_limit: float = TIME_LIMIT
+    wall_limit: float = WALL_LIMIT
 
     @property
     def right(self) -> int:
@@ -90,14 +107,17 @@ def run(
     backend: str = "mujoco",
     time_limit: float = TIME_LIMIT,
     progress: Callable[[float], None] = lambda _: None,
+    wall_limit: float = WALL_LIMIT,
 ) -> Grade:
     """Judge each function of a student's file.
 
     Args:
         file: A Python file; nothing of it runs in this process.
         backend: The engine to run it on.
-        time_limit: For each function, after everything it needs is ready [s].
+        time_limit: What each function may compute, after everything it needs is ready [s];
+            this does not pass while the machine is busy with others.
         progress: Told the fraction that is done.
+        wall_limit: What each may take on the clock, from the same moment [s].
 
     Raises:
         BadInputError: There is no such file, or it is no Python file.
@@ -111,12 +131,17 @@ def run(
         )
     engine = backend_engine(backend)
     content = path.read_bytes()
-    with tempfile.TemporaryDirectory(prefix="statemachine-", ignore_cleanup_errors=True) as folder:
-        judgements = _all(path, backend, time_limit, Path(folder), progress)
+    limits = Limits(time_limit, max(wall_limit, time_limit))
+    with (
+        unwinding(),
+        tempfile.TemporaryDirectory(prefix="statemachine-", ignore_cleanup_errors=True) as folder,
+    ):
+        judgements = _all(path, backend, limits, Path(folder), progress)
     versions = {"statemachine": __version__, "python": sys.version.split()[0]}
     if engine:
         versions[engine] = engine_version(engine)
-    return Grade(path.name, hashlib.sha256(content).hexdigest(), backend, versions, judgements)
+    digest = hashlib.sha256(content).hexdigest()
+    return Grade(path.name, digest, backend, versions, judgements, limits.cpu, limits.wall)
 
 
 def _python_file(path: Path) -> Path:
@@ -149,7 +174,7 @@ def _python_file(path: Path) -> Path:
 def _all(
     path: Path,
     backend: str,
-    seconds: float,
+    limits: Limits,
     folder: Path,
     progress: Callable[[float], None],
 ) -> tuple[Judgement, ...]:
@@ -157,7 +182,7 @@ def _all(
     stop = threading.Event()
     with ThreadPoolExecutor(len(JUDGES)) as pool:
         futures: list[Future[Judgement]] = [
-            pool.submit(_one, path, name, backend, seconds, folder / name, stop) for name in JUDGES
+            pool.submit(_one, path, name, backend, limits, folder / name, stop) for name in JUDGES
         ]
         try:
             waiting = set(futures)
@@ -170,8 +195,41 @@ def _all(
 
 
 def _one(
-    path: Path, name: str, backend: str, seconds: float, folder: Path, stop: threading.Event
+    path: Path, name: str, backend: str, limits: Limits, folder: Path, stop: threading.Event
 ) -> Judgement:
+    for number in range(_TRIES):
+        answer, trace, outcome = _tried(path, name, backend, limits, folder / str(number), stop)
+        if answer["stage"] != "none" or stop.is_set():
+            break
+    if answer["stage"] == "refused":
+        raise getattr(errors, answer["kind"], EngineError)(answer["text"])
+    if answer["stage"] == "judged":
+        remarks = tuple(text for text, _ in answer["remarks"])
+        passed = bool(remarks) and all(holds for _, holds in answer["remarks"])
+        return Judgement(name, answer["written"], passed, remarks)
+    if answer["stage"] != "running":
+        return Judgement(name, True, False, (_not_ready(outcome),), judged=False)
+    # The innermost line of the student's file comes first in what is noted last.
+    lines = re.findall(
+        rf'File "{re.escape(str(path))}", line (\d+)', trace.rpartition("Timeout (")[2]
+    )
+    where = f"line {lines[0]}: " if lines else ""
+    by_itself = os.name == "posix" and trace.startswith("Timeout")
+    if outcome.timed_out or (by_itself and not outcome.out_of_cpu):
+        computed = max(0.0, outcome.cpu - answer["cpu"])
+        text = (
+            f"{where}nothing could be judged: not at its end after {limits.wall:g} s on the clock, "
+            f"of which it computed for {computed:.1f} s. Does it wait for something, or is this "
+            "machine busy?"
+        )
+        return Judgement(name, True, False, (text,), judged=False)
+    return Judgement(name, True, False, (where + _how_it_ended(limits, outcome),))
+
+
+def _tried(
+    path: Path, name: str, backend: str, limits: Limits, folder: Path, stop: threading.Event
+) -> tuple[dict[str, Any], str, sandbox.Outcome]:
+    """What a process told last, what its fault handler wrote, and how it ended."""
     scratch = folder / "scratch"  # where the student's code runs, and may write
     scratch.mkdir(parents=True)
     nonce, answers, trace = secrets.token_hex(16), folder / "answers", folder / "trace"
@@ -180,7 +238,8 @@ def _one(
         "file": str(path),
         "function": name,
         "backend": backend,
-        "seconds": seconds,
+        "cpu": limits.cpu,
+        "wall": limits.wall,
         "answers": str(answers),
         "trace": str(trace),
         "nonce": nonce,
@@ -188,23 +247,18 @@ def _one(
     job.write_text(json.dumps(facts), encoding="utf-8")
     outcome = sandbox.run(
         [sys.executable, "-P", "-c", _CHILD, str(job), str(_PACKAGES)],
-        seconds=_START + seconds,
+        cpu=limits.cpu,
+        wall=limits.wall + _MARGIN,
+        started=lambda: _last_answer(answers, nonce)["stage"] != "none",
+        start=_START,
+        start_cpu=_START,
         cwd=scratch,
         env=_environment(),
         memory_most=_MEMORY_MOST,
         stop=stop,
     )
-    answer = _last_answer(answers, nonce)
-    if answer["stage"] == "refused":
-        raise getattr(errors, answer["kind"], EngineError)(answer["text"])
-    if answer["stage"] == "judged":
-        remarks = tuple(text for text, _ in answer["remarks"])
-        passed = bool(remarks) and all(holds for _, holds in answer["remarks"])
-        return Judgement(name, answer["written"], passed, remarks)
-    if answer["stage"] != "running":
-        return Judgement(name, True, False, (_not_ready(outcome),))
-    last = trace.read_text(encoding="utf-8", errors="replace") if trace.is_file() else ""
-    return Judgement(name, True, False, (_how_it_ended(path, last, seconds, outcome),))
+    told = trace.read_text(encoding="utf-8", errors="replace") if trace.is_file() else ""
+    return _last_answer(answers, nonce), told, outcome
 
 
 def _environment() -> dict[str, str]:
@@ -231,26 +285,25 @@ def _last_answer(file: Path, nonce: str) -> dict[str, Any]:
 def _not_ready(outcome: sandbox.Outcome) -> str:
     """Why a process did not get as far as the student's code."""
     if outcome.timed_out:
-        return (
-            f"nothing could be judged: the engine was not ready after {outcome.wall:.0f} s, "
-            "on a slow or busy machine; try --time-limit 30"
-        )
-    how = outcome.returncode if outcome.signal is None else _signal(outcome.signal)
-    return f"nothing could be judged: the judge itself ended with {how}"
+        how = f"the engine was not ready after {_START:.0f} s, {_TRIES} times"
+    else:
+        code = outcome.returncode if outcome.signal is None else _signal(outcome.signal)
+        how = f"the judge itself ended with {code}, {_TRIES} times"
+    return (
+        f"nothing could be judged: {how}. Your code was not run: this machine may be busy, or "
+        "out of memory; try again"
+    )
 
 
-def _how_it_ended(path: Path, trace: str, seconds: float, outcome: sandbox.Outcome) -> str:
-    """What became of a process that gave no verdict; `trace` is its fault handler's."""
-    # The innermost line of the student's file comes first.
-    lines = re.findall(rf'File "{re.escape(str(path))}", line (\d+)', trace)
-    where = f"line {lines[0]}: " if lines else ""
-    if outcome.timed_out or trace.startswith("Timeout"):
-        return f"{where}still running after {seconds:g} s: a loop that does not end?"
+def _how_it_ended(limits: Limits, outcome: sandbox.Outcome) -> str:
+    """What became of a process that gave no verdict."""
+    if outcome.out_of_cpu:
+        return f"still running after {limits.cpu:g} s of computing: a loop that does not end?"
     if outcome.out_of_memory:
-        return f"{where}it asks for more memory than there is for it"
+        return "it asks for more memory than there is for it"
     if outcome.signal is not None:
-        return f"{where}it crashed the process ({_signal(outcome.signal)})"
-    return f"{where}it ended the process, with code {outcome.returncode}: a function must return"
+        return f"it crashed the process ({_signal(outcome.signal)})"
+    return f"it ended the process, with code {outcome.returncode}: a function must return"
 
 
 def _signal(number: int) -> str:

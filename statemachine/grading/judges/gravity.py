@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...interface import Model
 from ...records import Array, Ints
 from ...verbs import make_data, step
 from ..answers import Answer

@@ -14,8 +14,16 @@ from ..calls import Remark
 from ..watch import Nudge, Run
 from ..worlds import ELSEWHERE, Scenes, World
 from ._values import (
-    address, count, grain, listed, near, numbers, parts, same_bits, short_float,
-)  # fmt: skip
+    address,
+    count,
+    grain,
+    listed,
+    near,
+    numbers,
+    parts,
+    same_bits,
+    short_float,
+)
 
 SCENE = "so101/scene_box"
 _CTRL = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)
@@ -168,8 +176,8 @@ def _runs(runs: tuple[Run, ...], world: World, start: Start) -> list[Remark]:
         return [
             Remark(
                 f"there were {len(runs)} runs, of {', '.join(str(run.nstep) for run in runs[:6])}"
-                f"{', …' * (len(runs) > 6)} steps: two are asked for, and nothing may be written into qpos, qvel or time "
-                "between their steps"
+                f"{', …' * (len(runs) > 6)} steps: two are asked for, and nothing may be written "
+                "into qpos, qvel or time between their steps"
             )
         ]
     found: dict[str, str] = {}
