@@ -28,7 +28,6 @@ from .unwinding import unwinding
 TIME_LIMIT = 5.0  # [s] of computing for a function, from when its worlds are ready
 WALL_LIMIT = 120.0  # [s] on the clock for it, which a busy machine may need too
 _START = 60.0  # [s] on the clock for Python, the engine and the worlds to get ready
-_TRIES = 2  # to get ready
 _MARGIN = 5.0  # [s] that the process has to end itself, and tell the line
 _MEMORY_MOST = 2 * sandbox.GB
 _LARGEST = 1_000_000  # bytes of a student's file
@@ -197,10 +196,9 @@ def _all(
 def _one(
     path: Path, name: str, backend: str, limits: Limits, folder: Path, stop: threading.Event
 ) -> Judgement:
-    for number in range(_TRIES):
-        answer, trace, outcome = _tried(path, name, backend, limits, folder / str(number), stop)
-        if answer["stage"] != "none" or stop.is_set():
-            break
+    answer, trace, outcome = _tried(path, name, backend, limits, folder / "1", stop)
+    if answer["stage"] == "none" and not stop.is_set():
+        answer, trace, outcome = _tried(path, name, backend, limits, folder / "2", stop)
     if answer["stage"] == "refused":
         raise getattr(errors, answer["kind"], EngineError)(answer["text"])
     if answer["stage"] == "judged":
@@ -285,10 +283,10 @@ def _last_answer(file: Path, nonce: str) -> dict[str, Any]:
 def _not_ready(outcome: sandbox.Outcome) -> str:
     """Why a process did not get as far as the student's code."""
     if outcome.timed_out:
-        how = f"the engine was not ready after {_START:.0f} s, {_TRIES} times"
+        how = f"the engine was not ready after {_START:.0f} s, twice"
     else:
         code = outcome.returncode if outcome.signal is None else _signal(outcome.signal)
-        how = f"the judge itself ended with {code}, {_TRIES} times"
+        how = f"the judge itself ended with {code}, twice"
     return (
         f"nothing could be judged: {how}. Your code was not run: this machine may be busy, or "
         "out of memory; try again"

@@ -214,7 +214,7 @@ def rounded(model):
     return np.round(_readings(model), 4)
 
 
-@wrong("forward", "you return [0.391362 ")
+@wrong("forward", "is expected, 3.46e-06 mm away")
 def nearly(model):
     tips = _readings(model)
     return [tips[0], tips[1] + 2e-9, *tips[2:]]
