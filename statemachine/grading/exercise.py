@@ -1,18 +1,22 @@
-"""A student's file, judged by what its functions do, each in a process of its own."""
+"""A student's file, judged by what its functions do, each in a process of its own.
+
+That process records what a function returned and what it did to the engine, as data. The verdict
+is found here, where no code of the student's ever runs, against figures that are worked out
+here. What a student who is set on it can still do: write a record of his own making, with
+the answers and the runs that are asked for. They must be right, so he has to work them out.
+"""
 
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import re
-import secrets
 import signal
 import sys
 import tempfile
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,25 +26,15 @@ from ..backends import backend_engine
 from ..engines import engine_version
 from ..errors import BadInputError, EngineError, StateMachineError
 from . import sandbox
-from .judges import JUDGES
+from .examine import judged
+from .judges import JUDGES, judge_of
+from .recording import START, Limits, Recording, record
 from .unwinding import unwinding
+from .worlds import Scenes, World
 
 TIME_LIMIT = 5.0  # [s] of computing for a function, from when its worlds are ready
 WALL_LIMIT = 120.0  # [s] on the clock for it, which a busy machine may need too
-_START = 60.0  # [s] on the clock for Python, the engine and the worlds to get ready
-_MARGIN = 5.0  # [s] that the process has to end itself, and tell the line
-_MEMORY_MOST = 2 * sandbox.GB
 _LARGEST = 1_000_000  # bytes of a student's file
-_PACKAGES = Path(__file__).resolve().parents[2]
-_CHILD = (
-    "import sys; sys.path.insert(0, sys.argv[2]); "
-    "from statemachine.grading._child import main; main(sys.argv[1])"
-)
-# What a program needs to start; the rest is none of a student's business.
-_KEPT = (
-    "PATH", "HOME", "USERPROFILE", "SYSTEMROOT", "TEMP", "TMP", "LANG", "LC_ALL",
-    "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "PYTHONPATH", "PYTHONHOME", "CONDA_PREFIX",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -60,14 +54,6 @@ class Judgement:
     passed: bool
     remarks: tuple[str, ...]
     judged: bool = True
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What a function may compute, and what it may take on the clock [s]."""
-
-    cpu: float
-    wall: float
 
 
 @dataclass(frozen=True)
@@ -180,110 +166,95 @@ def _all(
     """All functions at once, so that the slowest decides how long it takes."""
     stop = threading.Event()
     with ThreadPoolExecutor(len(JUDGES)) as pool:
-        futures: list[Future[Judgement]] = [
-            pool.submit(_one, path, name, backend, limits, folder / name, stop) for name in JUDGES
-        ]
         try:
-            waiting = set(futures)
+            futures = {
+                name: pool.submit(_recorded, path, name, backend, limits, folder / name, stop)
+                for name in JUDGES
+            }
+            # Meanwhile what is right is worked out here, where no code of the student's runs.
+            ours = folder / "ours"
+            ours.mkdir()
+            scenes = Scenes(backend, ours)
+            worlds = {name: judge_of(name).worlds(scenes) for name in JUDGES}
+            rights = {name: judge_of(name).right(worlds[name]) for name in JUDGES}
+            waiting = set(futures.values())
             while waiting:
                 waiting = wait(waiting, timeout=0.1).not_done
                 progress(1 - len(waiting) / len(futures))
-            return tuple(future.result() for future in futures)
+            return tuple(
+                _judgement(path, name, limits, worlds[name], rights[name], future.result())
+                for name, future in futures.items()
+            )
         finally:
             stop.set()  # after an interrupt nothing goes on
 
 
-def _one(
+def _recorded(
     path: Path, name: str, backend: str, limits: Limits, folder: Path, stop: threading.Event
+) -> Recording:
+    """A recording; if the process did not get ready, a second one."""
+    recording = record(path, name, backend, limits, folder / "1", stop)
+    if recording.began or recording.refusal or recording.broken or stop.is_set():
+        return recording
+    return record(path, name, backend, limits, folder / "2", stop)
+
+
+def _judgement(
+    path: Path,
+    name: str,
+    limits: Limits,
+    worlds: list[World],
+    rights: list[Any],
+    recording: Recording,
 ) -> Judgement:
-    answer, trace, outcome = _tried(path, name, backend, limits, folder / "1", stop)
-    if answer["stage"] == "none" and not stop.is_set():
-        answer, trace, outcome = _tried(path, name, backend, limits, folder / "2", stop)
-    if answer["stage"] == "refused":
-        raise getattr(errors, answer["kind"], EngineError)(answer["text"])
-    if answer["stage"] == "judged":
-        remarks = tuple(text for text, _ in answer["remarks"])
-        passed = bool(remarks) and all(holds for _, holds in answer["remarks"])
-        return Judgement(name, answer["written"], passed, remarks)
-    if answer["stage"] != "running":
-        return Judgement(name, True, False, (_not_ready(outcome),), judged=False)
+    if recording.refusal:
+        kind, text = recording.refusal
+        known = getattr(errors, kind, None)
+        if isinstance(known, type) and issubclass(known, StateMachineError):
+            raise known(text)
+        raise EngineError(text)
+    if recording.forbidden:
+        return Judgement(name, True, False, tuple(recording.forbidden))
+    try:
+        verdict = judged(judge_of(name), worlds, rights, recording.answers)
+    except Exception as error:  # what was recorded may have been made up
+        recording.broken = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+        verdict = None
+    if verdict is not None:
+        holds = all(remark.holds for remark in verdict.remarks)
+        texts = tuple(remark.text for remark in verdict.remarks)
+        return Judgement(name, verdict.written, holds, texts)
+    if recording.broken:
+        text = f"what its process recorded is no record of a run ({recording.broken})"
+        return Judgement(name, True, False, (text,))
+    if not recording.began:
+        return Judgement(name, True, False, (_not_ready(recording.outcome),), judged=False)
+    return _unfinished(path, name, limits, recording)
+
+
+def _unfinished(path: Path, name: str, limits: Limits, recording: Recording) -> Judgement:
+    """The judgement on a function that did not come to its end."""
+    outcome, trace = recording.outcome, recording.trace
     # The innermost line of the student's file comes first in what is noted last.
-    lines = re.findall(
-        rf'File "{re.escape(str(path))}", line (\d+)', trace.rpartition("Timeout (")[2]
-    )
+    last = trace.rpartition("Timeout (")[2]
+    lines = re.findall(rf'File "{re.escape(str(path))}", line (\d+)', last)
     where = f"line {lines[0]}: " if lines else ""
     by_itself = os.name == "posix" and trace.startswith("Timeout")
-    if outcome.timed_out or (by_itself and not outcome.out_of_cpu):
-        computed = max(0.0, outcome.cpu - answer["cpu"])
-        text = (
-            f"{where}nothing could be judged: not at its end after {limits.wall:g} s on the clock, "
-            f"of which it computed for {computed:.1f} s. Does it wait for something, or is this "
-            "machine busy?"
-        )
-        return Judgement(name, True, False, (text,), judged=False)
-    return Judgement(name, True, False, (where + _how_it_ended(limits, outcome),))
-
-
-def _tried(
-    path: Path, name: str, backend: str, limits: Limits, folder: Path, stop: threading.Event
-) -> tuple[dict[str, Any], str, sandbox.Outcome]:
-    """What a process told last, what its fault handler wrote, and how it ended."""
-    scratch = folder / "scratch"  # where the student's code runs, and may write
-    scratch.mkdir(parents=True)
-    nonce, answers, trace = secrets.token_hex(16), folder / "answers", folder / "trace"
-    job = folder / "job"
-    facts = {
-        "file": str(path),
-        "function": name,
-        "backend": backend,
-        "cpu": limits.cpu,
-        "wall": limits.wall,
-        "answers": str(answers),
-        "trace": str(trace),
-        "nonce": nonce,
-    }
-    job.write_text(json.dumps(facts), encoding="utf-8")
-    outcome = sandbox.run(
-        [sys.executable, "-P", "-c", _CHILD, str(job), str(_PACKAGES)],
-        cpu=limits.cpu,
-        wall=limits.wall + _MARGIN,
-        started=lambda: _last_answer(answers, nonce)["stage"] != "none",
-        start=_START,
-        start_cpu=_START,
-        cwd=scratch,
-        env=_environment(),
-        memory_most=_MEMORY_MOST,
-        stop=stop,
+    if not outcome.timed_out and (outcome.out_of_cpu or not by_itself):
+        return Judgement(name, True, False, (where + _how_it_ended(limits, outcome),))
+    computed = max(0.0, outcome.cpu - recording.cpu)
+    text = (
+        f"{where}nothing could be judged: not at its end after {limits.wall:g} s on the clock, "
+        f"of which it computed for {computed:.1f} s. Does it wait for something, or is this "
+        "machine busy?"
     )
-    told = trace.read_text(encoding="utf-8", errors="replace") if trace.is_file() else ""
-    return _last_answer(answers, nonce), told, outcome
-
-
-def _environment() -> dict[str, str]:
-    kept = {name: os.environ[name] for name in _KEPT if name in os.environ}
-    # One thread each: four processes share the machine, and threads reserve memory.
-    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    return {**kept, **threads, "PYTHONUTF8": "1", "PYTHONDONTWRITEBYTECODE": "1"}
-
-
-def _last_answer(file: Path, nonce: str) -> dict[str, Any]:
-    """The last line of the channel that is the child's own; a stage of "none" without one."""
-    found: dict[str, Any] = {"stage": "none"}
-    if file.is_file():
-        for line in file.read_text(encoding="utf-8", errors="replace").splitlines():
-            try:
-                answer = json.loads(line)
-            except ValueError:
-                continue
-            if isinstance(answer, dict) and answer.get("nonce") == nonce:
-                found = answer
-    return found
+    return Judgement(name, True, False, (text,), judged=False)
 
 
 def _not_ready(outcome: sandbox.Outcome) -> str:
     """Why a process did not get as far as the student's code."""
     if outcome.timed_out:
-        how = f"the engine was not ready after {_START:.0f} s, twice"
+        how = f"the engine was not ready after {START:.0f} s, twice"
     else:
         code = outcome.returncode if outcome.signal is None else _signal(outcome.signal)
         how = f"the judge itself ended with {code}, twice"
@@ -297,6 +268,8 @@ def _how_it_ended(limits: Limits, outcome: sandbox.Outcome) -> str:
     """What became of a process that gave no verdict."""
     if outcome.out_of_cpu:
         return f"still running after {limits.cpu:g} s of computing: a loop that does not end?"
+    if outcome.flooded:
+        return "it prints without end: a loop that does not end?"
     if outcome.out_of_memory:
         return "it asks for more memory than there is for it"
     if outcome.signal is not None:

@@ -1,9 +1,12 @@
 """Run a command that may loop, crash, flood or leave processes behind, and come back from it.
 
-It guards against what goes wrong, not against an attacker: the command has the rights of
-whoever runs it, and nothing here bounds how many processes it may start. On POSIX it gets a
-session and limits of its own; on Linux processes that left the session are found too, and it
-ends when we do. On Windows only the process itself is ended.
+On POSIX it gets a session and limits of its own; on Linux processes that left the session are
+found too, and it ends when we do. With `writable`, and where Linux permits it to any user, it
+is shut in (see `_launcher`). On Windows only the process itself is ended.
+
+Where it is not shut in it has the rights of whoever runs it, and this guards against what goes
+wrong, not against an attacker. Where it is, it still reads what its user can read, and a fault
+of the kernel's lets it out.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ import math
 import os
 import secrets
 import signal
+import site
 import subprocess
 import sys
 import threading
@@ -28,34 +32,11 @@ GB = 1024**3
 # Address space, of which engines reserve far more than they use.
 MEMORY_MOST = 4 * GB
 _FILE_MOST = GB // 4
+_FLOOD = GB // 4  # bytes of output that only a loop without end writes
 _TOKEN = "STATEMACHINE_SANDBOX"
 _PATIENCE = 2.0  # seconds to end what a command left behind
 _CHUNK = 65536
-
-# Sets the limits and becomes the command: what `preexec_fn` is for, and may not be used for
-# where the parent has threads. One limit that cannot be set leaves the others.
-_LAUNCHER = """
-import os, resource, sys
-if sys.platform == "linux":
-    try:
-        import ctypes
-        ctypes.CDLL(None).prctl(1, 9)  # PR_SET_PDEATHSIG: to be killed where we are
-    except (OSError, AttributeError, ImportError):
-        pass
-    if os.getppid() != int(sys.argv[1]):
-        sys.exit("who started it has ended")
-for name, most in zip(("AS", "CPU", "FSIZE", "CORE"), sys.argv[2:6]):
-    try:
-        # A limit of computing time is first a signal of its own, and then the end.
-        more = name == "CPU"
-        resource.setrlimit(getattr(resource, "RLIMIT_" + name), (int(most), int(most) + more))
-    except (OSError, ValueError, AttributeError):
-        pass
-try:
-    os.execvp(sys.argv[6], sys.argv[6:])
-except OSError as error:
-    sys.exit(f"{sys.argv[6]}: {error.strerror}")
-"""
+_LAUNCHER = str(Path(__file__).with_name("_launcher.py"))
 
 
 @dataclass(frozen=True)
@@ -68,6 +49,7 @@ class Outcome:
         started: Whether it got as far as `started` told, or was to.
         timed_out: Whether time on the clock ended it.
         out_of_cpu: Whether computing time ended it.
+        flooded: Whether it was ended since it wrote without end.
         out_of_memory: Whether what it wrote last speaks of memory that it did not get.
         stdout, stderr: What it wrote, each up to `output_most` bytes.
         truncated: Whether it wrote more than that.
@@ -81,6 +63,7 @@ class Outcome:
     started: bool
     timed_out: bool
     out_of_cpu: bool
+    flooded: bool
     out_of_memory: bool
     stdout: str
     stderr: str
@@ -100,6 +83,7 @@ def run(
     start_cpu: float = 0.0,
     cwd: str | os.PathLike[str] | None = None,
     env: Mapping[str, str] | None = None,
+    writable: str | os.PathLike[str] | None = None,
     output_most: int = 1_000_000,
     memory_most: int = MEMORY_MOST,
     stop: threading.Event | None = None,
@@ -116,6 +100,9 @@ def run(
             limits itself from there (`limits.limit_cpu`).
         cwd: Where it runs; None for here.
         env: Its environment; None for ours.
+        writable: The folder in which it has its home and its temporary files; where the system
+            permits it, it can write nowhere else, and has no network and no other process in
+            sight. None for none of this.
         output_most: Bytes of stdout, and of stderr, to keep; the rest is read and dropped.
         memory_most: Bytes of address space of each process, where the system can limit it.
         stop: Set by another thread, it ends the command as the time limit does.
@@ -126,16 +113,16 @@ def run(
     token = secrets.token_hex(16)
     began = time.monotonic()
     process = subprocess.Popen(
-        _limited(command, cpu + start_cpu, memory_most),
+        _limited(command, cpu + start_cpu, memory_most, writable),
         cwd=cwd,
-        env={**(os.environ if env is None else env), _TOKEN: token},
+        env={**(os.environ if env is None else env), **_home(writable), _TOKEN: token},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         start_new_session=True,  # without effect on Windows
     )
     readers = [_Reader(pipe, output_most) for pipe in (process.stdout, process.stderr)]
-    waiting = _Waiting(process, cpu, wall, stop or threading.Event())
+    waiting = _Waiting(process, readers, cpu, wall, stop or threading.Event())
     try:
         ready = started is None or waiting.until(started, began + start)
         if ready:
@@ -152,8 +139,9 @@ def run(
         returncode=code if code is not None and code >= 0 else None,
         signal=None if out_of_cpu else number,
         started=ready or (started is not None and started()),
-        timed_out=not (waiting.ended or out_of_cpu),
+        timed_out=not (waiting.ended or out_of_cpu or waiting.flooded),
         out_of_cpu=out_of_cpu,
+        flooded=waiting.flooded,
         out_of_memory=waiting.ended and code != 0 and _speaks_of_memory(err),
         stdout=out,
         stderr=err,
@@ -164,11 +152,26 @@ def run(
     )
 
 
-def _limited(command: Sequence[str], cpu: float, memory_most: int) -> list[str]:
+def _limited(
+    command: Sequence[str],
+    cpu: float,
+    memory_most: int,
+    writable: str | os.PathLike[str] | None,
+) -> list[str]:
     if os.name != "posix":
         return list(command)
-    limits = [str(limit) for limit in (os.getpid(), memory_most, math.ceil(cpu), _FILE_MOST, 0)]
-    return [sys.executable, "-I", "-S", "-c", _LAUNCHER, *limits, *command]
+    limits = [str(limit) for limit in (os.getpid(), memory_most, math.ceil(cpu), _FILE_MOST)]
+    place = "" if writable is None else str(Path(writable).resolve())
+    return [sys.executable, "-I", "-S", _LAUNCHER, *limits, place, *command]
+
+
+def _home(writable: str | os.PathLike[str] | None) -> dict[str, str]:
+    """A home and a place for temporary files; what is installed in ours is found."""
+    if writable is None:
+        return {}
+    place = str(Path(writable).resolve())
+    names = ("HOME", "USERPROFILE", "TMPDIR", "TEMP", "TMP")
+    return {**dict.fromkeys(names, place), "PYTHONUSERBASE": site.getuserbase()}
 
 
 class _Waiting:
@@ -179,14 +182,22 @@ class _Waiting:
     Attributes:
         ended: Whether it ended by itself.
         out_of_cpu: Whether it computed for too long, as seen from outside.
+        flooded: Whether it wrote too much.
     """
 
     def __init__(
-        self, process: subprocess.Popen[bytes], cpu: float, wall: float, stop: threading.Event
+        self,
+        process: subprocess.Popen[bytes],
+        readers: Sequence[_Reader],
+        cpu: float,
+        wall: float,
+        stop: threading.Event,
     ) -> None:
         self.ended = False
         self.out_of_cpu = False
-        self._process, self._cpu, self._wall, self._stop = process, cpu, wall, stop
+        self.flooded = False
+        self._process, self._readers = process, readers
+        self._cpu, self._wall, self._stop = cpu, wall, stop
 
     def until(self, ready: Callable[[], bool], deadline: float) -> bool:
         """Whether `ready` said so before the end, and before the deadline."""
@@ -198,7 +209,8 @@ class _Waiting:
 
         def exhausted() -> bool:
             self.out_of_cpu = WATCHED and cpu_of(self._process) - before > self._cpu
-            return self.out_of_cpu
+            self.flooded = any(reader.total > _FLOOD for reader in self._readers)
+            return self.out_of_cpu or self.flooded
 
         self._wait(time.monotonic() + self._wall, exhausted)
 
@@ -286,12 +298,14 @@ class _Reader:
         self._most = most
         self._kept = bytearray()
         self.dropped = False
+        self.total = 0
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
 
     def _read(self) -> None:
         with suppress(OSError, ValueError):
             while chunk := os.read(self._pipe.fileno(), _CHUNK):
+                self.total += len(chunk)
                 room = self._most - len(self._kept)
                 self._kept += chunk[:room]
                 self.dropped |= len(chunk) > room

@@ -21,6 +21,7 @@ from ..records import Array
 # Raw functions of MuJoCo that advance time, and those that only recompute.
 _STEPS = ("mj_step", "mj_step2")
 _FORWARDS = ("mj_forward", "mj_kinematics", "mj_fwdPosition")
+_MOST = 1000  # runs, forwards and Data that are noted
 
 
 @dataclass(frozen=True)
@@ -108,10 +109,16 @@ class Watch:
         self._current: dict[int, Run] = {}
 
     def meet(self, data: Any) -> int:
-        """The number of a Data; the engine's own object behind a known one is no other."""
+        """The number of a Data; the engine's own object behind a known one is no other.
+
+        Raises:
+            RuntimeError: There are too many.
+        """
         for number, known in enumerate(self.datas):
             if data is known or data is _raw(known):
                 return number
+        if len(self.datas) == _MOST:
+            raise RuntimeError(f"more than {_MOST} Data, which no exercise needs")
         self.datas.append(data)
         return len(self.datas) - 1
 
@@ -119,6 +126,11 @@ class Watch:
         """What they are now."""
         copies = (np.array(getattr(data, name)) for name in ("qpos", "qvel", "ctrl"))
         return Inputs(self.meet(data), *copies)
+
+    def recomputed(self, data: Any) -> None:
+        """Note that what is derived was."""
+        if len(self.forwards) < _MOST:
+            self.forwards.append(self.inputs(data))
 
     def step(self, model: Any, data: Any, advance: Callable[[], Any], nstep: int) -> Any:
         """Let `advance` move `data`, and note where from and where to."""
@@ -128,7 +140,8 @@ class Watch:
             now, time = self.inputs(data), float(data.time)
             own = _origin(model) == self._origin
             run = Run(number, own, now.qpos, now.qvel, now.ctrl, time, now.qpos, now.qvel, time)
-            self.runs.append(run)
+            if len(self.runs) < _MOST:
+                self.runs.append(run)
             self._current[number] = run
         elif run.ctrl_changed is None and (data.ctrl != run.ctrl).any():
             run.ctrl_changed = run.nstep
@@ -211,7 +224,7 @@ def _seen_recompute(original: Callable[..., None]) -> Callable[..., None]:
     def seen(data: Any) -> None:
         original(data)
         if _watch is not None:
-            _watch.forwards.append(_watch.inputs(data))
+            _watch.recomputed(data)
 
     return seen
 
@@ -232,7 +245,7 @@ def _seen_forward(original: Callable[..., Any]) -> Callable[..., Any]:
     def seen(m: Any, d: Any) -> Any:
         result = original(m, d)
         if _watch is not None:
-            _watch.forwards.append(_watch.inputs(d))
+            _watch.recomputed(d)
         return result
 
     return seen

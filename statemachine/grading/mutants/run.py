@@ -234,6 +234,7 @@ def _run(
             started=lambda: record.stat().st_size > 0,
             cwd=path.parent,
             env=env,
+            writable=folder,
             stop=stop,
         )
         return _read(record, outcome, seconds, clock)
@@ -299,6 +300,8 @@ def _end(outcome: sandbox.Outcome, seconds: float, clock: float) -> str:
     """How a run ended that did not come to its end."""
     if outcome.out_of_cpu:
         return f"took longer than {seconds:.0f} s of computing"
+    if outcome.flooded:
+        return "wrote without end"
     if outcome.timed_out:
         return f"took longer than {clock:.0f} s on the clock, and computed for {outcome.cpu:.0f} s"
     if outcome.out_of_memory:
