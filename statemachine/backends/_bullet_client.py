@@ -49,7 +49,7 @@ def as_file(text: str) -> Iterator[str]:
         return
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.urdf"
-        path.write_text(text)
+        path.write_text(text, encoding="utf-8")
         yield str(path)
 
 
