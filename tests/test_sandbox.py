@@ -171,8 +171,10 @@ def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
 # Shut in, where the system permits it.
 
 
-def _shut_in(folder: Path, code: str, **more: object) -> sandbox.Outcome:
-    return _python(code, cwd=folder, writable=folder, **more)
+def _shut_in(
+    folder: Path, code: str, cpu: float = 20.0, wall: float = 120.0, **more: object
+) -> sandbox.Outcome:
+    return _python(code, cpu, wall, cwd=folder, writable=folder, **more)
 
 
 @pytest.fixture

@@ -15,10 +15,14 @@ from __future__ import annotations
 
 import ctypes
 import os
-import resource
 import signal
 import sys
 from contextlib import suppress
+
+if sys.platform == "win32":
+    raise ImportError("this program is for POSIX")
+
+import resource
 
 _NEWNS, _NEWIPC, _NEWUSER, _NEWPID, _NEWNET = (
     0x20000, 0x8000000, 0x10000000, 0x20000000, 0x40000000
