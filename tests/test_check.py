@@ -333,7 +333,7 @@ def test_a_forged_record_is_judged_like_any_other(tmp_path: Path) -> None:
         f"    says('answer', answer={{'result': {{'tuple': [[0] * 5, [0] * 5]}}, {nothing}}}, "
         "refused=[])",
         "def demo_state(model):\n    says('refused', kind='SystemExit', text='boo')",
-        "def demo_forward(model):\n    says('judged', remarks=[['fine', True]], written=True)",
+        "def demo_forward(model):\n    time.sleep(0.5); os.unlink('../answers')\n    os._exit(0)",
         "def demo_replay(model, ctrl, nstep=600):\n"
         f"    says('answer', answer={{'result': {{'tuple': [True, row(1), row(1)]}}, {nothing}}}, "
         "refused=[])",
@@ -342,6 +342,7 @@ def test_a_forged_record_is_judged_like_any_other(tmp_path: Path) -> None:
     assert not found["gravity"].passed
     for name in ("state", "forward", "replay"):
         assert "what its process recorded is no record of a run (" in _one(found[name])
+    assert "(it is gone)" in _one(found["forward"])
 
 
 def test_a_judge_that_is_replaced_is_another_process_s(tmp_path: Path) -> None:

@@ -256,6 +256,21 @@ def test_a(request):
     assert (found.failures, found.caught) == ((), 0)
 
 
+def test_what_is_imported_does_not_tell_of_a_fault(write: Write) -> None:
+    text = "import sys\nSEEN = set(sys.modules)\n"
+    text += "def test_a(): assert 'statemachine.grading.mutants.faults' in SEEN\n"
+    found = examine(write(text), only=["xyzw"])
+    assert (found.failures, found.caught) == ((), 0)
+
+
+@pytest.mark.parametrize("line", ["not json", '{"began": 5}', "[" * 100_000, '{"tests": [1]}'])
+def test_a_forged_record_is_refused(line: str, write: Write) -> None:
+    text = "import sys\ndef test_a():\n    path = sys.argv[sys.argv.index('--record') + 1]\n"
+    text += f"    open(path, 'a').write({line!r} + chr(10))\n"
+    with pytest.raises(BadInputError, match="wrote into the record"):
+        examine(write(text), only=["xyzw"])
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
 def test_a_test_starts_no_process(write: Write) -> None:
     text = "import os\ndef test_a(): assert os.fork() >= 0\ndef test_b(): assert False, 'no'\n"

@@ -98,7 +98,7 @@ def record(
         [sys.executable, "-P", "-c", _CHILD, str(job), str(_PACKAGES)],
         cpu=limits.cpu,
         wall=limits.wall + _MARGIN,
-        started=lambda: bool(_content(answers, 1)),
+        started=lambda: bool(content(answers, 1)),
         start=START,
         start_cpu=START,
         cwd=scratch,
@@ -107,12 +107,14 @@ def record(
         memory_most=_MEMORY_MOST,
         stop=stop,
     )
-    recording = Recording(outcome, _content(trace, _RECORD_MOST).decode("utf-8", "replace"))
+    recording = Recording(outcome, content(trace, _RECORD_MOST).decode("utf-8", "replace"))
     try:
-        for line in _content(answers, _RECORD_MOST).splitlines():
+        for line in content(answers, _RECORD_MOST).splitlines():
             _add(recording, line, nonce)
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         recording.broken = f"{type(error).__name__}: {error}"[:_TEXT_MOST]
+    if outcome.started and not (recording.began or recording.refusal):
+        recording.broken = recording.broken or "it is gone"
     return recording
 
 
@@ -149,7 +151,7 @@ def _text(found: Any) -> str:
     return " ".join(found.split())[:_TEXT_MOST]
 
 
-def _content(file: Path, most: int) -> bytes:
+def content(file: Path, most: int) -> bytes:
     """The first bytes of a file; of what is no plain file (a link, a pipe), none."""
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
     try:

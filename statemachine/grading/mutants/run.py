@@ -1,4 +1,8 @@
-"""A test file against the healthy arm, then against every mutant, each in a process of its own."""
+"""A test file against the healthy arm, then against every mutant, each in a process of its own.
+
+The tests and what records them share a process: tests that look into it can learn that there is
+a fault without looking at the arm, or write the record themselves.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +12,17 @@ import os
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ...backends import backend_names
 from ...engines import engine_version, require
 from ...errors import BadInputError, EngineError, MissingEngineError, ModelFileError, unknown_name
 from .. import sandbox
+from ..recording import content
 from ..unwinding import unwinding
 from . import BACKENDS, FAULT, MUTANTS, Mutant
 
@@ -24,6 +30,7 @@ _SECONDS = 60.0  # of computing, for the tests on the healthy arm
 _CLOCK = 300.0  # on the clock: the machine may be busy with others
 # Under a fault they may take longer: so many times as long, and so many seconds more.
 _TIMES, _AND, _CLOCK_AND = 5.0, 15.0, 120.0
+_RECORD_MOST = 10_000_000  # bytes
 _IMPORT = "the import of the file"
 _OWN = ("PYTEST_ADDOPTS", "PYTEST_PLUGINS", "PYTEST_DEBUG")  # settings of another pytest
 
@@ -261,22 +268,24 @@ def _read(record: Path, outcome: sandbox.Outcome, seconds: float, clock: float) 
     ended: list[str] = []
     skipped: set[str] = set()
     failures: dict[str, str] = {}
-    for line in record.read_text(encoding="utf-8").splitlines():
-        match json.loads(line):
-            case {"ready": _}:
+    for found in _lines(record):
+        match found:
+            case {"ready": True}:
                 ready = True
-            case {"tests": names}:
+            case {"tests": [*names]} if all(isinstance(name, str) for name in names):
                 tests = names
-            case {"began": name}:
+            case {"began": str(name)}:
                 running = name
-            case {"failed": name, "why": why}:
+            case {"failed": str(name), "why": str(why)}:
                 failures.setdefault(name, why)  # the test itself, before its teardown
-            case {"skipped": name}:
+            case {"skipped": str(name)}:
                 skipped.add(name)
-            case {"ended": name}:
+            case {"ended": str(name)}:
                 ended.append(name)
-            case {"broken": why}:
+            case {"broken": str(why)}:
                 broken = why
+            case _:
+                raise BadInputError("the tests wrote into the record of what they do")
     if not ready:  # of which no test can be the reason
         lines = outcome.stderr.strip().splitlines()
         said = [line for line in lines if "rror" in line] or lines or ["it said nothing"]
@@ -294,6 +303,15 @@ def _read(record: Path, outcome: sandbox.Outcome, seconds: float, clock: float) 
         cpu=outcome.cpu,
         wall=outcome.wall,
     )
+
+
+def _lines(record: Path) -> Iterator[Any]:
+    """What the lines of a record say; None for one that says nothing."""
+    for line in content(record, _RECORD_MOST).splitlines():
+        try:
+            yield json.loads(line)
+        except (ValueError, RecursionError):
+            yield None
 
 
 def _end(outcome: sandbox.Outcome, seconds: float, clock: float) -> str:
