@@ -533,14 +533,9 @@ def test_a_recorded_trace_is_what_the_engine_does_here(
     assert set(make_traces.RUNS) == set(shipped_names())
     trace, kept = make_traces.recorded(name), read(make_traces.FOLDER / f"{name}.npz")
     assert kept.header.provenance.model_sha256 == trace.header.provenance.model_sha256
-    if name.endswith(".engine"):
-        assert same(trace, kept, INPUTS)
+    assert same(trace, kept, INPUTS)
     for column in trace.columns:
-        if column in INPUTS:
-            # The emulated servo goes through NumPy, whose sums differ in the last bits with the
-            # processor: 2e-15 rad and 3e-13 rad/s were seen at most.
-            np.testing.assert_allclose(trace[column], kept[column], rtol=0, atol=1e-11)
-        else:  # kept in single precision
+        if column not in INPUTS:  # kept in single precision
             rounded = trace[column].astype(np.float32)
             np.testing.assert_allclose(rounded, kept[column], rtol=1e-6, atol=1e-6)
 

@@ -63,6 +63,9 @@ _COMPONENTS = {
 }
 _NATIVE = Behaviour("native", "the engine's own")
 _NOTES = {
+    "position servo": Behaviour(
+        "native", "the engine's own; an infinite ctrl is clamped to its range, or refused"
+    ),
     "forces by part": Behaviour("native", "rows of the constraint solver, by their type"),
     "exact restore": Behaviour("native", "mjSTATE_INTEGRATION, warm start included"),
     "no automatic reset": Behaviour("native", "the engine's flag mjDSBL_AUTORESET"),
