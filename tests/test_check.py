@@ -166,13 +166,13 @@ def test_what_waits_is_no_verdict_on_the_function(tmp_path: Path) -> None:
     file = tmp_path / "student.py"
     waits = "def {}(*_):\n    time.sleep(1e6)\n"
     file.write_text("import time\n" + "".join(waits.format(name) for name in JUDGES))
-    grade = exercise.run(file, time_limit=1.0, wall_limit=1.5)
+    grade = exercise.run(file, time_limit=0.3, wall_limit=1.5)
     for judgement in grade.functions:
         assert (judgement.judged, judgement.written) == (False, True)
         assert "nothing could be judged: not at its end after 1.5 s on the clock" in _one(judgement)
         assert re.search(r"of which it computed for 0\.[0-5] s", _one(judgement))
     assert _one(grade.functions[0]).startswith("line 3: ")
-    assert (grade.cpu_limit, grade.wall_limit) == (1.0, 1.5)
+    assert (grade.cpu_limit, grade.wall_limit) == (0.3, 1.5)
 
 
 def test_what_does_not_get_ready_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,7 +28,7 @@ def add(commands: Any) -> None:
         default=5.0,
         metavar="S",
         help="seconds that each function of FILE may compute (default 5); time in which the "
-        "machine is busy with others does not count, but for 120 s on the clock at most",
+        "machine is busy with others does not count, up to 120 s on the clock, or four times S",
     )
     _mutants.add(parser)
     add_json(parser, "judgement")

@@ -34,6 +34,7 @@ from .worlds import Scenes, World
 
 TIME_LIMIT = 5.0  # [s] of computing for a function, from when its worlds are ready
 WALL_LIMIT = 120.0  # [s] on the clock for it, which a busy machine may need too
+_TIMES = 4  # a busy machine needs longer on the clock: so many times what may be computed, at least
 _LARGEST = 1_000_000  # bytes of a student's file
 
 
@@ -102,7 +103,8 @@ def run(
         time_limit: What each function may compute, after everything it needs is ready [s];
             this does not pass while the machine is busy with others.
         progress: Told the fraction that is done.
-        wall_limit: What each may take on the clock, from the same moment [s].
+        wall_limit: What each may take on the clock, from the same moment [s]; at least four
+            times `time_limit`.
 
     Raises:
         BadInputError: There is no such file, or it is no Python file.
@@ -116,7 +118,7 @@ def run(
         )
     engine = backend_engine(backend)
     content = path.read_bytes()
-    limits = Limits(time_limit, max(wall_limit, time_limit))
+    limits = Limits(time_limit, max(wall_limit, _TIMES * time_limit))
     with (
         unwinding(),
         tempfile.TemporaryDirectory(prefix="statemachine-", ignore_cleanup_errors=True) as folder,
