@@ -2,6 +2,7 @@
 # make test         set everything up and run all checks and tests
 # make check        lint, format, layers and types only
 # make bench        the speed budget, as ratios
+# make fuzz         odd input for the parts that meet strangers; ends with what was tried
 # make help         all targets
 
 VENV   ?= .venv
@@ -13,7 +14,7 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13 python3.14; 
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null \
 	&& { echo $$p; break; }; done)
 
-.PHONY: help lesson test test-fast test-pythons test-newest check format hooks bench picture extras report urdf traces docs notebook clean
+.PHONY: help lesson test test-fast test-pythons test-newest check format hooks bench fuzz picture extras report urdf traces docs notebook clean
 
 help:
 	@sed -n 's/^# make /  make /p' Makefile
@@ -80,6 +81,9 @@ hooks: $(VENV)/test.stamp
 bench: $(VENV)/run.stamp
 	@$(BIN)/python -m benchmarks
 
+fuzz: $(VENV)/test.stamp
+	@$(BIN)/python -m fuzz --seed $(SEED) --seconds $(SECONDS)
+
 # make picture      render models/so101/so101.png anew (needs EGL or OSMesa)
 picture: $(VENV)/test.stamp
 	@$(BIN)/python models/so101/render.py
@@ -116,6 +120,9 @@ clean:
 	rm -rf .venv .venv-newest .venv-3.* build dist docs/_build docs/path docs/reference docs/comparisons .pytest_cache .ruff_cache .hypothesis
 
 CONSTRAINTS ?= -c constraints.txt
+# Of make fuzz: what is drawn, and how long each target draws.
+SEED    ?= 0
+SECONDS ?= 60
 
 $(VENV)/run.stamp: pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "no Python 3.11 or newer with venv and ensurepip here" \

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import signal
 import sys
 
 
@@ -24,8 +25,14 @@ def main() -> int:
                 file=sys.stderr,
             )
             return 2
+    # An interrupt while the package is imported ends the process, as it ends any program that
+    # does not ask for it; from then on it is a KeyboardInterrupt, which the command answers.
+    handler = signal.getsignal(signal.SIGINT)
+    if handler is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
     from statemachine.cli import main as run
 
+    signal.signal(signal.SIGINT, handler)
     return run()
 
 

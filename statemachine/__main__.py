@@ -1,3 +1,3 @@
-from .cli import main
+from statemachine_sim import main
 
 raise SystemExit(main())

@@ -16,6 +16,7 @@ from typing import Any, NoReturn
 from . import __version__
 from .commands import COMMANDS, lesson
 from .commands._common import BAD_INPUT, MISSING, NO_OUTPUT, PROGRAM, complain
+from .engines import raise_if_interrupted
 from .errors import EngineWarning, MissingEngineError, StateMachineError
 from .lessons import LESSONS
 from .report.terminal import spelled
@@ -101,6 +102,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return complain(error, BAD_INPUT)
         _let_go_of_output()
         return complain(OSError(f"the output cannot be written: {error.strerror}"), NO_OUTPUT)
+    except MemoryError:
+        return complain("this takes more memory than there is", BAD_INPUT)
+    except UnicodeError as error:  # a name in a file, or of one
+        return complain(f"this holds text that is not UTF-8: {error}", BAD_INPUT)
+    except Exception as error:
+        try:
+            raise_if_interrupted(error)
+        except KeyboardInterrupt:  # while something was imported, which made that fail
+            return 130
+        raise
 
 
 def _options(words: list[str]) -> argparse.Namespace:

@@ -8,7 +8,7 @@ two agree, neither has copied from the other.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -57,6 +57,7 @@ class Kinematics:
     Raises:
         MissingEngineError: Pinocchio is not installed here.
         ModelError: Pinocchio cannot read this file, or would misread it.
+        BadInputError: `joint_names` are no names.
     """
 
     def __init__(
@@ -67,7 +68,7 @@ class Kinematics:
         self.version: str = self._pin.__version__
         self._model, in_file, self._misplaced = read(self._pin, self.path)
         self._data: Any = self._model.createData()
-        self.joint_names: tuple[str, ...] = tuple(in_file if joint_names is None else joint_names)
+        self.joint_names: tuple[str, ...] = _names(in_file if joint_names is None else joint_names)
         self._segments = _segments(self._model, in_file, self.joint_names, self.path)
         self.nq: int = sum(segment.nq for segment in self._segments)
         self.nv: int = sum(segment.nv for segment in self._segments)
@@ -161,16 +162,16 @@ class Kinematics:
     def _frame(self, name: str, kind: Kind) -> int:
         types = self._pin.FrameType
         wanted = {"site": types.OP_FRAME, "body": types.BODY}
-        if kind not in wanted:
+        if kind not in tuple(wanted):
             raise unknown_name("kind of frame", kind, wanted)
-        if kind == "site" and name in self._misplaced:
+        if kind == "site" and name in tuple(self._misplaced):
             raise ModelError(
                 f"site {name!r} of {self.path.name} is placed by fromto, which Pinocchio's "
                 "parser does not read"
             )
         # A joint and a body may share a name, so the name alone does not tell.
-        if not self._model.existFrame(name, wanted[kind]):
-            known = (frame.name for frame in self._model.frames if frame.type == wanted[kind])
+        known = [frame.name for frame in self._model.frames if frame.type == wanted[kind]]
+        if name not in known:  # asked here: Pinocchio takes nothing but text
             raise unknown_name(f"{kind} in {self.path.name}", name, known)
         return self._model.getFrameId(name, wanted[kind])
 
@@ -239,6 +240,14 @@ def _segments(
             f"against {', '.join(wanted)}"
         )
     return [by_name[name] for name in wanted]
+
+
+def _names(given: Sequence[str]) -> tuple[str, ...]:
+    listed = isinstance(given, Iterable) and not isinstance(given, str)
+    names = tuple(given) if listed else ()
+    if not listed or not all(isinstance(name, str) for name in names):
+        raise BadInputError(f"joint_names must be a list of names; got {given!r}")
+    return names
 
 
 def _unit(quat: Array) -> Array:

@@ -48,6 +48,8 @@ def resolve(name: str | os.PathLike[str], menagerie: str | os.PathLike[str] | No
     text = os.fspath(name)
     if "\0" in text or not text.strip():
         raise ModelFileError(f"{text!r} is neither the name of a model nor a path")
+    if any("\ud800" <= character <= "\udfff" for character in os.fsdecode(text)):
+        raise ModelFileError(f"{text!r} is not UTF-8, and engines open no file of such a name")
     try:
         path = Path(text).expanduser()
         path.is_file()

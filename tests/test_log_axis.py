@@ -89,10 +89,10 @@ def test_in_a_figure() -> None:
 
 
 def test_in_a_report() -> None:
-    figures = {"max": 2.0, "at": 0.9, "rms": 1.0, "settled": 1.0, "since": 0.7}
     found = Agreement(
-        name="a", kind="joint", unit="rad", **figures, tolerance=1e-3, reason="", verdict="differs"
-    )
+        name="a", kind="joint", unit="rad", max=2.0, at=0.9, rms=1.0, settled=1.0, since=0.7,
+        tolerance=1e-3, reason="", verdict="differs",
+    )  # fmt: skip
     curve = Series("a", "joint", TIME, np.zeros(0), np.zeros(0), VALUES)
     chart = difference_chart(curve, found)
     ticks = [

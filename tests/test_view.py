@@ -583,7 +583,9 @@ def test_it_listens_on_loopback_alone_and_ctrl_c_ends_it(tmp_path: Path) -> None
     pytest.importorskip("viser")
     port = _free_pair()
     with Viewer(tmp_path, "--port", str(port)) as viewer:
-        assert viewer.line().strip() == f"http://localhost:{port}"
+        address, _, token = viewer.line().strip().partition("/?token=")
+        assert address == f"http://localhost:{port}"
+        assert len(token) >= 16
         assert "mujoco" in viewer.line()
         viewer.line()
         assert f"ssh -L {port}:localhost:{port}" in viewer.line()
@@ -702,10 +704,12 @@ def test_nobody_opens_a_tunnel_from_here(monkeypatch: pytest.MonkeyPatch) -> Non
     from viser import _messages, _viser
 
     from statemachine.view import server as serving
+    from statemachine.view.door import Door
 
     opened: list[object] = []
     monkeypatch.setattr(_viser, "ViserTunnel", lambda *words: opened.append(words))
-    server = serving.serve("127.0.0.1", serving.free_port("127.0.0.1", 0), "t")
+    port = serving.free_port("127.0.0.1", 0)
+    server = serving.serve("127.0.0.1", port, "t", Door("127.0.0.1"))
     try:
         assert isinstance(server, viser.ViserServer)
         handlers = server._websock_server._incoming_handlers[_messages.ShareUrlRequest]

@@ -8,6 +8,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ import statemachine as sm
 from statemachine.drawing import drawing_of
 from statemachine.traces import record
 from statemachine.view import server as serving
+from statemachine.view.door import Door
 from statemachine.view.frames import Pause, Reset, Run, SetCtrl
 from statemachine.view.live import Live, Pace
 from statemachine.view.recording import Recording
@@ -37,12 +39,17 @@ def _viser() -> None:
         pytest.importorskip("viser")
 
 
+def _serve(door: Door) -> Any:
+    return serving.serve("127.0.0.1", serving.free_port("127.0.0.1", 0), "page", door)
+
+
 class Stage:
     """A session on a page, with tabs before it; time passes only in `until`."""
 
     def __init__(self, session: Session, model: sm.Model, new_tab: Callable[[], Tab]) -> None:
         self.session, self.new_tab = session, new_tab
-        self.server = serving.serve("127.0.0.1", serving.free_port("127.0.0.1", 0), "page")
+        self.door = Door("127.0.0.1")
+        self.server = _serve(self.door)
         front = ViserFront(self.server, session, drawing_of(model))
         self.live = Live(session, front, sleep=lambda seconds: None)
         self.tab = self.open()
@@ -50,7 +57,7 @@ class Stage:
     def open(self) -> Tab:
         """A new tab with the page, all of it there."""
         tab = self.new_tab()
-        tab.goto(f"http://127.0.0.1:{self.server.get_port()}")
+        tab.goto(f"http://127.0.0.1:{self.server.get_port()}/?token={self.door.token}")
         self.until(lambda: tab.get_by_role("slider").count() == 6, tab)
         return tab
 
@@ -255,9 +262,10 @@ def test_the_command_shows_both_engines_to_a_browser(tmp_path: Path) -> None:
         Viewer(tmp_path, "--ghost", "pybullet", "--port", str(port)) as viewer,
         browser() as tab,
     ):
-        assert viewer.line().startswith("http://localhost:")
+        address = viewer.line().strip()
+        assert address.startswith("http://localhost:")
         assert "mujoco" in viewer.line()
-        tab.goto(f"http://localhost:{port}")
+        tab.goto(address)
         for text in ("on mujoco", "on pybullet", "tips apart", "real time"):
             tab.get_by_text(text).first.wait_for(timeout=1000 * PATIENCE)
         tab.nothing_wrong(*KNOWN)
@@ -273,7 +281,7 @@ def test_the_page_is_told_where_every_body_is_on_each_engine() -> None:
     with Session(models, "held") as session:
         session.apply(SetCtrl(0, 0.7))
         session.advance(100)
-        server = serving.serve("127.0.0.1", serving.free_port("127.0.0.1", 0), "t")
+        server = _serve(Door("127.0.0.1"))
         try:
             front = ViserFront(server, session, drawing, 1.0, 0)
             front.show(session.frame(), Pace(1.0, None, False), "")
@@ -301,7 +309,7 @@ def test_the_page_is_told_where_every_body_is_on_each_engine() -> None:
 def test_the_slider_of_a_recording_follows_it() -> None:
     model = sm.load("so101/scene")
     recording = Recording([record(model, seconds=0.5)])
-    server = serving.serve("127.0.0.1", serving.free_port("127.0.0.1", 0), "t")
+    server = _serve(Door("127.0.0.1"))
     try:
         front = ViserFront(server, recording, drawing_of(model))
         assert (front._seek.min, front._seek.max) == (0, pytest.approx(0.5))

@@ -217,7 +217,7 @@ def _typed_play(options: argparse.Namespace) -> str:
         words += ["--defaults", options.defaults]
     if options.model:
         words += ["--model", Path(options.model).name]
-    return " ".join(words)
+    return one_line(" ".join(words))
 
 
 def run_show(options: argparse.Namespace) -> int:
@@ -309,4 +309,4 @@ def _typed(options: argparse.Namespace) -> str:
         value = getattr(options, flag)
         if value != usual:
             words += [f"--{flag}", Path(value).name if flag == "model" else str(value)]
-    return " ".join(words)
+    return one_line(" ".join(words))

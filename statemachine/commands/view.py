@@ -138,15 +138,16 @@ def _serve(
 ) -> None:
     """Show a session until it is interrupted: the ordinary end of a server, no failure."""
     from ..view import server as serving
+    from ..view.door import Door
     from ..view.frames import Run
     from ..view.live import Live
     from ..view.viser_front import ViserFront
 
-    server = None
+    server, door = None, Door(options.host)
     try:
-        server = serving.serve(options.host, port, f"{PROGRAM} view")
+        server = serving.serve(options.host, port, f"{PROGRAM} view", door)
         front = ViserFront(server, session, drawing, options.speed, keyframe)
-        _announce(options, server.get_port(), what, drawing)
+        _announce(options, server.get_port(), door.token, what, drawing)
         if not options.paused:
             session.apply(Run())
         Live(session, front, options.speed).run(options.seconds)
@@ -159,17 +160,17 @@ def _serve(
                 serving.stop(server)
 
 
-def _announce(options: argparse.Namespace, port: int, what: str, drawing: Any) -> None:
+def _announce(options: argparse.Namespace, port: int, token: str, what: str, drawing: Any) -> None:
     everywhere = options.host in ("0.0.0.0", "::")
     here = everywhere or options.host in ("127.0.0.1", "::1", "localhost")
     host = f"[{options.host}]" if ":" in options.host else options.host
-    address = f"http://{'localhost' if here else host}:{port}"
+    address = f"http://{'localhost' if here else host}:{port}/?token={token}"
     if options.port not in (0, port):
         print(f"port {options.port} is taken, so it is {port}")
     print(address)
     print(one_line(f"shows {what}; Ctrl-C ends it"))
     if everywhere or not here:
-        print(f"whoever reaches port {port} of this machine can move the sliders")
+        print(f"whoever has this address and reaches port {port} here can move the sliders")
     else:
         machine = socket.gethostname() if os.environ.get("SSH_CONNECTION") else "HOST"
         print("from another machine, first:")

@@ -59,7 +59,7 @@ def provenance(model: Model, seed: int | None = None, **others: str) -> Provenan
         **others,
     }
     # The folder and name, not the machine's path: a result is read elsewhere.
-    name = "/".join(model.path.parts[-2:])
+    name = "/".join(model.path.parts[-2:]).encode(errors="replace").decode()
     digest = model_digest(model.path)
     emulated = tuple(
         name
@@ -248,12 +248,13 @@ def steps_in(model: Model, seconds: float) -> int:
     """Number of timesteps in a time, at least one."""
     if not np.isfinite(seconds) or seconds <= 0:
         raise BadInputError(f"seconds must be above 0; got {seconds}")
-    steps = seconds / model.timestep
-    if steps > _STEPS_MOST:
+    steps = max(1.0, seconds / model.timestep)
+    if steps * model.substeps > _STEPS_MOST:
         raise BadInputError(
-            f"{seconds:g} s are {steps:.3g} steps, and a run has at most {_STEPS_MOST:,}"
+            f"{seconds:g} s are {steps * model.substeps:.3g} steps of the engine, and a run has "
+            f"at most {_STEPS_MOST:,}"
         )
-    return max(1, round(steps))
+    return round(steps)
 
 
 def milestones(seconds: float) -> list[float]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from ..errors import EngineError
-from ..traces.files import beside, replace_file
+from ..traces.whole import beside, replace_file
 
 SUFFIXES = (".webp", ".mp4")
 _QUALITY = 70  # of WebP, 0 to 100
@@ -63,7 +63,7 @@ def write_mp4(path: Path, pictures: Iterator[Any], size: tuple[int, int], fps: f
         *("-i", "-", "-an", "-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p"),
         *("-movflags", "+faststart", "-fflags", "+bitexact", "-flags:v", "+bitexact"),
     ]
-    with beside(path) as name, tempfile.TemporaryFile() as said:
+    with beside(path) as (name,), tempfile.TemporaryFile() as said:
         _feed([*command, "-f", "mp4", name], pictures, said)
 
 

@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 from ..compare import Comparison
 from ..errors import BadInputError, MissingEngineError
 from ..traces import Trace
-from ..traces.files import replace_file
+from ..traces.whole import replace_file
 from . import plot_panels
 from .plot_panels import Figure
 

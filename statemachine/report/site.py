@@ -17,7 +17,7 @@ from ..lessons.session import page_of_lesson, take
 from ..page import Page, Picture, Traces, Verdict
 from ..probes import phrasebook
 from ..probes.conventions import probe
-from ..traces.files import replace_file
+from ..traces.whole import replace_file
 from . import compare as comparison
 from . import conventions, why
 from .figures import svg

@@ -1,28 +1,69 @@
-"""Whether the header of a trace can be believed: a file may have been edited, or be no trace."""
+"""Whether a file can be believed: it may have been edited, made to do harm, or be no trace."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from ..checks import HUGE
 from ..errors import TraceError
+from ..model import OPTIONS
 from ..records import JointType
 
 if TYPE_CHECKING:
     from .trace import Header
 
 
+# Bytes that a trace may unfold into: this many, or so many times the size of its file.
+# Recorded runs are 2 to 3 times as large as their files.
+_UNFOLDED, _TIMES, _MOST = 2**28, 100, 2**32
+_LONGEST = 1000  # characters of a name or a sentence
+WHOLE = ("contact_row", "contact_geom")  # columns of whole numbers
+# No number of a run is larger, and what is computed from smaller ones stays finite.
+LARGEST = 1e100
+
+
+def check_size(unfolded: int, path: Path) -> None:
+    """Refuse a file that unfolds into more than a recorded run would.
+
+    Raises:
+        TraceError: It does.
+    """
+    most = min(max(_UNFOLDED, _TIMES * path.stat().st_size), _MOST)
+    if unfolded > most:
+        raise TraceError(
+            f"unfolds into {unfolded / 2**20:,.0f} MB; a file of this size may into "
+            f"{most / 2**20:,.0f}"
+        )
+
+
+def as_column(name: str, array: Any) -> Any:
+    """An array of a file as a column: int64, or float64."""
+    return np.asarray(array, dtype=np.int64 if name in WHOLE else np.float64)
+
+
 def _text(value: Any) -> bool:
-    return isinstance(value, str)
+    if not isinstance(value, str) or len(value) > _LONGEST:
+        return False
+    # Half of a surrogate pair is no text: it can be written nowhere.
+    return not any("\ud800" <= character <= "\udfff" for character in value)
 
 
 def _number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+    return isinstance(value, float) or _whole(value)
+
+
+def _finite(value: Any) -> bool:
+    return _number(value) and math.isfinite(value) and abs(value) <= HUGE
 
 
 def _whole(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
+    return isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63
 
 
 def _each(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
@@ -30,7 +71,13 @@ def _each(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
 
 
 def _words(value: Any) -> bool:
-    return isinstance(value, dict) and all(map(_text, value.values()))
+    return isinstance(value, dict) and all(map(_text, (*value, *value.values())))
+
+
+def _option(name: str, value: Any) -> bool:
+    """Whether `Model.replace` might take this; it looks closer."""
+    known = isinstance(value, bool) or _text(value) or _finite(value) or _each(_finite)(value)
+    return name in OPTIONS and known
 
 
 _KINDS: dict[str, Callable[[Any], bool]] = {
@@ -38,9 +85,11 @@ _KINDS: dict[str, Callable[[Any], bool]] = {
     "says": _text,
     "command": _text,
     "defaults": lambda value: value in ("model", "engine"),
-    "options": lambda value: isinstance(value, dict),
+    "options": lambda value: (
+        isinstance(value, dict) and all(_option(name, each) for name, each in value.items())
+    ),
     "keyframe": lambda value: value is None or _text(value),
-    "gravity": lambda value: _each(_number)(value) and len(value) == 3,
+    "gravity": lambda value: _each(_finite)(value) and len(value) == 3,
     "joints": _each(_text),
     "sites": _each(_text),
     "bodies": _each(_text),

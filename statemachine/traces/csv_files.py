@@ -12,8 +12,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..records import JointType
-from .files import replace_file
 from .trace import COLUMNS, Header, Trace
+from .whole import beside, fill_file
 
 
 def export_csv(trace: Trace, path: str | os.PathLike[str]) -> list[Path]:
@@ -21,19 +21,31 @@ def export_csv(trace: Trace, path: str | os.PathLike[str]) -> list[Path]:
 
     Columns are named after joints, bodies, sites and actuators: "qpos.elbow_flex",
     "site_xpos.gripperframe.x". Contacts, which are many to a moment, go into a second
-    file beside it, NAME.contacts.csv.
+    file beside it, NAME.contacts.csv; both are written before either is put in its place.
 
     Returns:
         The files that were written.
     """
     target = Path(path)
+    contacts = target.with_name(f"{target.stem}.contacts.csv")
+    if "contact_row" not in trace:
+        with beside(target) as (name,):
+            fill_file(name, lambda out: _write_columns(out, trace))
+        return [target]
+    with beside(target, contacts) as (name, other):
+        fill_file(name, lambda out: _write_columns(out, trace))
+        fill_file(other, lambda out: _write_contacts(out, trace))
+    return [target, contacts]
+
+
+def _write_columns(out: BinaryIO, trace: Trace) -> None:
     names = [name for name in COLUMNS if name in trace]
     labels = list(itertools.chain.from_iterable(column_labels(trace.header, n) for n in names))
     flat = np.hstack([np.asarray(trace[n]).reshape(len(trace), -1) for n in names])
-    replace_file(target, lambda out: _write_rows(out, labels, flat.tolist()))
-    if "contact_row" not in trace:
-        return [target]
-    beside = target.with_name(f"{target.stem}.contacts.csv")
+    _write_rows(out, labels, flat.tolist())
+
+
+def _write_contacts(out: BinaryIO, trace: Trace) -> None:
     geoms, header = trace["contact_geom"].tolist(), trace.header
     labels = ["time", "geom_1", "geom_2", "body_1", "body_2", "dist"]
     labels += [f"pos.{axis}" for axis in "xyz"]
@@ -53,8 +65,7 @@ def export_csv(trace: Trace, path: str | os.PathLike[str]) -> list[Path]:
                 *trace["contact_force"][k].tolist(),
             ]
 
-    replace_file(beside, lambda out: _write_rows(out, labels, rows()))
-    return [target, beside]
+    _write_rows(out, labels, rows())
 
 
 def column_labels(header: Header, column: str) -> list[str]:

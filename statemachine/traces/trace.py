@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import index_of
+from ..checks import HUGE, index_of
 from ..errors import TraceError
 from ..experiments._common import Provenance
 from ..records import Array
-from .checked import check_header, check_places
+from .checked import LARGEST, check_header, check_places
 
 SCHEMA = 1
 # Columns of numbers, one row for each moment; widths are numbers or counts of the header.
@@ -45,7 +45,6 @@ CONTACTS: dict[str, tuple[int, ...]] = {
     "contact_frame": (9,),
     "contact_force": (3,),
 }
-WHOLE = ("contact_row", "contact_geom")  # columns of whole numbers
 
 
 @dataclass(frozen=True)
@@ -182,7 +181,7 @@ class Header:
         for name in ("nq", "nv", "nu", "substeps"):
             value = getattr(self, name)
             if not isinstance(value, int) or not 0 <= value < 10**6:
-                raise TraceError(f"{name} = {value!r} of the trace is no count")
+                raise TraceError(f"{name} = {str(value)[:40]} of the trace is no count")
         if not isinstance(self.timestep, float) or not 0 < self.timestep < 1e6:
             raise TraceError(f"timestep = {self.timestep!r} of the trace is no time")
         lengths = {
@@ -210,6 +209,38 @@ def _frozen(value: Any) -> Any:
     return tuple(_frozen(item) for item in value) if isinstance(value, list) else value
 
 
+def check_shapes(header: Header, shapes: Mapping[str, tuple[int, ...]]) -> None:
+    """The columns of a trace are there, and as long and as wide as its header says.
+
+    Raises:
+        TraceError: One is not.
+    """
+    rows = shapes.get("time", ())
+    if len(rows) != 1 or not rows[0]:
+        raise TraceError("a trace has at least one row, and a column 'time'")
+    for name, shape in shapes.items():
+        if name not in COLUMNS and name not in CONTACTS:
+            raise TraceError(f"a trace has no column {name[:40]!r}")
+        first = shapes.get("contact_row", ()) if name in CONTACTS else rows
+        expected = (*first[:1], *header.shape(name))
+        if shape != expected:
+            raise TraceError(f"column {name!r} has shape {shape}; expected {expected}")
+    for name in INPUTS:
+        if name not in shapes:
+            raise TraceError(f"a trace needs the column {name!r}")
+
+
+def _check_entries(name: str, array: NDArray[Any]) -> None:
+    """Inputs are numbers that an engine takes; the rest may be NaN, which is not told."""
+    if name in INPUTS and not np.isfinite(array).all():
+        raise TraceError(f"column {name!r} has an entry that is not a finite number")
+    most = HUGE if name in INPUTS else LARGEST
+    # fmax and fmin pass over NaN.
+    ends = np.fmin.reduce(array, None, initial=0), np.fmax.reduce(array, None, initial=0)
+    if not -most <= ends[0] <= ends[1] <= most:
+        raise TraceError(f"column {name!r} has an entry beyond {most:g}")
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Trace:
     """A recorded run. All arrays are read-only, SI units, MuJoCo's conventions.
@@ -227,25 +258,11 @@ class Trace:
     columns: Mapping[str, NDArray[Any]]
 
     def __post_init__(self) -> None:
-        time = self.columns.get("time")
-        if time is None or time.ndim != 1 or not len(time):
-            raise TraceError("a trace has at least one row, and a column 'time'")
-        rows = len(time)
+        check_shapes(self.header, {name: array.shape for name, array in self.columns.items()})
         for name, array in self.columns.items():
-            if name not in COLUMNS and name not in CONTACTS:
-                raise TraceError(f"a trace has no column {name!r}")
-            shape = self.header.shape(name)
-            first = len(self.columns["contact_row"]) if name in CONTACTS else rows
-            if array.shape != (first, *shape):
-                raise TraceError(
-                    f"column {name!r} has shape {array.shape}; expected {(first, *shape)}"
-                )
             array.setflags(write=False)
-        for name in INPUTS:
-            if name not in self.columns:
-                raise TraceError(f"a trace needs the column {name!r}")
-            if not np.isfinite(self.columns[name]).all():
-                raise TraceError(f"column {name!r} has an entry that is not a finite number")
+            _check_entries(name, array)
+        time = self.time
         if not (np.diff(time) > 0).all():
             row = int(np.argmin(np.diff(time) > 0))
             raise TraceError(f"time does not go on after row {row}, at {time[row]:g} s")
@@ -253,7 +270,7 @@ class Trace:
         if contact and len(contact) != len(CONTACTS):
             raise TraceError(f"of the contacts only {', '.join(contact)} are there")
         if contact:
-            self._check_contacts(rows)
+            self._check_contacts(len(time))
 
     def _check_contacts(self, rows: int) -> None:
         row, geom = self.columns["contact_row"], self.columns["contact_geom"]

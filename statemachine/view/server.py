@@ -8,10 +8,12 @@ import io
 import logging
 import os
 import socket
+from collections.abc import Iterator
 from types import ModuleType
 from typing import Any
 
 from ..errors import BadInputError, MissingEngineError
+from .door import Door
 
 LOOPBACK = "127.0.0.1"
 _PORTS = 100  # tried one after another
@@ -70,17 +72,30 @@ def _is_taken(error: OSError) -> bool:
     return error.errno in (errno.EADDRINUSE, 10048)
 
 
-def serve(host: str, port: int, label: str) -> Any:
+def serve(host: str, port: int, label: str, door: Door) -> Any:
     """A viser server on a port that is free, without its banner and without its tunnel.
 
+    Args:
+        host: Where it listens.
+        port: A free one.
+        label: Of the page.
+        door: Asked about every request, before viser is.
+
     Raises:
-        MissingEngineError: viser is not installed.
+        MissingEngineError: viser is not installed, or not one that can be guarded.
     """
     viser = require_viser()
     # Who connects and says nothing, as browsers do to be quick, is no news for a terminal.
     logging.getLogger("websockets").addHandler(logging.NullHandler())
-    with _hush(), _without("_VISER_PORT_OVERRIDE"):
+    with _hush(), _without("_VISER_PORT_OVERRIDE"), _guarded(door) as guarded:
         server = viser.ViserServer(host=host, port=port, label=label, verbose=False)
+    if not guarded:
+        stop(server)
+        raise MissingEngineError(
+            f"viser {viser.__version__} opens its server in another way than this version "
+            "of statemachine knows, and would let everybody in: pip install 'viser<1.2'",
+            engine="viser",
+        )
     # A tab can ask viser to open a tunnel to a server of its makers: not from here.
     server.request_share_url = lambda verbose=True: None
     server.disconnect_share_url = lambda: None
@@ -91,6 +106,32 @@ def stop(server: Any) -> None:
     """Close the connections and free the port; nothing is printed."""
     with _hush():
         server.stop()
+
+
+@contextlib.contextmanager
+def _guarded(door: Door) -> Iterator[list[Any]]:
+    """While viser opens its server, put a door before it.
+
+    viser answers requests in a function that it hands to websockets, and offers no place for
+    another. So the call that opens the server is replaced for as long as viser makes it.
+
+    Yields:
+        The functions that were guarded; none if viser did not make that call.
+    """
+    from websockets.asyncio import server as websockets
+
+    guarded: list[Any] = []
+    plain = websockets.serve
+
+    def serve(*arguments: Any, process_request: Any, **others: Any) -> Any:
+        guarded.append(process_request)
+        return plain(*arguments, process_request=door.guard(process_request), **others)
+
+    websockets.serve = serve  # type: ignore[assignment]
+    try:
+        yield guarded
+    finally:
+        websockets.serve = plain
 
 
 @contextlib.contextmanager

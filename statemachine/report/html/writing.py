@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from ...errors import BadInputError
-from ...traces.files import replace_file
+from ...traces.whole import replace_file
 
 SUFFIXES = (".html", ".htm")
 

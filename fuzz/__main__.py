@@ -1,0 +1,86 @@
+"""Run the fuzzers: `python -m fuzz [--seed N] [--seconds S] [TARGET …]`.
+
+A target is a file of this folder with `run(seed, seconds) -> Tally`. Each runs in a process
+of its own, so that a crash is a failure that is counted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import importlib
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from ._tally import ROOT, Tally, environment, limit_memory
+
+_FOLDER = Path(__file__).resolve().parent
+_GRACE = 120.0  # seconds that a target may take beyond its own, for the last input
+_WIDTH = 100  # of a failure in the table
+
+
+def targets() -> list[str]:
+    """Names of all targets."""
+    return sorted(path.stem for path in _FOLDER.glob("[!_]*.py"))
+
+
+def run_apart(target: str, seed: int, seconds: float) -> Tally:
+    """A target in a child process; the end of the child is a failure, too."""
+    with tempfile.TemporaryDirectory() as folder:
+        answer = Path(folder) / "tally.json"
+        words = [sys.executable, "-m", "fuzz", "--child", str(answer), target]
+        words += ["--seed", str(seed), "--seconds", str(seconds)]
+        child = subprocess.Popen(
+            words, cwd=ROOT, env=environment(), stderr=subprocess.PIPE, stdout=subprocess.DEVNULL
+        )
+        try:
+            _, said = child.communicate(timeout=seconds + _GRACE)
+        except subprocess.TimeoutExpired:
+            child.kill()
+            child.communicate()
+            return Tally(0, [f"it hung for {_GRACE:g} s beyond its time"])
+        except BaseException:
+            child.kill()
+            raise
+        if child.returncode != 0 or not answer.exists():
+            last = (said.decode(errors="replace").strip() or "nothing said").splitlines()[-1]
+            return Tally(0, [f"its process ended with code {child.returncode}: {last}"])
+        return Tally(**json.loads(answer.read_text()))
+
+
+def main() -> int:
+    """Run the targets, show the table; 1 if anything failed."""
+    parser = argparse.ArgumentParser(prog="python -m fuzz", description=__doc__)
+    parser.add_argument("targets", nargs="*", metavar="TARGET", help=", ".join(targets()))
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all that is drawn (0)")
+    parser.add_argument("--seconds", type=float, default=30.0, metavar="S", help="a target (30)")
+    parser.add_argument("--child", default=None, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    unknown = sorted(set(options.targets) - set(targets()))
+    if unknown:
+        parser.error(f"no target {unknown[0]!r}; known: {', '.join(targets())}")
+    if options.child:
+        limit_memory()
+        module = importlib.import_module(f"fuzz.{options.targets[0]}")
+        tally = module.run(options.seed, options.seconds)
+        Path(options.child).write_text(json.dumps(dataclasses.asdict(tally)))
+        return 0
+    rows = []
+    for number, target in enumerate(chosen := options.targets or targets(), start=1):
+        print(f"{number}/{len(chosen)} {target}: {options.seconds:g} s ...", file=sys.stderr)
+        began = time.monotonic()
+        rows.append((target, run_apart(target, options.seed, options.seconds)))
+        print(f"    {time.monotonic() - began:.0f} s", file=sys.stderr)
+    print(f"{'target':<16}{'seed':>6}{'tried':>8}{'failures':>10}  first failure")
+    for target, tally in rows:
+        first = " ".join(tally.failures[0].split())[:_WIDTH] if tally.failures else "none"
+        print(f"{target:<16}{options.seed:>6}{tally.tried:>8}{len(tally.failures):>10}  {first}")
+    return int(any(tally.failures for _, tally in rows))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,96 @@
+"""A trace as npz: a zip archive of NumPy arrays, and of the header as text."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.lib import format as npy
+
+from ..errors import TraceError
+from .checked import WHOLE, as_column, check_size
+from .trace import INPUTS, Header, Trace, check_shapes
+
+_HEADER_MOST = 2**24  # bytes of a header
+
+
+def write_npz(trace: Trace, out: BinaryIO) -> None:
+    """Write it; in single precision, but for the inputs, if its header says so."""
+    columns: dict[str, Any] = dict(trace.columns)
+    if trace.header.single:
+        columns = {
+            name: array if name in (*INPUTS, *WHOLE) else array.astype(np.float32)
+            for name, array in columns.items()
+        }
+    header = np.frombuffer(trace.header.as_json().encode(), dtype=np.uint8)
+    np.savez_compressed(out, header=header, **columns)
+
+
+def read_npz(path: Path) -> tuple[Header, dict[str, Any]]:
+    """Header and columns. What the archive says of itself is checked before it is unfolded."""
+    with zipfile.ZipFile(path) as archive:
+        entries = _entries(archive)
+        if "header" not in entries:
+            raise TraceError("has no header: it is no trace")
+        header = _read_header(archive, entries.pop("header"))
+        described = {name: _describe(archive, entry) for name, entry in entries.items()}
+        for name, (_, kind) in described.items():
+            _check_kind(name, kind)
+        check_shapes(header, {name: shape for name, (shape, _) in described.items()})
+        check_size(sum(8 * int(np.prod(shape)) for shape, _ in described.values()), path)
+        return header, {
+            name: as_column(name, _unfold(archive, entry)) for name, entry in entries.items()
+        }
+
+
+def _entries(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
+    """The arrays by name."""
+    found: dict[str, zipfile.ZipInfo] = {}
+    for entry in archive.infolist():
+        name = entry.filename.removesuffix(".npy")
+        if name == entry.filename:
+            raise TraceError(f"holds {name[:40]!r}, which is no array")
+        if entry.comment or entry.extra:  # where a damaged list of contents hides its next entries
+            raise TraceError("has a damaged list of contents")
+        if name in found:
+            raise TraceError(f"holds two arrays {name[:40]!r}")
+        found[name] = entry
+    return found
+
+
+def _describe(
+    archive: zipfile.ZipFile, entry: zipfile.ZipInfo
+) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Shape and kind of an array, from its first bytes."""
+    with archive.open(entry) as file:
+        version = npy.read_magic(file)
+        if version not in ((1, 0), (2, 0)):
+            raise TraceError(f"holds an array of npy version {version}")
+        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+        shape, _, kind = read(file)
+    return shape, kind
+
+
+def _read_header(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Header:
+    shape, kind = _describe(archive, entry)
+    if kind != np.uint8 or len(shape) != 1:
+        raise TraceError("has a header that is no text: it is no trace")
+    if shape[0] > _HEADER_MOST:
+        raise TraceError(f"has a header of {shape[0]:,} bytes; at most {_HEADER_MOST:,}")
+    return Header.from_json(_unfold(archive, entry).tobytes().decode())
+
+
+def _check_kind(name: str, kind: np.dtype[Any]) -> None:
+    if kind.kind not in ("iu" if name in WHOLE else "fiu"):
+        what = "whole numbers" if name in WHOLE else "numbers"
+        raise TraceError(f"column {name!r} holds {kind}, not {what}")
+
+
+def _unfold(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Any:
+    with archive.open(entry) as file:
+        array = npy.read_array(file, allow_pickle=False)
+        if file.read(1):  # its checksum is looked at when its end is reached
+            raise TraceError(f"has more in {entry.filename!r} than its array")
+    return array

@@ -1,0 +1,155 @@
+"""A trace as parquet: a table that other programs read, with the header in its metadata."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from ..errors import MissingEngineError, TraceError
+from .checked import as_column, check_size
+from .trace import COLUMNS, CONTACTS, Header, Trace
+
+# Of the header in the metadata: a digest of header and columns, then the header. Parquet
+# has no checksum of its own that every reader looks at.
+_KEY = b"statemachine.trace.sha256"
+_OLD_KEY = b"statemachine.trace"  # the header alone, of earlier versions
+_DIGITS = hashlib.sha256().digest_size * 2
+
+
+def write_parquet(trace: Trace, out: BinaryIO) -> None:
+    """Write it, compressed with zstd.
+
+    Raises:
+        MissingEngineError: pyarrow is not installed.
+    """
+    table = _table(trace, require_pyarrow())
+    parquet = importlib.import_module("pyarrow.parquet")
+    parquet.write_table(table, out, compression="zstd")
+
+
+def read_parquet(path: Path) -> tuple[Header, dict[str, Any]]:
+    """Header and columns; refused unless their digest is the one that was written.
+
+    Raises:
+        MissingEngineError: pyarrow is not installed.
+    """
+    require_pyarrow()
+    parquet = importlib.import_module("pyarrow.parquet")
+    with parquet.ParquetFile(path) as file:
+        digest, text = _header_text(file.metadata.metadata or {})
+        header = Header.from_json(text)
+        check_size(_unfolded(file.metadata, header), path)
+        columns = _columns(file.read(), header)
+    if digest and digest != _digest(text, columns):
+        raise TraceError("is damaged: its numbers are not those that were written")
+    return header, columns
+
+
+def require_pyarrow() -> Any:
+    """The package pyarrow.
+
+    Raises:
+        MissingEngineError: It is not installed; the message names the extra.
+    """
+    try:
+        importlib.import_module("pyarrow.parquet")
+    except ImportError as error:
+        raise MissingEngineError(
+            "parquet needs pyarrow: pip install 'statemachine-sim[parquet]'; "
+            "npz needs nothing more",
+            engine="pyarrow",
+        ) from error
+    return importlib.import_module("pyarrow")
+
+
+def _header_text(known: dict[bytes, bytes]) -> tuple[str, str]:
+    """Digest and header from the metadata of a file; no digest in an old one."""
+    if _KEY in known:
+        text = known[_KEY].decode()
+        return text[:_DIGITS], text[_DIGITS:]
+    if _OLD_KEY in known:
+        return "", known[_OLD_KEY].decode()
+    raise TraceError("has no header: it is no trace")
+
+
+def _digest(text: str, columns: dict[str, Any]) -> str:
+    """SHA-256 of a header and of the numbers that a file keeps, in hexadecimal digits."""
+    digest = hashlib.sha256(text.encode())
+    for name in sorted(columns):
+        array = columns[name]
+        if 0 in array.shape[1:]:  # of no width, and not in the file
+            continue
+        if array.dtype.kind == "f":  # files do not tell one NaN from another
+            array = np.where(np.isnan(array), np.nan, array)
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()
+
+
+def _unfolded(metadata: Any, header: Header) -> int:
+    """Bytes of all numbers of a file, as far as it tells the truth.
+
+    Contacts, whose number no header says, count as they are packed. What the file says of a
+    single column is not asked for: where it is damaged, pyarrow ends the process.
+    """
+    width = sum(int(np.prod(header.shape(name), dtype=int)) for name in COLUMNS)
+    groups = (metadata.row_group(k) for k in range(metadata.num_row_groups))
+    return 8 * width * metadata.num_rows + sum(group.total_byte_size for group in groups)
+
+
+def _table(trace: Trace, arrow: Any) -> Any:
+    """Columns of one number, or of a list of as many as a row has; contacts as lists of rows."""
+    columns = {}
+    for name in COLUMNS:
+        if name in trace:
+            width = int(np.prod(trace.header.shape(name), dtype=int))
+            if width:  # a column of empty lists cannot be written
+                columns[name] = _fixed(arrow, trace[name], width, name == "time")
+    if "contact_row" in trace:
+        counts = np.bincount(trace["contact_row"], minlength=len(trace))
+        offsets = arrow.array(np.concatenate([[0], np.cumsum(counts)]).astype(np.int32))
+        for name, shape in CONTACTS.items():
+            if name != "contact_row":
+                width = int(np.prod(shape, dtype=int))
+                values = _fixed(arrow, trace[name], width, not shape)
+                columns[name] = arrow.ListArray.from_arrays(offsets, values)
+    text = trace.header.as_json()
+    kept = {name: as_column(name, array) for name, array in trace.columns.items()}
+    value = (_digest(text, kept) + text).encode()
+    return arrow.table(columns).replace_schema_metadata({_KEY: value})
+
+
+def _fixed(arrow: Any, values: Any, width: int, alone: bool) -> Any:
+    flat = arrow.array(np.ascontiguousarray(values).reshape(-1))
+    return flat if alone else arrow.FixedSizeListArray.from_arrays(flat, width)
+
+
+def _columns(table: Any, header: Header) -> dict[str, Any]:
+    columns: dict[str, Any] = {}
+    for name in table.column_names:
+        if name in CONTACTS:
+            _contacts(name, table[name].combine_chunks(), columns)
+        elif name in COLUMNS:
+            array = table[name].combine_chunks()
+            flat = array if name == "time" else array.flatten()
+            values = as_column(name, flat.to_numpy(zero_copy_only=False))
+            columns[name] = values.reshape(table.num_rows, *header.shape(name))
+    for name in ("qpos", "qvel", "ctrl", "xpos", "xquat", "site_xpos", "site_xmat"):
+        if name not in columns and 0 in header.shape(name):
+            columns[name] = np.empty((table.num_rows, *header.shape(name)))
+    return columns
+
+
+def _contacts(name: str, array: Any, columns: dict[str, Any]) -> None:
+    counts = np.diff(array.offsets.to_numpy())
+    columns["contact_row"] = np.repeat(np.arange(len(array)), counts)
+    values = array.flatten()
+    if CONTACTS[name]:
+        values = values.flatten()
+    columns[name] = as_column(name, values.to_numpy(zero_copy_only=False)).reshape(
+        -1, *CONTACTS[name]
+    )

@@ -1,0 +1,104 @@
+"""Files that are there whole or not at all: written beside their place, then renamed."""
+
+from __future__ import annotations
+
+import glob
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None
+
+_PART = ".part-"  # in the names of files that are being written
+
+
+@contextmanager
+def beside(*targets: Path) -> Iterator[list[str]]:
+    """Names of new files beside their places, which are renamed to these: whole or not at all.
+
+    Each name ends as its target does, for programs that go by that. Several files that belong
+    together are renamed one right after the other. No filesystem does that at once, so the
+    later ones are removed before: a process that is killed between leaves a file without its
+    companion, and never one with the companion of another.
+
+    What a killed process has left of an earlier attempt is removed, where files can be locked:
+    not on Windows.
+    """
+    with ExitStack() as stack:
+        names = [stack.enter_context(_part_of(target)) for target in targets]
+        yield names
+        for target in targets[1:]:
+            target.unlink(missing_ok=True)
+        for name, target in zip(names, targets, strict=True):
+            os.replace(name, target)
+
+
+def replace_file(target: Path, fill: Callable[[BinaryIO], object]) -> None:
+    """Write a file beside its place and rename it: whole or not at all."""
+    with beside(target) as (name,):
+        fill_file(name, fill)
+
+
+def fill_file(name: str, fill: Callable[[BinaryIO], object]) -> None:
+    """Open a file that `beside` named, let it be filled, and close it."""
+    with open(name, "wb") as out:
+        fill(out)
+
+
+@contextmanager
+def _part_of(target: Path) -> Iterator[str]:
+    """A new file beside a place; gone at the end unless it was renamed."""
+    _remove_abandoned(target)
+    handle, name = _new_part(target)
+    try:
+        # mkstemp gives a file that its owner alone may read.
+        mask = os.umask(0)
+        os.umask(mask)
+        os.chmod(name, 0o666 & ~mask)
+        yield name
+    finally:
+        with suppress(OSError):
+            os.unlink(name)
+        if handle is not None:
+            os.close(handle)
+
+
+def _new_part(target: Path) -> tuple[int | None, str]:
+    """A new file's name, and its handle, which holds a lock until it is closed."""
+    while True:
+        handle, name = tempfile.mkstemp(
+            dir=target.parent, prefix=f".{target.name}{_PART}", suffix=target.suffix
+        )
+        if fcntl is None:  # an open file could not be renamed
+            os.close(handle)
+            return None, name
+        with suppress(OSError):  # no locks on this filesystem
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        if os.path.exists(name):
+            return handle, name
+        os.close(handle)  # another process took it for abandoned before it was locked
+
+
+def _remove_abandoned(target: Path) -> None:
+    """Remove what is left of attempts to write this file whose process is gone.
+
+    A process that is still writing holds a lock on its part.
+    """
+    if fcntl is None:
+        return
+    pattern = glob.escape(f".{target.name}{_PART}") + "*" + glob.escape(target.suffix)
+    for name in glob.glob(pattern, root_dir=target.parent):
+        part = target.parent / name
+        with suppress(OSError):  # among them: locked, or no locks on this filesystem
+            handle = os.open(part, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                part.unlink()
+            finally:
+                os.close(handle)

@@ -1,0 +1,110 @@
+"""The command line when it is interrupted, starved, or given text that is none."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from statemachine import cli as command_line
+from statemachine.errors import BadInputError, UnknownNameError
+
+from .conftest import ROOT, Cli
+
+INTERRUPT = """
+import os, signal, sys
+
+class Interrupt:
+    def find_spec(self, name, path=None, target=None):
+        if name == {module!r}:
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Interrupt())
+sys.argv = ["statemachine", "doctor"]
+import statemachine_sim
+sys.exit(statemachine_sim.main())
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no process sends itself Ctrl-C there")
+@pytest.mark.parametrize("module", ["numpy", "statemachine.commands", "statemachine.report.doctor"])
+def test_ctrl_c_while_it_imports_ends_it_without_a_traceback(module: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPT.format(module=module)],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode in (130, -2)  # a shell shows both as 130
+    assert done.stderr.strip() == ""
+    assert done.stdout == ""
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "says"),
+    [
+        (MemoryError(), 2, "memory"),
+        (UnicodeDecodeError("utf-8", b"\xff", 0, 1, "invalid start byte"), 2, "UTF-8"),
+        (UnicodeEncodeError("utf-8", "\udcff", 0, 1, "surrogates not allowed"), 2, "UTF-8"),
+    ],
+)
+def test_what_no_command_expects_is_one_line(
+    error: Exception,
+    code: int,
+    says: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def fails(_options: object) -> int:
+        raise error
+
+    monkeypatch.setattr("statemachine.commands.doctor.run", fails)
+    assert command_line.main(["doctor"]) == code
+    said = capsys.readouterr().err
+    assert says in said
+    assert len(said.splitlines()) == 1
+
+
+def test_an_import_that_an_interrupt_broke_is_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(_options: object) -> int:
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as interrupt:
+            raise SystemError("initialization failed") from interrupt
+
+    monkeypatch.setattr("statemachine.commands.doctor.run", fails)
+    assert command_line.main(["doctor"]) == 130
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="file names are text elsewhere")
+def test_a_model_whose_file_name_is_no_text_is_refused(cli: Cli, tmp_path: Path) -> None:
+    path = os.fsencode(tmp_path) + b"/\xff.xml"
+    with open(path, "w") as out:
+        out.write("<mujoco/>")
+    for command in (["lesson", "state"], ["fingertip"]):
+        done = cli(*command, "--model", os.fsdecode(path))
+        assert done.returncode == 2
+        assert "is not UTF-8" in done.stderr
+        assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.usefixtures("pinocchio")
+@pytest.mark.parametrize("name", [5, None, b"gripperframe", ["gripperframe"], "\udcff"])
+def test_a_name_of_another_type_is_unknown_to_kinematics(name: object) -> None:
+    import statemachine as sm
+
+    arm = sm.Kinematics("so101")
+    for kind in ("site", "body"):
+        with pytest.raises(UnknownNameError, match="known: "):
+            arm.pose([0.0] * arm.nq, name, kind)  # type: ignore[arg-type]
+    with pytest.raises(UnknownNameError, match="kind of frame"):
+        arm.pose([0.0] * arm.nq, "gripperframe", name)  # type: ignore[arg-type]
+    for names in (5, [name] * 6, "abcdef"):
+        if names != ["\udcff"] * 6:
+            with pytest.raises(BadInputError, match="list of names"):
+                sm.Kinematics("so101", names)  # type: ignore[arg-type]

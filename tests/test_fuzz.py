@@ -1,0 +1,139 @@
+"""The fuzzers: each runs, and each finds a fault that is put in."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fuzz import command_lines, kills, models, traces
+from fuzz.__main__ import run_apart, targets
+from statemachine.traces import parquet_files
+
+from .conftest import ROOT
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="limits and kills are POSIX's")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", targets())
+def test_each_target_runs_in_a_process_of_its_own(target: str) -> None:
+    tally = run_apart(target, seed=3, seconds=1.0)
+    assert tally.failures == []
+    assert tally.tried >= 1
+
+
+def test_the_same_seed_draws_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[list[str]] = []
+    monkeypatch.setattr(command_lines, "_furnish", lambda _folder: None)
+    monkeypatch.setattr(command_lines, "turns", lambda _seconds: range(20))
+    monkeypatch.setattr(command_lines, "examine", lambda words, _folder: seen.append(words) or "")
+    for seed in (1, 1, 2):
+        assert command_lines.run(seed, 0.0).tried == 20
+    assert seen[:20] == seen[20:40] != seen[40:]
+
+
+def test_a_digest_that_is_not_looked_at_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pyarrow")
+    monkeypatch.setattr(parquet_files, "_digest", lambda _text, _columns: "0" * 64)
+    monkeypatch.setattr(traces, "turns", lambda _seconds: range(40))
+    monkeypatch.setattr(traces, "_CHANGES", [traces._flip] * 3)
+    assert any("other numbers" in line for line in traces.run(1, 0.0).failures)
+
+
+BROKEN_PARSER = """
+import sys
+from statemachine import cli
+def error(self, message):
+    raise KeyError(message)
+cli._Parser.error = error
+sys.exit(cli.main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.slow
+def test_a_command_line_that_ends_in_a_traceback_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        command_lines, "command", lambda *words: [sys.executable, "-c", BROKEN_PARSER, *words]
+    )
+    monkeypatch.setattr(command_lines, "_furnish", lambda _folder: None)
+    monkeypatch.setattr(command_lines, "_BASES", [["doctor", "--json"]])
+    monkeypatch.setattr(command_lines, "turns", lambda _seconds: range(4))
+    assert any("traceback" in line for line in command_lines.run(1, 0.0).failures)
+
+
+def test_what_is_no_good_end_of_a_command_is_said(tmp_path: Path) -> None:
+    for code, says in (
+        ("import sys; sys.exit(7)", "exit code 7"),
+        ("import os; os.abort()", "exit code -6"),
+        ("import sys; print('a\\nb', file=sys.stderr); sys.exit(2)", "2 lines"),
+        ("import sys; sys.exit(2)", "0 lines"),
+    ):
+        assert says in command_lines.examine([sys.executable, "-c", code], tmp_path)
+    assert command_lines.examine([sys.executable, "-c", ""], tmp_path) == ""
+
+
+@pytest.mark.slow
+def test_a_reader_of_models_that_fails_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = "import statemachine as sm\nsm.load = sm.Kinematics = lambda *a, **k: {}[a]"
+    broken = models._READER.replace("import statemachine as sm", lines)
+    assert broken != models._READER
+    monkeypatch.setattr(models, "_READER", broken)
+    monkeypatch.setattr(models, "turns", lambda _seconds: range(2))
+    tally = models.run(1, 0.0)
+    assert len(tally.failures) == 2
+    assert "KeyError" in tally.failures[0]
+
+
+# Writes in place, and the second file after a moment.
+IN_PLACE = """
+import contextlib, time
+from statemachine.traces import csv_files, whole
+@contextlib.contextmanager
+def beside(*targets):
+    yield [str(target) for target in targets]
+whole.beside = csv_files.beside = beside
+"""
+
+
+@pytest.mark.slow
+def test_a_writer_that_writes_in_place_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kills, "_WRITER", IN_PLACE + kills._WRITER)
+    monkeypatch.setattr(kills, "turns", lambda _seconds: range(8))
+    assert any("half a file" in line for line in kills.run(1, 0.0).failures)
+
+
+def test_a_target_that_crashes_is_a_failure(tmp_path: Path) -> None:
+    """The table shows it, the others go on, and the exit code says so."""
+    code = (
+        "import sys, fuzz.__main__ as fuzz\n"
+        "from fuzz._tally import Tally\n"
+        "ends = {'kills': 'import os; os.abort()', 'models': ''}\n"
+        "plain = fuzz.subprocess.Popen\n"
+        "def start(words, **others):\n"
+        "    target = words[words.index('--child') + 2]\n"
+        '    ends_well = \'{"tried": 5, "failures": []}\'\n'
+        "    code = ends[target] or f'open({words[4]!r}, \"w\").write({ends_well!r})'\n"
+        "    return plain([sys.executable, '-c', code], **others)\n"
+        "fuzz.subprocess.Popen = start\n"
+        "sys.argv = ['fuzz', 'kills', 'models', '--seconds', '0']\n"
+        "sys.exit(fuzz.main())\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert done.returncode == 1, done.stderr
+    table = done.stdout.splitlines()
+    assert table[1].split()[:4] == ["kills", "0", "0", "1"]
+    assert "code -6" in table[1]
+    assert table[2].split() == ["models", "0", "5", "0", "none"]
+
+
+def test_every_file_of_the_folder_is_a_target() -> None:
+    assert {"command_lines", "kills", "models", "traces"} <= set(targets())
+    for name in targets():
+        assert callable(importlib.import_module(f"fuzz.{name}").run)

@@ -1,0 +1,250 @@
+"""Files of traces that are damaged, made by strangers to do harm, or cut off by a kill."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+import os
+import random
+import tracemalloc
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.lib import format as npy
+
+import statemachine as sm
+from statemachine.errors import TraceError
+from statemachine.traces import Trace, export_csv, parquet_files, read, record, whole, write
+
+from .conftest import Cli
+
+
+@pytest.fixture(scope="module")
+def box() -> Trace:
+    return record(sm.load("so101/scene_box"), seconds=0.1, keyframe="held", experiment="box")
+
+
+def same(one: Trace, two: Trace) -> bool:
+    return set(one.columns) == set(two.columns) and all(
+        np.array_equal(one[name], two[name], equal_nan=True) for name in one.columns
+    )
+
+
+def npz(path: Path, trace: Trace, changes: Any = None, **entries: bytes | np.ndarray) -> Path:
+    """A trace's file with other entries, as they are or as arrays, and another header."""
+    facts = json.loads(trace.header.as_json()) | (changes or {})
+    arrays: dict[str, Any] = {name: np.array(array) for name, array in trace.columns.items()}
+    arrays["header"] = np.frombuffer(json.dumps(facts).encode(), dtype=np.uint8)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, value in (arrays | entries).items():
+            out = io.BytesIO()
+            if isinstance(value, bytes):
+                out.write(value)
+            else:
+                np.save(out, value)
+            archive.writestr(f"{name}.npy", out.getvalue())
+    return path
+
+
+def claim(*shape: int) -> bytes:
+    """The first bytes of an array of this shape, and no more."""
+    out = io.BytesIO()
+    npy.write_array_header_1_0(out, {"descr": "<f8", "fortran_order": False, "shape": shape})
+    return out.getvalue()
+
+
+# Parquet: a checksum of content.
+
+
+def test_no_flipped_bit_of_a_parquet_file_gives_other_numbers(box: Trace, tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    path = write(box, tmp_path / "box.parquet")
+    good, draw = path.read_bytes(), random.Random(1)
+    refused = 0
+    for _ in range(200):
+        bad = bytearray(good)
+        bad[draw.randrange(len(bad))] ^= 1 << draw.randrange(8)
+        path.write_bytes(bad)
+        try:
+            assert same(read(path), box)
+        except TraceError:
+            refused += 1
+    assert refused > 150  # nearly all of a file is numbers
+
+
+def test_a_parquet_file_that_others_changed_is_refused(box: Trace, tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    path = write(box, tmp_path / "box.parquet")
+    table = parquet.read_table(path)
+    parquet.write_table(table, path, compression="gzip")  # another packing of the same numbers
+    assert same(read(path), box)
+    parquet.write_table(table.drop_columns(["qfrc_bias"]), path)
+    with pytest.raises(TraceError, match="damaged"):
+        read(path)
+
+
+def test_a_parquet_file_of_an_earlier_version_opens(box: Trace, tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    path = write(box, tmp_path / "box.parquet")
+    table = parquet.read_table(path)
+    header = {parquet_files._OLD_KEY: box.header.as_json().encode()}
+    parquet.write_table(table.replace_schema_metadata(header), path)
+    assert same(read(path), box)
+
+
+def test_no_flipped_bit_of_an_archives_list_hides_a_column(box: Trace, tmp_path: Path) -> None:
+    path = write(box, tmp_path / "box.npz")
+    good = path.read_bytes()
+    place = good.rindex(b"PK\x01\x02", 0, good.rindex(b"PK\x01\x02"))
+    for offset in (30, 32):  # the lengths of what may follow a name: extra field, comment
+        for bit in range(8):
+            bad = bytearray(good)
+            bad[place + offset] ^= 1 << bit
+            path.write_bytes(bad)
+            with pytest.raises(TraceError):
+                read(path)
+
+
+# What a stranger's file may do.
+
+
+def test_a_small_file_does_not_take_much_memory(box: Trace, tmp_path: Path) -> None:
+    zeros = np.zeros(100_000_000, dtype=np.uint8)
+    header = npz(tmp_path / "header.npz", box, header=zeros)
+    column = npz(tmp_path / "column.npz", box, qpos=zeros)
+    del zeros
+    rows = 10_000_000
+    claims = {
+        name: claim(rows, *box.header.shape(name))
+        for name in box.columns
+        if not name.startswith("contact")
+    }
+    whole_trace = npz(tmp_path / "rows.npz", box, **claims)
+    tracemalloc.start()
+    try:
+        for path, says in ((header, "header of"), (column, "shape"), (whole_trace, "unfolds into")):
+            with pytest.raises(TraceError, match=says):
+                read(path)
+        assert tracemalloc.get_traced_memory()[1] < 20e6
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize(
+    ("entry", "says"),
+    [
+        (b"hello", "is no trace"),  # what is no array
+        (claim(10**12), "shape"),
+        (claim(0, 10**18), "shape"),
+        (claim(21, 13), "is no trace"),  # and nothing after it
+        (b"\x93NUMPY\x01\x00\x10\x00__import__('os')", "is no trace"),
+        (b"\x93NUMPY\x09\x00\x10\x00", "npy version"),
+    ],
+)
+def test_an_entry_that_is_no_array_is_one_line(
+    entry: bytes, says: str, box: Trace, tmp_path: Path
+) -> None:
+    with pytest.raises(TraceError, match=says) as caught:
+        read(npz(tmp_path / "bad.npz", box, qpos=entry))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"options": {"self": 1}},
+        {"options": {"damping": [[1, 2], [3]]}},
+        {"options": {"damping": {"a": 1}}},
+        {"options": {"timestep": float("nan")}},
+        {"options": {"gravity": [1e308, 0, 0]}},
+        {"gravity": [10**400, 0, 0]},
+        {"gravity": [float("nan")] * 3},
+        {"rewritten": 10**4000},
+        {"experiment": "\ud800"},
+        {"experiment": "x" * 10**6},
+    ],
+)
+def test_a_header_that_no_run_writes_is_refused(
+    change: dict[str, Any], box: Trace, tmp_path: Path
+) -> None:
+    with pytest.raises(TraceError, match="of the trace is") as caught:
+        read(npz(tmp_path / "bad.npz", box, change))
+    assert len(str(caught.value)) < 200
+
+
+def test_numbers_that_no_run_gives_are_refused(box: Trace, tmp_path: Path) -> None:
+    for name, value in (("qpos", 1e308), ("ctrl", 1e300), ("xpos", 1e308), ("xpos", np.inf)):
+        array = np.array(box[name])
+        array.flat[3] = value
+        with pytest.raises(TraceError, match=f"column '{name}' has an entry beyond"):
+            read(npz(tmp_path / "bad.npz", box, **{name: array}))
+
+
+def test_a_run_that_would_take_days_is_not_begun(box: Trace, tmp_path: Path, cli: Cli) -> None:
+    npz(tmp_path / "slow.npz", box, {"options": {"substeps": 10**9}})
+    done = cli("trace", "play", "slow.npz")
+    assert done.returncode == 2
+    assert "at most" in done.stderr
+    assert len(done.stderr.splitlines()) <= 2  # one says that the model's digest is another
+
+
+def test_what_cannot_be_read_again_is_not_written(box: Trace, tmp_path: Path) -> None:
+    odd = Trace(dataclasses.replace(box.header, says="\udcff"), box.columns)
+    with pytest.raises(TraceError, match="says"):
+        write(odd, tmp_path / "odd.npz")
+    assert list(tmp_path.iterdir()) == []
+
+
+# Writes that are cut off.
+
+
+def test_what_a_killed_write_left_is_removed_by_the_next(box: Trace, tmp_path: Path) -> None:
+    if whole.fcntl is None:
+        pytest.skip("files cannot be locked here")
+    left = tmp_path / ".box.npz.part-abcdefgh.npz"
+    mine = [tmp_path / ".box.npz.notes", tmp_path / ".other.npz.part-abcdefgh.npz"]
+    for file in (left, *mine):
+        file.write_bytes(b"half")
+    with whole.beside(tmp_path / "box.npz") as (name,):  # a writer that is alive
+        write(box, tmp_path / "box.npz")
+        assert os.path.exists(name)
+        assert not left.exists()
+    assert sorted(tmp_path.iterdir()) == sorted([*mine, tmp_path / "box.npz"])
+
+
+def test_a_csv_and_its_contacts_are_replaced_together(
+    box: Trace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table, contacts = tmp_path / "box.csv", tmp_path / "box.contacts.csv"
+    for file in (table, contacts):
+        file.write_text("old")
+    seen: list[set[str]] = []
+    replace = os.replace
+
+    def watched(source: str, target: Path) -> None:
+        seen.append({f.name for f in (table, contacts) if f.exists() and f.read_text() == "old"})
+        replace(source, target)
+
+    monkeypatch.setattr(whole.os, "replace", watched)
+    assert export_csv(box, table) == [table, contacts]
+    assert seen == [{"box.csv"}, set()]  # never a new table beside old contacts
+    assert "force.normal" in contacts.read_text()
+
+    def full(*_arguments: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    before = table.read_bytes()
+    monkeypatch.setattr("statemachine.traces.csv_files._write_contacts", full)
+    with pytest.raises(OSError, match="No space"):
+        export_csv(box, table)
+    assert table.read_bytes() == before
+    assert contacts.exists()
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["box.contacts.csv", "box.csv"]
