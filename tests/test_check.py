@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import json
 import os
+import re
+import runpy
+import signal
 import subprocess
 import sys
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from statemachine import cli as command_line
 from statemachine.errors import MissingEngineError
-from statemachine.grading import exercise
-from statemachine.grading.examine import Verdict, examine, judged
+from statemachine.grading import exercise, recording
+from statemachine.grading.answers import Answer
+from statemachine.grading.calls import FaultError
+from statemachine.grading.examine import Verdict, answers_of, answers_of_file, judged
 from statemachine.grading.judges import JUDGES, judge_of
+from statemachine.grading.transcript import decode, encode
 from statemachine.grading.watch import engine_watched
 from statemachine.grading.worlds import Scenes, World
 
@@ -32,19 +45,42 @@ def _name(attempt: Attempt) -> str:
     return attempt.name
 
 
-def _verdict(attempt: Attempt, worlds: list[World]) -> Verdict:
+Prepared = tuple[list[World], list[Any]]
+
+
+def _verdict(attempt: Attempt, prepared: Prepared) -> Verdict:
+    worlds, rights = prepared
+    if attempt.raw:  # which may leave the engine's own model changed
+        with tempfile.TemporaryDirectory() as folder:
+            worlds = judge_of(attempt.solves).worlds(Scenes("mujoco", Path(folder)))
     with engine_watched(worlds[0].model.backend):
-        return judged(attempt.function, judge_of(attempt.solves), worlds)
+        answers = (_through_text(each) for each in answers_of(attempt.function, worlds))
+        verdict = judged(judge_of(attempt.solves), worlds, rights, answers)
+    assert verdict is not None
+    return verdict
+
+
+def _through_text(answer: Answer | FaultError) -> Answer | FaultError:
+    """As from another process."""
+    return (
+        answer if isinstance(answer, FaultError) else decode(json.loads(json.dumps(encode(answer))))
+    )
 
 
 @pytest.fixture(scope="module")
-def on_pybullet(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[World]]:
-    """The worlds of every judge, made once: nothing there can be changed but a Data."""
-    need_engine("pybullet")
-    return {
-        name: judge_of(name).worlds(Scenes("pybullet", tmp_path_factory.mktemp(name)))
-        for name in JUDGES
-    }
+def prepared(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], Prepared]:
+    """The worlds of a judge on a backend and what is right there, worked out once."""
+
+    @functools.cache
+    def prepare(name: str, backend: str) -> Prepared:
+        need_engine(backend)
+        worlds = judge_of(name).worlds(Scenes(backend, tmp_path_factory.mktemp(name)))
+        return worlds, judge_of(name).right(worlds)
+
+    return prepare
+
+
+Prepare = Callable[[str, str], Prepared]
 
 
 def _texts(verdict: Verdict) -> list[str]:
@@ -52,12 +88,16 @@ def _texts(verdict: Verdict) -> list[str]:
 
 
 @pytest.mark.parametrize("attempt", WRONG, ids=_name)
-def test_a_wrong_solution_is_told_what_is_wrong(attempt: Attempt, tmp_path: Path) -> None:
-    verdict = _verdict(attempt, judge_of(attempt.solves).worlds(Scenes("mujoco", tmp_path)))
+def test_a_wrong_solution_is_told_what_is_wrong(attempt: Attempt, prepared: Prepare) -> None:
+    verdict = _verdict(attempt, prepared(attempt.solves, "mujoco"))
     texts = _texts(verdict)
     assert not any(remark.holds for remark in verdict.remarks)
     assert any(attempt.message in text for text in texts), texts
     assert all("\n" not in text for text in texts)
+    assert not any(re.search(r"you return (.+?)( at \d s| m)? where \1( |$)", t) for t in texts), (
+        texts
+    )
+    assert not any(re.search(r"\b1 (steps|joints|numbers)", text) for text in texts), texts
 
 
 def test_every_wrong_solution_has_a_message_of_its_own() -> None:
@@ -66,22 +106,17 @@ def test_every_wrong_solution_has_a_message_of_its_own() -> None:
 
 
 @pytest.mark.parametrize("attempt", RIGHT, ids=_name)
-def test_right_solutions_of_other_kinds_pass(attempt: Attempt, tmp_path: Path) -> None:
-    verdict = _verdict(attempt, judge_of(attempt.solves).worlds(Scenes("mujoco", tmp_path)))
+def test_right_solutions_of_other_kinds_pass(attempt: Attempt, prepared: Prepare) -> None:
+    verdict = _verdict(attempt, prepared(attempt.solves, "mujoco"))
     assert all(remark.holds for remark in verdict.remarks), _texts(verdict)
-
-
-# A model that the student loaded is not watched there.
-_ON_PYBULLET = {"gravity-printed_constants": "no step was taken with the model that you got"}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("attempt", [each for each in WRONG + RIGHT if not each.raw], ids=_name)
-def test_pybullet_judges_alike(attempt: Attempt, on_pybullet: dict[str, list[World]]) -> None:
-    texts = _texts(verdict := _verdict(attempt, on_pybullet[attempt.solves]))
+def test_pybullet_judges_alike(attempt: Attempt, prepared: Prepare) -> None:
+    texts = _texts(verdict := _verdict(attempt, prepared(attempt.solves, "pybullet")))
     assert all(remark.holds == (attempt in RIGHT) for remark in verdict.remarks), texts
-    message = _ON_PYBULLET.get(attempt.name, attempt.message)
-    assert any(message in text for text in texts), texts
+    assert any(attempt.message in text for text in texts), texts
 
 
 _HEAD = """
@@ -118,13 +153,103 @@ def test_what_never_returns_or_ends_the_process_is_reported(tmp_path: Path) -> N
         "def demo_replay(model, ctrl, nstep=600):\n    sum(range(10**15))",  # never lets go
         limit=1.0,
     )
-    assert "still running after 1 s: a loop that does not end?" in _one(found["gravity"])
+    assert "still running after 1 s of computing: a loop" in _one(found["gravity"])
     assert _one(found["gravity"]).startswith(("line 7:", "line 8:"))
     assert _one(found["state"]) == (
         "line 10: it ends the program (sys.exit with 0) where it should return (in `sys.exit(0)`)"
     )
     assert "it ended the process, with code 0" in _one(found["forward"])
     assert _one(found["replay"]).startswith("line 14: still running after 1 s")
+
+
+def test_what_waits_is_no_verdict_on_the_function(tmp_path: Path) -> None:
+    file = tmp_path / "student.py"
+    waits = "def {}(*_):\n    time.sleep(1e6)\n"
+    file.write_text("import time\n" + "".join(waits.format(name) for name in JUDGES))
+    grade = exercise.run(file, time_limit=0.3, wall_limit=1.5)
+    for judgement in grade.functions:
+        assert (judgement.judged, judgement.written) == (False, True)
+        assert "nothing could be judged: not at its end after 1.5 s on the clock" in _one(judgement)
+        assert re.search(r"of which it computed for 0\.[0-5] s", _one(judgement))
+    assert _one(grade.functions[0]).startswith("line 3: ")
+    assert (grade.cpu_limit, grade.wall_limit) == (0.3, 1.5)
+
+
+def test_what_does_not_get_ready_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recording, "_CHILD", "import os, sys; os._exit(7)")
+    for judgement in exercise.run(SOLUTION).functions:
+        assert not judgement.judged
+        text = _one(judgement)
+        assert "nothing could be judged: the judge itself ended with 7, twice" in text
+        assert "Your code was not run" in text
+    monkeypatch.undo()
+    # Now only the first time.
+    first = "import os\nif os.path.basename(os.path.dirname(os.getcwd())) == '1': os._exit(7)\n"
+    monkeypatch.setattr(exercise, "JUDGES", {"demo_state": JUDGES["demo_state"]})
+    monkeypatch.setattr(recording, "_CHILD", first + recording._CHILD)
+    assert exercise.run(SOLUTION).passed
+
+
+@pytest.mark.slow
+def test_a_right_answer_passes_on_a_busy_machine() -> None:
+    busy = "import time; end = time.monotonic() + 60\nwhile time.monotonic() < end: pass"
+    others = [subprocess.Popen([sys.executable, "-c", busy]) for _ in range(6)]
+    try:
+        grade = exercise.run(SOLUTION)
+    finally:
+        for other in others:
+            other.kill()
+            other.wait()
+    assert (grade.right, grade.passed) == (4, True)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+def test_a_signal_leaves_nothing_behind(number: signal.Signals, tmp_path: Path) -> None:
+    file = tmp_path / "student.py"
+    here = tmp_path / "temporary"
+    here.mkdir()
+    waits = "def {0}(*_):\n    open('begun', 'w').close()\n    time.sleep(60)\n"
+    file.write_text("import time\n" + "".join(map(waits.format, JUDGES)))
+    command = [sys.executable, "-m", "statemachine", "check", str(file)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(here)}
+    with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE) as process:
+        deadline = time.monotonic() + 60
+        while len(list(here.glob("*/*/1/scratch/begun"))) < len(JUDGES):
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        assert len(_processes_in(here)) >= len(JUDGES)
+        process.send_signal(number)
+        process.communicate(timeout=60)
+    assert process.returncode in (-number, 128 + number)
+    assert list(here.iterdir()) == []
+    assert _processes_in(here) == []
+
+
+def _processes_in(folder: Path) -> list[int]:
+    """Living processes that were given something in a folder."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            if str(folder).encode() in (entry / "cmdline").read_bytes():
+                found.append(int(entry.name))
+    return found
+
+
+def test_an_error_in_another_file_is_told_with_its_name(tmp_path: Path) -> None:
+    (tmp_path / "helper.py").write_text("def helps():\n    return 1 / 0\n")
+    (tmp_path / "broken.py").write_text("def f(:\n")
+    found = _grade(
+        tmp_path,
+        "def demo_gravity(model, seconds=4):\n    import helper; return helper.helps()",
+        "def demo_state(model):\n    import broken",
+        "def demo_forward(model):\n    return sm.load('nowhere.xml')",
+        "def demo_replay(model, ctrl, nstep=600):\n    return np.zeros(3) @ np.zeros(2)",
+    )
+    assert _one(found["gravity"]).startswith("helper.py, line 2: ZeroDivisionError")
+    assert _one(found["state"]).startswith("broken.py, line 1: ")
+    assert _one(found["forward"]).startswith("line 11: ")
+    assert _one(found["replay"]).startswith("line 13: ValueError")
 
 
 def test_crashes_memory_and_other_processes_are_reported(tmp_path: Path) -> None:
@@ -187,6 +312,80 @@ def test_what_is_replaced_under_the_judge_does_not_help(tmp_path: Path) -> None:
     assert "no step was taken" in found["replay"].remarks[0]
 
 
+_SAYS = """
+def says(stage, **facts):
+    frame = sys._getframe()
+    while 'record' not in frame.f_locals: frame = frame.f_back
+    frame.f_locals['record'].say(stage, **facts)
+    os._exit(0)
+def row(*values):
+    import base64
+    return {"array": ["<f8", [len(values)], base64.b64encode(np.array(values)).decode()]}
+"""
+
+
+def test_a_forged_record_is_judged_like_any_other(tmp_path: Path) -> None:
+    nothing = '"memory": [], "live": [], "runs": [], "forwards": [], "ends": [], "changed": {}'
+    found = _grade(
+        tmp_path,
+        _SAYS,
+        "def demo_gravity(model, seconds=4):\n"
+        f"    says('answer', answer={{'result': {{'tuple': [[0] * 5, [0] * 5]}}, {nothing}}}, "
+        "refused=[])",
+        "def demo_state(model):\n    says('refused', kind='SystemExit', text='boo')",
+        "def demo_forward(model):\n    time.sleep(0.5); os.unlink('../answers')\n    os._exit(0)",
+        "def demo_replay(model, ctrl, nstep=600):\n"
+        f"    says('answer', answer={{'result': {{'tuple': [True, row(1), row(1)]}}, {nothing}}}, "
+        "refused=[])",
+    )
+    assert "no step was taken" in found["gravity"].remarks[0]
+    assert not found["gravity"].passed
+    for name in ("state", "forward", "replay"):
+        assert "what its process recorded is no record of a run (" in _one(found[name])
+    assert "(it is gone)" in _one(found["forward"])
+
+
+def test_a_judge_that_is_replaced_is_another_process_s(tmp_path: Path) -> None:
+    found = _grade(
+        tmp_path,
+        "from statemachine.grading import calls, examine, judges",
+        "for name in judges.JUDGES:",
+        "    judges.judge_of(name).judge = lambda *_: [calls.Remark('patched', True)]",
+        "    judges.judge_of(name).right = lambda worlds: [None for _ in worlds]",
+        "examine.judged = lambda *_: examine.Verdict((calls.Remark('patched', True),))",
+        *(f"def {name}(*_): return 1" for name in JUDGES),
+    )
+    for judgement in found.values():
+        assert _one(judgement).startswith("it returns an int: 1")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="it is shut in on Linux only")
+def test_it_reaches_neither_us_nor_the_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home = tmp_path / "home"
+    home.mkdir()
+    monkeypatch.setenv("HOME", str(home))
+    kill = "ctypes.CDLL(None).kill"
+    found = _grade(
+        tmp_path,
+        f"def demo_gravity(model, seconds=4):\n    {kill}({os.getpid()}, 19)\n    return 1",
+        f"def demo_state(model):\n    {kill}(os.getppid(), 19)\n    {kill}(os.getppid(), 9)",
+        "def demo_forward(model):\n"
+        "    open(os.path.expanduser('~/left'), 'w').close()\n"
+        "    return RIGHT['demo_forward'](model)",
+        f"def demo_replay(model, ctrl, nstep=600):\n    open({str(tmp_path / 'left')!r}, 'w')",
+    )
+    assert not any(found[name].passed for name in ("gravity", "state", "replay"))
+    assert found["forward"].passed
+    assert list(home.iterdir()) == []
+    if "Read-only" not in _one(found["replay"]):
+        pytest.skip("this system does not let a user make namespaces")
+    assert _one(found["gravity"]).startswith("it returns an int")
+    assert _one(found["state"]).startswith("it returns nothing")
+    assert not (tmp_path / "left").exists()
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
@@ -202,12 +401,16 @@ def test_what_is_replaced_under_the_judge_does_not_help(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_a_file_that_cannot_be_called_is_told_in_a_line(
-    content: str, message: str, tmp_path: Path
+    content: str, message: str, tmp_path: Path, prepared: Prepare
 ) -> None:
     file = tmp_path / "student.py"
     file.write_text(content)
-    worlds = judge_of("demo_gravity").worlds(Scenes("mujoco", tmp_path))
-    (remark,) = examine(file, "demo_gravity", judge_of("demo_gravity"), worlds).remarks
+    judge, there = judge_of("demo_gravity"), prepared("demo_gravity", "mujoco")
+    worlds, rights = there
+    answers = answers_of_file(file, "demo_gravity", worlds)
+    verdict = judged(judge, worlds, rights, answers)
+    assert verdict is not None
+    (remark,) = verdict.remarks
     assert message in remark.text
     assert not remark.holds
 
@@ -233,23 +436,24 @@ def test_the_students_file_is_still_to_be_written(cli: Cli) -> None:
     assert "0 of 4 functions do what they should; 4 not written yet" in page
 
 
-def test_bad_input_is_one_line(cli: Cli, tmp_path: Path) -> None:
+def test_bad_input_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "picture.py").write_bytes(b"\x89PNG\0\0")
     (tmp_path / "notes.txt").write_text("hello")
     for arguments, word in (
         (("nowhere.py",), "there is no file nowhere.py"),
         ((str(tmp_path),), "is a folder"),
-        (("picture.py",), "no Python file"),
-        (("notes.txt",), "does not end in .py"),
+        ((str(tmp_path / "picture.py"),), "no Python file"),
+        ((str(tmp_path / "notes.txt"),), "does not end in .py"),
         ((str(STUDENT.with_name("test_arm.py")),), "did you mean statemachine check --mutants"),
         ((str(SOLUTION), "--backend", "mujcoo"), "Did you mean 'mujoco'?"),
         ((str(SOLUTION), "--time-limit", "0"), "above 0 s"),
         ((str(SOLUTION), "--time-limit", "nan"), "above 0 s"),
     ):
-        done = cli("check", *arguments)
-        assert (done.returncode, done.stdout) == (2, ""), arguments
-        assert len(done.stderr.splitlines()) == 1
-        assert word in done.stderr
+        assert command_line.main(["check", *arguments]) == 2, arguments
+        printed = capsys.readouterr()
+        assert printed.out == ""
+        assert len(printed.err.splitlines()) == 1
+        assert word in printed.err
 
 
 def test_a_missing_engine_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -259,20 +463,25 @@ def test_a_missing_engine_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         exercise.run(SOLUTION)
 
 
-def test_the_exercise_runs_as_a_program() -> None:
+def test_the_exercise_runs_as_a_program(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     def run(file: Path, *arguments: str) -> tuple[int, list[str]]:
-        done = subprocess.run(
-            [sys.executable, str(file), *arguments],
-            capture_output=True,
-            text=True,
-            env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUTF8": "1"},
-            check=False,
-        )
-        assert done.stderr == ""
-        lines = done.stdout.splitlines()
-        assert done.returncode == 2 or max(map(len, lines)) <= 80
-        return done.returncode, lines
+        monkeypatch.setattr(sys, "argv", [str(file), *arguments])
+        with pytest.raises(SystemExit) as ended:
+            runpy.run_path(str(file), run_name="__main__")
+        printed = capsys.readouterr()
+        assert printed.err == ""
+        lines = printed.out.splitlines()
+        assert ended.value.code == 2 or max(map(len, lines)) <= 80
+        return int(ended.value.code or 0), lines
 
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUTF8": "1"}
+    alone = subprocess.run(
+        [sys.executable, str(STUDENT)], capture_output=True, text=True, env=environment, check=False
+    )
+    assert (alone.returncode, alone.stderr) == (0, "")
+    assert alone.stdout.splitlines() == run(STUDENT)[1]
     code, lines = run(STUDENT)
     assert code == 0
     assert sum("TODO(you)" in line for line in lines) == 4

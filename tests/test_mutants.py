@@ -194,6 +194,7 @@ def test_what_ends_under_a_fault_has_caught_it(
 ) -> None:
     monkeypatch.setattr(run, "_TIMES", 1.0)
     monkeypatch.setattr(run, "_AND", 10.0)
+    monkeypatch.setattr(run, "_CLOCK_AND", 10.0)
     found = examine(write(HANGS_OR_FALLS.format(what=what)), only=("no-forward", "xyzw"))
     caught, survived = found.trials
     assert not survived.caught
@@ -241,7 +242,7 @@ def test_tests_that_fail_on_the_healthy_arm_are_told(body: str, why: str, write:
 )
 def test_a_file_that_is_no_test_file_is_refused(text: str, message: str, write: Write) -> None:
     with pytest.raises(BadInputError, match=message) as caught:
-        examine(write(text), seconds=2 if "sleep" in text else 60)
+        examine(write(text), clock=2 if "sleep" in text else 300)
     assert "\n" not in str(caught.value)
 
 
@@ -253,6 +254,21 @@ def test_a(request):
 """
     found = examine(write(text), only=["xyzw", "degrees"])
     assert (found.failures, found.caught) == ((), 0)
+
+
+def test_what_is_imported_does_not_tell_of_a_fault(write: Write) -> None:
+    text = "import sys\nSEEN = set(sys.modules)\n"
+    text += "def test_a(): assert 'statemachine.grading.mutants.faults' in SEEN\n"
+    found = examine(write(text), only=["xyzw"])
+    assert (found.failures, found.caught) == ((), 0)
+
+
+@pytest.mark.parametrize("line", ["not json", '{"began": 5}', "[" * 100_000, '{"tests": [1]}'])
+def test_a_forged_record_is_refused(line: str, write: Write) -> None:
+    text = "import sys\ndef test_a():\n    path = sys.argv[sys.argv.index('--record') + 1]\n"
+    text += f"    open(path, 'a').write({line!r} + chr(10))\n"
+    with pytest.raises(BadInputError, match="wrote into the record"):
+        examine(write(text), only=["xyzw"])
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")

@@ -16,8 +16,8 @@ POSIX = pytest.mark.skipif(os.name != "posix", reason="limits and sessions are P
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
 
 
-def _python(code: str, seconds: float = 20.0, **more: object) -> sandbox.Outcome:
-    return sandbox.run([sys.executable, "-c", code], seconds=seconds, **more)  # type: ignore[arg-type]
+def _python(code: str, cpu: float = 20.0, wall: float = 120.0, **more: object) -> sandbox.Outcome:
+    return sandbox.run([sys.executable, "-c", code], cpu=cpu, wall=wall, **more)  # type: ignore[arg-type]
 
 
 def _lives(pid: int) -> bool:
@@ -41,21 +41,71 @@ def test_nothing_is_read_from_us() -> None:
 
 
 def test_a_loop_is_ended() -> None:
-    done = _python("print('on', flush=True)\nwhile True: pass", seconds=1.0)
-    assert (done.timed_out, done.returncode, done.signal) == (True, None, None)
+    done = _python("print('on', flush=True)\nwhile True: pass", cpu=1.0)
+    assert (done.out_of_cpu, done.timed_out, done.returncode, done.signal) == (
+        True,
+        False,
+        None,
+        None,
+    )
     assert done.stdout == "on\n"
+    if os.name == "posix":
+        assert 0.5 < done.cpu < 3  # as the system counts: by ticks
+
+
+def test_what_waits_is_ended_by_the_clock() -> None:
+    done = _python("print('on', flush=True)\nimport time; time.sleep(60)", wall=2.0)
+    assert (done.out_of_cpu, done.timed_out, done.returncode, done.signal) == (
+        False,
+        True,
+        None,
+        None,
+    )
+    assert done.cpu < 1.5 < done.wall
+
+
+def test_the_time_until_it_is_ready_does_not_count(tmp_path: Path) -> None:
+    code = "import time; time.sleep(1.5); open('ready', 'w').close(); time.sleep(0.2)"
+    ready = (tmp_path / "ready").exists
+    done = _python(code, wall=1.0, start=100.0, started=ready, cwd=tmp_path)
+    assert (done.started, done.timed_out, done.returncode) == (True, False, 0)
+    never = _python("import time; time.sleep(60)", start=0.5, started=lambda: False)
+    assert (never.started, never.timed_out) == (False, True)
+
+
+def test_where_a_process_cannot_limit_itself_it_is_watched(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pytest.importorskip("psutil")
+    monkeypatch.setattr(sandbox, "WATCHED", True)
+    busy = _python("import time\nwhile time.process_time() < 30: pass", cpu=1.0, start_cpu=60.0)
+    assert (busy.out_of_cpu, busy.timed_out) == (True, False)
+    assert busy.cpu < 10
+    idle = _python("import time; time.sleep(1.5)", cpu=1.0)
+    assert (idle.out_of_cpu, idle.returncode) == (False, 0)
 
 
 def test_it_is_ended_from_outside() -> None:
     stop = threading.Event()
     threading.Timer(0.3, stop.set).start()
-    assert _python("while True: pass", seconds=30.0, stop=stop).wall < 20
+    assert _python("while True: pass", cpu=30.0, stop=stop).wall < 20
 
 
 def test_a_flood_is_read_and_dropped() -> None:
     done = _python("import os\nfor _ in range(300): os.write(2, b'x' * 65536)", output_most=1000)
     assert done.returncode == 0
     assert (len(done.stderr), done.truncated) == (1000, True)
+
+
+def test_a_flood_without_end_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sandbox, "_FLOOD", 5_000_000)
+    done = _python("import os\nwhile True: os.write(1, b'x' * 65536)")
+    assert (done.flooded, done.timed_out, done.out_of_cpu, done.signal) == (
+        True,
+        False,
+        False,
+        None,
+    )
 
 
 @POSIX
@@ -108,7 +158,7 @@ def test_no_other_process_is_touched() -> None:
 
 @POSIX
 def test_a_program_that_is_not_there() -> None:
-    done = sandbox.run(["no-such-program"], seconds=5)
+    done = sandbox.run(["no-such-program"], cpu=5, wall=60)
     assert done.returncode == 1
     assert "no-such-program: " in done.stderr
 
@@ -116,3 +166,84 @@ def test_a_program_that_is_not_there() -> None:
 def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         _python("pass", cwd=tmp_path / "nowhere")
+
+
+# Shut in, where the system permits it.
+
+
+def _shut_in(
+    folder: Path, code: str, cpu: float = 20.0, wall: float = 120.0, **more: object
+) -> sandbox.Outcome:
+    return _python(code, cpu, wall, cwd=folder, writable=folder, **more)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder for a command that can be shut in; without such, there is nothing to test."""
+    if sys.platform != "linux":
+        pytest.skip("namespaces are Linux")
+    place = tmp_path / "inside"
+    place.mkdir()
+    if _shut_in(place, "import os; print(os.getpid())").stdout != "2\n":
+        pytest.skip("this system does not let a user make namespaces")
+    return place
+
+
+def test_shut_in_it_writes_in_its_folder_only(folder: Path) -> None:
+    done = _shut_in(
+        folder,
+        "import os, tempfile\n"
+        "open(os.path.expanduser('~/home'), 'w').close()\n"
+        "open(os.path.join(tempfile.gettempdir(), 'temporary'), 'w').close()\n"
+        "open(os.devnull, 'w').close()\n"
+        f"open({str(folder.parent / 'outside')!r}, 'w')",
+    )
+    assert "Read-only file system" in done.stderr
+    assert {entry.name for entry in folder.iterdir()} == {"home", "temporary"}
+    assert [entry.name for entry in folder.parent.iterdir()] == ["inside"]
+
+
+def test_shut_in_it_reaches_no_process_and_no_network(folder: Path) -> None:
+    done = _shut_in(
+        folder,
+        "import ctypes, os, socket\n"
+        "kill = ctypes.CDLL(None).kill\n"
+        f"print(kill({os.getpid()}, 19))\n"
+        "for number in (9, 15, 19): kill(os.getppid(), number)\n"
+        "print(kill(-1, 0), flush=True)\n"
+        "socket.create_connection(('127.0.0.1', 9))",
+    )
+    assert done.stdout == "-1\n-1\n"
+    assert "Network is unreachable" in done.stderr
+    assert (done.returncode, done.timed_out) == (1, False)
+
+
+def test_shut_in_nothing_escapes(folder: Path) -> None:
+    code = f"# {folder}\nimport os, time\nfor _ in range(2):\n    if os.fork() == 0:\n"
+    code += "        os.setsid()\n        open(str(os.getpid()), 'w').close()\n"
+    code += "        time.sleep(50)\n        os._exit(0)\n"
+    code += "while len(os.listdir()) < 2: time.sleep(0.01)\nos._exit(7)"
+    done = _shut_in(folder, code)
+    assert (done.returncode, done.timed_out) == (7, False)
+    for entry in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            assert f"# {folder}\n".encode() not in entry.read_bytes()
+        except OSError:
+            continue
+    assert done.wall < 20
+
+
+def test_shut_in_signals_and_limits_are_told_alike(folder: Path) -> None:
+    assert _shut_in(folder, "import ctypes; ctypes.string_at(0)").signal == 11
+    assert _shut_in(folder, "import os; os.abort()").signal == 6
+    assert _shut_in(folder, "import os; os._exit(77)").returncode == 77
+    assert _shut_in(folder, "while True: pass", cpu=1.0).out_of_cpu
+    assert _shut_in(folder, "x = bytearray(10**9)", memory_most=500_000_000).out_of_memory
+    asleep = _shut_in(folder, "import time; time.sleep(60)", wall=1.0)
+    assert (asleep.timed_out, asleep.out_of_cpu) == (True, False)
+
+
+@LINUX
+def test_where_it_cannot_be_shut_in_it_runs_all_the_same(tmp_path: Path) -> None:
+    done = _python("import os; print(os.getpid() > 2)", writable=tmp_path / "nowhere", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (0, "True\n")

@@ -27,7 +27,8 @@ def add(commands: Any) -> None:
         type=float,
         default=5.0,
         metavar="S",
-        help="seconds for each function of FILE (default 5); all run at once",
+        help="seconds that each function of FILE may compute (default 5); time in which the "
+        "machine is busy with others does not count, up to 120 s on the clock, or four times S",
     )
     _mutants.add(parser)
     add_json(parser, "judgement")

@@ -1,8 +1,9 @@
 """The process in which one function of a student's file runs, alone.
 
-It answers into a file, line by line and with a number that only its parent knows, so that
-nothing that the student's code prints can pass for an answer, and a process that ends early
-leaves behind how far it got.
+It records what came of the function on each world, as data, into a file: line by line, so that
+a process that ends early leaves behind how far it got, and with a number that is not to be
+guessed, so that what the student's code prints does not pass for a line. Whoever digs the
+number out can write what he likes: it is judged elsewhere, as what anybody might have written.
 """
 
 from __future__ import annotations
@@ -11,12 +12,15 @@ import faulthandler
 import json
 import os
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
+_LONGEST = 8_000_000  # characters of a line
 
-class _Answers:
-    """The private channel."""
+
+class _Record:
+    """The file."""
 
     def __init__(self, path: str, nonce: str) -> None:
         self._path = path
@@ -24,48 +28,57 @@ class _Answers:
 
     def say(self, stage: str, **facts: Any) -> None:
         """Add a line."""
+        line = json.dumps({"nonce": self._nonce, "stage": stage, **facts})
+        if len(line) > _LONGEST:
+            line = json.dumps({"nonce": self._nonce, "stage": "fault", **_TOO_MUCH})
         with open(self._path, "a", encoding="utf-8") as file:
-            file.write(json.dumps({"nonce": self._nonce, "stage": stage, **facts}) + "\n")
+            file.write(line + "\n")
+
+
+_TOO_MUCH = {"text": "it returns more than can be looked at", "written": True, "refused": []}
 
 
 def main(job_file: str) -> None:
-    """Examine one function, as the job file says, and end the process."""
+    """Call one function, as the job file says, and end the process."""
     with open(job_file, encoding="utf-8") as file:
         job = json.load(file)
     os.unlink(job_file)
-    answers = _Answers(job["answers"], job["nonce"])
+    record = _Record(job["answers"], job["nonce"])
     path = Path(job["file"])
     sys.argv = [str(path)]
     try:
-        judge, worlds = _prepare(job["function"], job["backend"])
+        worlds = _prepare(job["function"], job["backend"])
     except Exception as error:
-        answers.say("refused", kind=type(error).__name__, text=" ".join(str(error).split()))
+        record.say("refused", kind=type(error).__name__, text=" ".join(str(error).split()))
         return
-    from .examine import examine
+    from .calls import FaultError
+    from .examine import answers_of_file
     from .guard import Guard
+    from .limits import limit_cpu
+    from .transcript import encode
 
     # Both work where Python's own threads do not get their turn, and tell the line.
     trace = open(job["trace"], "w", encoding="utf-8")  # noqa: SIM115  (till the end)
     faulthandler.enable(trace)
     guard = Guard(path)
-    faulthandler.dump_traceback_later(job["seconds"], exit=True, file=trace)
     sys.path.insert(0, str(path.parent))  # as when the file is run; engines are loaded by now
-    answers.say("running")
-    verdict = examine(path, job["function"], judge, worlds)
-    remarks = [(text, False) for text in dict.fromkeys(guard.refused)]
-    if not remarks:
-        remarks = [(remark.text, remark.holds) for remark in verdict.remarks]
-    answers.say("judged", written=verdict.written, remarks=remarks)
+    record.say("running", cpu=time.process_time())
+    limit_cpu(job["cpu"], job["wall"], trace)
+    for answer in answers_of_file(path, job["function"], worlds):
+        refused = list(dict.fromkeys(guard.refused))
+        if isinstance(answer, FaultError):
+            record.say("fault", text=str(answer), written=answer.written, refused=refused)
+        else:
+            record.say("answer", answer=encode(answer), refused=refused)
     # Threads that the student's code left, and what it registered for the end, have no say.
     os._exit(0)
 
 
-def _prepare(function: str, backend: str) -> tuple[Any, Any]:
-    """The judge and its worlds, with all that is right worked out."""
+def _prepare(function: str, backend: str) -> Any:
+    """The worlds to call it on; nothing of what is right there."""
     from .judges import judge_of
     from .worlds import Scenes
 
-    judge = judge_of(function)
     folder = Path.cwd() / "worlds"
     folder.mkdir()
-    return judge, judge.worlds(Scenes(backend, folder))
+    return judge_of(function).worlds(Scenes(backend, folder))

@@ -7,21 +7,20 @@ import inspect
 import linecache
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from itertools import islice
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import UnsupportedError
-from .watch import Watch, watching
+from .answers import Answer, answer_of, settings
+from .watch import watching
 from .worlds import World
 
 Function = Callable[..., Any]
 _MODULE = "the_students_file"
-_MOST = 10_000  # values that a generator may give
 _LONGEST = 200  # characters of an error's own text
 
 
@@ -86,8 +85,8 @@ def find(names: dict[str, Any], name: str, arguments: Sequence[Any]) -> Function
     return function
 
 
-def call(function: Function, world: World) -> tuple[Any, Watch]:
-    """What a function returns on a world, and what it did there.
+def call(function: Function, world: World) -> Answer:
+    """What came of a function on a world.
 
     Raises:
         FaultError: It raised, tried to end the program, is not written, or returned nothing.
@@ -96,33 +95,27 @@ def call(function: Function, world: World) -> tuple[Any, Watch]:
     given = [
         np.array(value) if isinstance(value, np.ndarray) else value for value in world.arguments
     ]
+    before = settings(world.model)
     try:
-        with watching(world.nudge) as watch:
-            result = _taken(function(world.model, *given))
+        with watching(world.model, world.nudge) as watch:
+            answer = answer_of(function(world.model, *given), watch)
     except BaseException as error:
         if isinstance(error, NotImplementedError) and not isinstance(error, UnsupportedError):
             raise FaultError(f"not written yet. {error}".strip(), written=False) from None
         raise FaultError(said(error, file)) from error
-    if result is None:
+    if answer.result is None:
         raise FaultError("it returns nothing: print shows a result, `return` hands it over")
-    return result, watch
-
-
-def _taken(result: Any) -> Any:
-    """What is worked out only when somebody asks is asked for now, while it is watched."""
-    if isinstance(result, Iterator):
-        result = tuple(islice(result, _MOST))
-    if type(result) in (tuple, list):
-        return type(result)(
-            list(islice(each, _MOST)) if isinstance(each, Iterator) else each for each in result
-        )
-    return result
+    after = settings(world.model)
+    changed = {name: (before[name], after[name]) for name in before if before[name] != after[name]}
+    return replace(answer, changed=changed)
 
 
 def said(error: BaseException, file: Path) -> str:
-    """An error in one line, with the line of the student's file that it came from."""
-    line, text = _line(error, file)
+    """An error in one line, with the line that it came from, in the file or one beside it."""
+    place, line, text = _line(error, file)
     where = f"line {line}: " if line else ""
+    if line and place != file:
+        where = f"{place.name}, {where}"
     source = f" (in `{text}`)" if text else ""
     if isinstance(error, SyntaxError):
         return f"{where}{error.msg}{source}"
@@ -141,11 +134,22 @@ def said(error: BaseException, file: Path) -> str:
     return f"{where}{type(error).__name__}{': ' * bool(words)}{words}{source}"
 
 
-def _line(error: BaseException, file: Path) -> tuple[int, str]:
-    """Number and text of the last line of the file that had a part in it."""
-    if isinstance(error, SyntaxError) and Path(error.filename or "") == file:
-        return error.lineno or 0, (error.text or "").strip()
+def _line(error: BaseException, file: Path) -> tuple[Path, int, str]:
+    """The last line of the student's that had a part in it: file, number and text.
+
+    Of the file, or of another in its folder or below, but for packages that live there.
+    """
+    if isinstance(error, SyntaxError) and _students(Path(error.filename or ""), file):
+        return Path(error.filename or ""), error.lineno or 0, (error.text or "").strip()
     for frame, number in reversed(list(traceback.walk_tb(error.__traceback__))):
-        if Path(frame.f_code.co_filename) == file:
-            return number, linecache.getline(str(file), number).strip()
-    return 0, ""
+        place = Path(frame.f_code.co_filename)
+        if _students(place, file):
+            return place, number, linecache.getline(str(place), number).strip()
+    return file, 0, ""
+
+
+def _students(place: Path, file: Path) -> bool:
+    beside = file.parent in place.parents and not {"site-packages", "statemachine"} & set(
+        place.relative_to(file.parent).parts
+    )
+    return place == file or (beside and place.is_file())

@@ -1,12 +1,16 @@
-"""One function of a student's file, examined on all its worlds, in this process."""
+"""A function of a student's file: called on all its worlds, and judged by what came of it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from .calls import FaultError, Function, Remark, find, load_file
+import numpy as np
+
+from .answers import Answer
+from .calls import FaultError, Function, Remark, call, find, load_file
 from .judges import Judge
 from .watch import engine_watched
 from .worlds import World
@@ -23,37 +27,62 @@ class Verdict:
     written: bool = True
 
 
-def examine(path: Path, name: str, judge: Judge, worlds: Sequence[World]) -> Verdict:
-    """The verdict on a function of a file, which is loaded here.
+def answers_of_file(
+    path: Path, name: str, worlds: Sequence[World]
+) -> Iterator[Answer | FaultError]:
+    """What comes of a function of a file, which is loaded here, on world after world.
 
     Args:
         path: The student's file, absolute.
         name: Of the function.
-        judge: Its judge; worlds: what `judge.worlds` made, before anything here was loaded.
         worlds: The first is the course's own.
     """
     with engine_watched(worlds[0].model.backend):
         try:
             function = find(load_file(path), name, worlds[0].arguments)
         except FaultError as fault:
-            return Verdict((Remark(str(fault)),))
-        return judged(function, judge, worlds)
+            yield fault
+            return
+        yield from answers_of(function, worlds)
 
 
-def judged(function: Function, judge: Judge, worlds: Sequence[World]) -> Verdict:
-    """The verdict on a function, called on world after world until one shows a fault."""
-    right: list[str] = []
+def answers_of(function: Function, worlds: Sequence[World]) -> Iterator[Answer | FaultError]:
+    """What comes of a function on world after world, until it fails on one."""
     for world in worlds:
         try:
-            remarks = judge.judge(function, world)
+            yield call(function, world)
+        except FaultError as fault:
+            yield fault
+            return
+
+
+def judged(
+    judge: Judge,
+    worlds: Sequence[World],
+    rights: Sequence[Any],
+    answers: Iterable[Answer | FaultError],
+) -> Verdict | None:
+    """The verdict on what came of a function, world after world, until one shows a fault.
+
+    None if there are fewer answers than worlds, and no fault.
+    """
+    passed: list[str] = []
+    for world, right, answer in zip(worlds, rights, answers, strict=False):
+        try:
+            if isinstance(answer, FaultError):
+                raise answer
+            with np.errstate(all="ignore"):
+                remarks = judge.judge(answer, world, right)
         except FaultError as fault:
             remarks = [Remark(str(fault))]
             if not fault.written:
-                return Verdict(tuple(remarks), written=False)
+                return Verdict(tuple(remarks), fault.written)
         faults = [remark for remark in remarks if not remark.holds]
         if faults:
             where = f"{world.where}: " if world.where else ""
             return Verdict(tuple(Remark(where + fault.text) for fault in faults))
-        right.append(world.where or "".join(remark.text for remark in remarks))
-    also = f"; right also {', and '.join(right[1:])}" if right[1:] else ""
-    return Verdict((Remark(right[0] + also, True),))
+        passed.append(world.where or "".join(remark.text for remark in remarks))
+    if len(passed) < len(worlds):
+        return None
+    also = f"; right also {', and '.join(passed[1:])}" if passed[1:] else ""
+    return Verdict((Remark(passed[0] + also, True),))

@@ -1,18 +1,22 @@
-"""A student's file, judged by what its functions do, each in a process of its own."""
+"""A student's file, judged by what its functions do, each in a process of its own.
+
+That process records what a function returned and what it did to the engine, as data. The verdict
+is found here, where no code of the student's ever runs, against figures that are worked out
+here. What a student who is set on it can still do: write a record of his own making, with
+the answers and the runs that are asked for. They must be right, so he has to work them out.
+"""
 
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import re
-import secrets
 import signal
 import sys
 import tempfile
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,23 +26,16 @@ from ..backends import backend_engine
 from ..engines import engine_version
 from ..errors import BadInputError, EngineError, StateMachineError
 from . import sandbox
-from .judges import JUDGES
+from .examine import judged
+from .judges import JUDGES, judge_of
+from .recording import START, Limits, Recording, record
+from .unwinding import unwinding
+from .worlds import Scenes, World
 
-TIME_LIMIT = 5.0  # [s] for a function, from when its worlds are ready
-# [s] for Python, the engine and the worlds to get ready, all functions at once.
-_START = 4.0
-_MEMORY_MOST = 2 * sandbox.GB
+TIME_LIMIT = 5.0  # [s] of computing for a function, from when its worlds are ready
+WALL_LIMIT = 120.0  # [s] on the clock for it, which a busy machine may need too
+_TIMES = 4  # a busy machine needs longer on the clock: so many times what may be computed, at least
 _LARGEST = 1_000_000  # bytes of a student's file
-_PACKAGES = Path(__file__).resolve().parents[2]
-_CHILD = (
-    "import sys; sys.path.insert(0, sys.argv[2]); "
-    "from statemachine.grading._child import main; main(sys.argv[1])"
-)
-# What a program needs to start; the rest is none of a student's business.
-_KEPT = (
-    "PATH", "HOME", "USERPROFILE", "SYSTEMROOT", "TEMP", "TMP", "LANG", "LC_ALL",
-    "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "PYTHONPATH", "PYTHONHOME", "CONDA_PREFIX",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -50,12 +47,14 @@ class Judgement:
         written: False where it is still to be written.
         passed: Whether it does what it should.
         remarks: What is wrong with it, or what was verified, a line each.
+        judged: False where there is no verdict, for which the machine may be the reason.
     """
 
     function: str
     written: bool
     passed: bool
     remarks: tuple[str, ...]
+    judged: bool = True
 
 
 @dataclass(frozen=True)
@@ -66,6 +65,8 @@ class Grade:
         file: Its name; sha256: the digest of its content.
         backend: The backend that it ran on; versions: of what it ran with.
         functions: One after the other, in the exercise's order.
+        cpu_limit: What each function might compute [s], and wall_limit, what it might take on
+            the clock [s].
     """
 
     file: str
@@ -73,6 +74,8 @@ class Grade:
     backend: str
     versions: dict[str, str]
     functions: tuple[Judgement, ...]
+    cpu_limit: float = TIME_LIMIT
+    wall_limit: float = WALL_LIMIT
 
     @property
     def right(self) -> int:
@@ -90,14 +93,18 @@ def run(
     backend: str = "mujoco",
     time_limit: float = TIME_LIMIT,
     progress: Callable[[float], None] = lambda _: None,
+    wall_limit: float = WALL_LIMIT,
 ) -> Grade:
     """Judge each function of a student's file.
 
     Args:
         file: A Python file; nothing of it runs in this process.
         backend: The engine to run it on.
-        time_limit: For each function, after everything it needs is ready [s].
+        time_limit: What each function may compute, after everything it needs is ready [s];
+            this does not pass while the machine is busy with others.
         progress: Told the fraction that is done.
+        wall_limit: What each may take on the clock, from the same moment [s]; at least four
+            times `time_limit`.
 
     Raises:
         BadInputError: There is no such file, or it is no Python file.
@@ -111,12 +118,17 @@ def run(
         )
     engine = backend_engine(backend)
     content = path.read_bytes()
-    with tempfile.TemporaryDirectory(prefix="statemachine-", ignore_cleanup_errors=True) as folder:
-        judgements = _all(path, backend, time_limit, Path(folder), progress)
+    limits = Limits(time_limit, max(wall_limit, _TIMES * time_limit))
+    with (
+        unwinding(),
+        tempfile.TemporaryDirectory(prefix="statemachine-", ignore_cleanup_errors=True) as folder,
+    ):
+        judgements = _all(path, backend, limits, Path(folder), progress)
     versions = {"statemachine": __version__, "python": sys.version.split()[0]}
     if engine:
         versions[engine] = engine_version(engine)
-    return Grade(path.name, hashlib.sha256(content).hexdigest(), backend, versions, judgements)
+    digest = hashlib.sha256(content).hexdigest()
+    return Grade(path.name, digest, backend, versions, judgements, limits.cpu, limits.wall)
 
 
 def _python_file(path: Path) -> Path:
@@ -149,108 +161,122 @@ def _python_file(path: Path) -> Path:
 def _all(
     path: Path,
     backend: str,
-    seconds: float,
+    limits: Limits,
     folder: Path,
     progress: Callable[[float], None],
 ) -> tuple[Judgement, ...]:
     """All functions at once, so that the slowest decides how long it takes."""
     stop = threading.Event()
     with ThreadPoolExecutor(len(JUDGES)) as pool:
-        futures: list[Future[Judgement]] = [
-            pool.submit(_one, path, name, backend, seconds, folder / name, stop) for name in JUDGES
-        ]
         try:
-            waiting = set(futures)
+            futures = {
+                name: pool.submit(_recorded, path, name, backend, limits, folder / name, stop)
+                for name in JUDGES
+            }
+            # Meanwhile what is right is worked out here, where no code of the student's runs.
+            ours = folder / "ours"
+            ours.mkdir()
+            scenes = Scenes(backend, ours)
+            worlds = {name: judge_of(name).worlds(scenes) for name in JUDGES}
+            rights = {name: judge_of(name).right(worlds[name]) for name in JUDGES}
+            waiting = set(futures.values())
             while waiting:
                 waiting = wait(waiting, timeout=0.1).not_done
                 progress(1 - len(waiting) / len(futures))
-            return tuple(future.result() for future in futures)
+            return tuple(
+                _judgement(path, name, limits, worlds[name], rights[name], future.result())
+                for name, future in futures.items()
+            )
         finally:
             stop.set()  # after an interrupt nothing goes on
 
 
-def _one(
-    path: Path, name: str, backend: str, seconds: float, folder: Path, stop: threading.Event
+def _recorded(
+    path: Path, name: str, backend: str, limits: Limits, folder: Path, stop: threading.Event
+) -> Recording:
+    """A recording; if the process did not get ready, a second one."""
+    recording = record(path, name, backend, limits, folder / "1", stop)
+    if recording.began or recording.refusal or recording.broken or stop.is_set():
+        return recording
+    return record(path, name, backend, limits, folder / "2", stop)
+
+
+def _judgement(
+    path: Path,
+    name: str,
+    limits: Limits,
+    worlds: list[World],
+    rights: list[Any],
+    recording: Recording,
 ) -> Judgement:
-    scratch = folder / "scratch"  # where the student's code runs, and may write
-    scratch.mkdir(parents=True)
-    nonce, answers, trace = secrets.token_hex(16), folder / "answers", folder / "trace"
-    job = folder / "job"
-    facts = {
-        "file": str(path),
-        "function": name,
-        "backend": backend,
-        "seconds": seconds,
-        "answers": str(answers),
-        "trace": str(trace),
-        "nonce": nonce,
-    }
-    job.write_text(json.dumps(facts), encoding="utf-8")
-    outcome = sandbox.run(
-        [sys.executable, "-P", "-c", _CHILD, str(job), str(_PACKAGES)],
-        seconds=_START + seconds,
-        cwd=scratch,
-        env=_environment(),
-        memory_most=_MEMORY_MOST,
-        stop=stop,
+    if recording.refusal:
+        kind, text = recording.refusal
+        known = getattr(errors, kind, None)
+        if isinstance(known, type) and issubclass(known, StateMachineError):
+            raise known(text)
+        raise EngineError(text)
+    if recording.forbidden:
+        return Judgement(name, True, False, tuple(recording.forbidden))
+    try:
+        verdict = judged(judge_of(name), worlds, rights, recording.answers)
+    except Exception as error:  # what was recorded may have been made up
+        recording.broken = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+        verdict = None
+    if verdict is not None:
+        holds = all(remark.holds for remark in verdict.remarks)
+        texts = tuple(remark.text for remark in verdict.remarks)
+        return Judgement(name, verdict.written, holds, texts)
+    if recording.broken:
+        text = f"what its process recorded is no record of a run ({recording.broken})"
+        return Judgement(name, True, False, (text,))
+    if not recording.began:
+        return Judgement(name, True, False, (_not_ready(recording.outcome),), judged=False)
+    return _unfinished(path, name, limits, recording)
+
+
+def _unfinished(path: Path, name: str, limits: Limits, recording: Recording) -> Judgement:
+    """The judgement on a function that did not come to its end."""
+    outcome, trace = recording.outcome, recording.trace
+    # The innermost line of the student's file comes first in what is noted last.
+    last = trace.rpartition("Timeout (")[2]
+    lines = re.findall(rf'File "{re.escape(str(path))}", line (\d+)', last)
+    where = f"line {lines[0]}: " if lines else ""
+    by_itself = os.name == "posix" and trace.startswith("Timeout")
+    if not outcome.timed_out and (outcome.out_of_cpu or not by_itself):
+        return Judgement(name, True, False, (where + _how_it_ended(limits, outcome),))
+    computed = max(0.0, outcome.cpu - recording.cpu)
+    text = (
+        f"{where}nothing could be judged: not at its end after {limits.wall:g} s on the clock, "
+        f"of which it computed for {computed:.1f} s. Does it wait for something, or is this "
+        "machine busy?"
     )
-    answer = _last_answer(answers, nonce)
-    if answer["stage"] == "refused":
-        raise getattr(errors, answer["kind"], EngineError)(answer["text"])
-    if answer["stage"] == "judged":
-        remarks = tuple(text for text, _ in answer["remarks"])
-        passed = bool(remarks) and all(holds for _, holds in answer["remarks"])
-        return Judgement(name, answer["written"], passed, remarks)
-    if answer["stage"] != "running":
-        return Judgement(name, True, False, (_not_ready(outcome),))
-    last = trace.read_text(encoding="utf-8", errors="replace") if trace.is_file() else ""
-    return Judgement(name, True, False, (_how_it_ended(path, last, seconds, outcome),))
-
-
-def _environment() -> dict[str, str]:
-    kept = {name: os.environ[name] for name in _KEPT if name in os.environ}
-    # One thread each: four processes share the machine, and threads reserve memory.
-    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    return {**kept, **threads, "PYTHONUTF8": "1", "PYTHONDONTWRITEBYTECODE": "1"}
-
-
-def _last_answer(file: Path, nonce: str) -> dict[str, Any]:
-    """The last line of the channel that is the child's own; a stage of "none" without one."""
-    found: dict[str, Any] = {"stage": "none"}
-    if file.is_file():
-        for line in file.read_text(encoding="utf-8", errors="replace").splitlines():
-            try:
-                answer = json.loads(line)
-            except ValueError:
-                continue
-            if isinstance(answer, dict) and answer.get("nonce") == nonce:
-                found = answer
-    return found
+    return Judgement(name, True, False, (text,), judged=False)
 
 
 def _not_ready(outcome: sandbox.Outcome) -> str:
     """Why a process did not get as far as the student's code."""
     if outcome.timed_out:
-        return (
-            f"nothing could be judged: the engine was not ready after {outcome.wall:.0f} s, "
-            "on a slow or busy machine; try --time-limit 30"
-        )
-    how = outcome.returncode if outcome.signal is None else _signal(outcome.signal)
-    return f"nothing could be judged: the judge itself ended with {how}"
+        how = f"the engine was not ready after {START:.0f} s, twice"
+    else:
+        code = outcome.returncode if outcome.signal is None else _signal(outcome.signal)
+        how = f"the judge itself ended with {code}, twice"
+    return (
+        f"nothing could be judged: {how}. Your code was not run: this machine may be busy, or "
+        "out of memory; try again"
+    )
 
 
-def _how_it_ended(path: Path, trace: str, seconds: float, outcome: sandbox.Outcome) -> str:
-    """What became of a process that gave no verdict; `trace` is its fault handler's."""
-    # The innermost line of the student's file comes first.
-    lines = re.findall(rf'File "{re.escape(str(path))}", line (\d+)', trace)
-    where = f"line {lines[0]}: " if lines else ""
-    if outcome.timed_out or trace.startswith("Timeout"):
-        return f"{where}still running after {seconds:g} s: a loop that does not end?"
+def _how_it_ended(limits: Limits, outcome: sandbox.Outcome) -> str:
+    """What became of a process that gave no verdict."""
+    if outcome.out_of_cpu:
+        return f"still running after {limits.cpu:g} s of computing: a loop that does not end?"
+    if outcome.flooded:
+        return "it prints without end: a loop that does not end?"
     if outcome.out_of_memory:
-        return f"{where}it asks for more memory than there is for it"
+        return "it asks for more memory than there is for it"
     if outcome.signal is not None:
-        return f"{where}it crashed the process ({_signal(outcome.signal)})"
-    return f"{where}it ended the process, with code {outcome.returncode}: a function must return"
+        return f"it crashed the process ({_signal(outcome.signal)})"
+    return f"it ended the process, with code {outcome.returncode}: a function must return"
 
 
 def _signal(number: int) -> str:

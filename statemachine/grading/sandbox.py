@@ -1,9 +1,12 @@
 """Run a command that may loop, crash, flood or leave processes behind, and come back from it.
 
-It guards against what goes wrong, not against an attacker: the command has the rights of
-whoever runs it, and nothing here bounds how many processes it may start. On POSIX it gets a
-session and limits of its own; on Linux processes that left the session are found too. On
-Windows only the process itself is ended.
+On POSIX it gets a session and limits of its own; on Linux processes that left the session are
+found too, and it ends when we do. With `writable`, and where Linux permits it to any user, it
+is shut in (see `_launcher`). On Windows only the process itself is ended.
+
+Where it is not shut in it has the rights of whoever runs it, and this guards against what goes
+wrong, not against an attacker. Where it is, it still reads what its user can read, and a fault
+of the kernel's lets it out.
 """
 
 from __future__ import annotations
@@ -12,38 +15,28 @@ import math
 import os
 import secrets
 import signal
+import site
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
+from .limits import WATCHED, cpu_of, ended_by_cpu
+
 GB = 1024**3
 # Address space, of which engines reserve far more than they use.
 MEMORY_MOST = 4 * GB
 _FILE_MOST = GB // 4
+_FLOOD = GB // 4  # bytes of output that only a loop without end writes
 _TOKEN = "STATEMACHINE_SANDBOX"
 _PATIENCE = 2.0  # seconds to end what a command left behind
 _CHUNK = 65536
-
-# Sets the limits and becomes the command: what `preexec_fn` is for, and may not be used for
-# where the parent has threads. One limit that cannot be set leaves the others.
-_LAUNCHER = """
-import os, resource, sys
-for name, most in zip(("AS", "CPU", "FSIZE", "CORE"), sys.argv[1:5]):
-    try:
-        resource.setrlimit(getattr(resource, "RLIMIT_" + name), (int(most), int(most)))
-    except (OSError, ValueError, AttributeError):
-        pass
-try:
-    os.execvp(sys.argv[5], sys.argv[5:])
-except OSError as error:
-    sys.exit(f"{sys.argv[5]}: {error.strerror}")
-"""
+_LAUNCHER = str(Path(__file__).with_name("_launcher.py"))
 
 
 @dataclass(frozen=True)
@@ -51,33 +44,46 @@ class Outcome:
     """How a command ended.
 
     Attributes:
-        returncode: Its exit code; None if a signal or the time limit ended it.
+        returncode: Its exit code; None if a signal or a limit of time ended it.
         signal: The number of the signal that ended it, unless that was ours.
-        timed_out: Whether the time limit ended it.
+        started: Whether it got as far as `started` told, or was to.
+        timed_out: Whether time on the clock ended it.
+        out_of_cpu: Whether computing time ended it.
+        flooded: Whether it was ended since it wrote without end.
         out_of_memory: Whether what it wrote last speaks of memory that it did not get.
         stdout, stderr: What it wrote, each up to `output_most` bytes.
         truncated: Whether it wrote more than that.
-        wall: How long it ran [s].
+        wall: How long it ran on the clock [s].
+        cpu: How long it computed [s]; 0 where the system does not tell.
         left_behind: Processes of its own that were still there at its end, and were ended.
     """
 
     returncode: int | None
     signal: int | None
+    started: bool
     timed_out: bool
+    out_of_cpu: bool
+    flooded: bool
     out_of_memory: bool
     stdout: str
     stderr: str
     truncated: bool
     wall: float
+    cpu: float
     left_behind: int
 
 
 def run(
     command: Sequence[str],
     *,
-    seconds: float,
+    cpu: float,
+    wall: float,
+    started: Callable[[], bool] | None = None,
+    start: float = 60.0,
+    start_cpu: float = 0.0,
     cwd: str | os.PathLike[str] | None = None,
     env: Mapping[str, str] | None = None,
+    writable: str | os.PathLike[str] | None = None,
     output_most: int = 1_000_000,
     memory_most: int = MEMORY_MOST,
     stop: threading.Event | None = None,
@@ -86,9 +92,17 @@ def run(
 
     Args:
         command: Program and arguments.
-        seconds: Wall-clock time that it may take.
+        cpu: Seconds that it may compute, on all processors together.
+        wall: Seconds on the clock that it may take.
+        started: Tells when it is ready, and `wall` begins; None for at once.
+        start: Seconds on the clock that it may take until then.
+        start_cpu: Seconds of computing until then that are not counted: for a command that
+            limits itself from there (`limits.limit_cpu`).
         cwd: Where it runs; None for here.
         env: Its environment; None for ours.
+        writable: The folder in which it has its home and its temporary files; where the system
+            permits it, it can write nowhere else, and has no network and no other process in
+            sight. None for none of this.
         output_most: Bytes of stdout, and of stderr, to keep; the rest is read and dropped.
         memory_most: Bytes of address space of each process, where the system can limit it.
         stop: Set by another thread, it ends the command as the time limit does.
@@ -99,59 +113,117 @@ def run(
     token = secrets.token_hex(16)
     began = time.monotonic()
     process = subprocess.Popen(
-        _limited(command, seconds, memory_most),
+        _limited(command, cpu + start_cpu, memory_most, writable),
         cwd=cwd,
-        env={**(os.environ if env is None else env), _TOKEN: token},
+        env={**(os.environ if env is None else env), **_home(writable), _TOKEN: token},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         start_new_session=True,  # without effect on Windows
     )
     readers = [_Reader(pipe, output_most) for pipe in (process.stdout, process.stderr)]
-    ended = False
+    waiting = _Waiting(process, readers, cpu, wall, stop or threading.Event())
     try:
-        ended = _wait(process, began + seconds, stop or threading.Event())
-        wall = time.monotonic() - began
+        ready = started is None or waiting.until(started, began + start)
+        if ready:
+            waiting.to_the_end()
+        took = time.monotonic() - began
     finally:  # an interrupt too
         left = _end_all(process, token)
-        process.wait()
+        used = _reap(process)
     out, err = (reader.finish() for reader in readers)
-    code = process.returncode if ended else None
+    code = process.returncode if waiting.ended else None
+    number = -code if code is not None and code < 0 else None
+    out_of_cpu = waiting.out_of_cpu or ended_by_cpu(number, used, cpu)
     return Outcome(
         returncode=code if code is not None and code >= 0 else None,
-        signal=-code if code is not None and code < 0 else None,
-        timed_out=not ended,
-        out_of_memory=ended and code != 0 and _speaks_of_memory(err),
+        signal=None if out_of_cpu else number,
+        started=ready or (started is not None and started()),
+        timed_out=not (waiting.ended or out_of_cpu or waiting.flooded),
+        out_of_cpu=out_of_cpu,
+        flooded=waiting.flooded,
+        out_of_memory=waiting.ended and code != 0 and _speaks_of_memory(err),
         stdout=out,
         stderr=err,
         truncated=any(reader.dropped for reader in readers),
-        wall=wall,
+        wall=took,
+        cpu=used,
         left_behind=left,
     )
 
 
-def _limited(command: Sequence[str], seconds: float, memory_most: int) -> list[str]:
+def _limited(
+    command: Sequence[str],
+    cpu: float,
+    memory_most: int,
+    writable: str | os.PathLike[str] | None,
+) -> list[str]:
     if os.name != "posix":
         return list(command)
-    # The time on all processors ends a loop even where we were killed and cannot.
-    processors = math.ceil(seconds + 1) * (os.cpu_count() or 1)
-    limits = [str(limit) for limit in (memory_most, processors, _FILE_MOST, 0)]
-    return [sys.executable, "-I", "-S", "-c", _LAUNCHER, *limits, *command]
+    limits = [str(limit) for limit in (os.getpid(), memory_most, math.ceil(cpu), _FILE_MOST)]
+    place = "" if writable is None else str(Path(writable).resolve())
+    return [sys.executable, "-I", "-S", _LAUNCHER, *limits, place, *command]
 
 
-def _wait(process: subprocess.Popen[bytes], deadline: float, stop: threading.Event) -> bool:
-    """Whether the process ended in time. On POSIX it is not reaped yet.
+def _home(writable: str | os.PathLike[str] | None) -> dict[str, str]:
+    """A home and a place for temporary files; what is installed in ours is found."""
+    if writable is None:
+        return {}
+    place = str(Path(writable).resolve())
+    names = ("HOME", "USERPROFILE", "TMPDIR", "TEMP", "TMP")
+    return {**dict.fromkeys(names, place), "PYTHONUSERBASE": site.getuserbase()}
+
+
+class _Waiting:
+    """Waits for a process. On POSIX it is not reaped yet when it has ended.
 
     So that its number, and that of its group, is nobody else's when the group is killed.
+
+    Attributes:
+        ended: Whether it ended by itself.
+        out_of_cpu: Whether it computed for too long, as seen from outside.
+        flooded: Whether it wrote too much.
     """
-    pause = 0.001
-    while True:
-        if _has_ended(process):
-            return True
-        remaining = deadline - time.monotonic()
-        if remaining <= 0 or stop.wait(min(pause, remaining)):
-            return False
-        pause = min(pause * 2, 0.02)
+
+    def __init__(
+        self,
+        process: subprocess.Popen[bytes],
+        readers: Sequence[_Reader],
+        cpu: float,
+        wall: float,
+        stop: threading.Event,
+    ) -> None:
+        self.ended = False
+        self.out_of_cpu = False
+        self.flooded = False
+        self._process, self._readers = process, readers
+        self._cpu, self._wall, self._stop = cpu, wall, stop
+
+    def until(self, ready: Callable[[], bool], deadline: float) -> bool:
+        """Whether `ready` said so before the end, and before the deadline."""
+        return self._wait(deadline, ready)
+
+    def to_the_end(self) -> None:
+        """Wait for the end, or that of one of its times."""
+        before = cpu_of(self._process) if WATCHED else 0.0
+
+        def exhausted() -> bool:
+            self.out_of_cpu = WATCHED and cpu_of(self._process) - before > self._cpu
+            self.flooded = any(reader.total > _FLOOD for reader in self._readers)
+            return self.out_of_cpu or self.flooded
+
+        self._wait(time.monotonic() + self._wall, exhausted)
+
+    def _wait(self, deadline: float, enough: Callable[[], bool]) -> bool:
+        pause = 0.001
+        while True:
+            self.ended = _has_ended(self._process)
+            if enough():
+                return True
+            remaining = deadline - time.monotonic()
+            if self.ended or remaining <= 0 or self._stop.wait(min(pause, remaining)):
+                return False
+            pause = min(pause * 2, 0.02)
 
 
 def _has_ended(process: subprocess.Popen[bytes]) -> bool:
@@ -159,6 +231,16 @@ def _has_ended(process: subprocess.Popen[bytes]) -> bool:
         return process.poll() is not None
     options = os.WEXITED | os.WNOHANG | os.WNOWAIT
     return os.waitid(os.P_PID, process.pid, options) is not None
+
+
+def _reap(process: subprocess.Popen[bytes]) -> float:
+    """Wait for a process that was ended; how long it had computed [s]."""
+    if sys.platform == "win32" or process.returncode is not None:
+        process.wait()
+        return 0.0
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return usage.ru_utime + usage.ru_stime
 
 
 def _end_all(process: subprocess.Popen[bytes], token: str) -> int:
@@ -216,12 +298,14 @@ class _Reader:
         self._most = most
         self._kept = bytearray()
         self.dropped = False
+        self.total = 0
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
 
     def _read(self) -> None:
         with suppress(OSError, ValueError):
             while chunk := os.read(self._pipe.fileno(), _CHUNK):
+                self.total += len(chunk)
                 room = self._most - len(self._kept)
                 self._kept += chunk[:room]
                 self.dropped |= len(chunk) > room

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field
-from types import ModuleType
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,21 @@ from ..records import Array
 # Raw functions of MuJoCo that advance time, and those that only recompute.
 _STEPS = ("mj_step", "mj_step2")
 _FORWARDS = ("mj_forward", "mj_kinematics", "mj_fwdPosition")
+_MOST = 1000  # runs, forwards and Data that are noted
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """The inputs of a Data at some moment: (nq,), (nv,), (nu,).
+
+    Attributes:
+        data: The number of the Data, in the order in which they were met.
+    """
+
+    data: int
+    qpos: Array
+    qvel: Array
+    ctrl: Array
 
 
 @dataclass
@@ -29,14 +43,16 @@ class Run:
     """One run, from its first step on.
 
     Attributes:
-        data: The Data, or MuJoCo's own.
+        data: The number of the Data.
+        own: Whether it is a Data of the Model that the function got, or of a variant of it.
         qpos, qvel, ctrl, time: What they were at the first step.
         end, end_qvel, end_time: qpos, qvel and the time after the last step.
         nstep: How many steps it took.
         ctrl_changed: After how many steps ctrl was another; None if it never was.
     """
 
-    data: Any
+    data: int
+    own: bool
     qpos: Array
     qvel: Array
     ctrl: Array
@@ -71,120 +87,146 @@ class Nudge:
     after: int
 
 
-@dataclass
 class Watch:
     """What was done while a function ran.
 
     Attributes:
         runs: In the order in which they began.
-        datas: Every Data of the Model, or raw one that was used, in order.
-        nudge: What every run but the first is pushed by, so that an engine that repeats
-            itself to the bit does not.
+        forwards: What the inputs were when derived values were recomputed, in order.
+        datas: Every Data that was used, or MuJoCo's own, in order.
     """
 
-    nudge: Nudge | None = None
-    runs: list[Run] = field(default_factory=list)
-    datas: list[Any] = field(default_factory=list)
-    _current: dict[int, Run] = field(default_factory=dict)
+    def __init__(self, model: Model, nudge: Nudge | None) -> None:
+        """Watch what is done with `model`; every run but the first is pushed by `nudge`.
 
-    def meet(self, data: Any) -> None:
-        """Note a Data; the engine's own object behind a noted one is no other."""
-        if not any(data is known or data is _raw(known) for known in self.datas):
-            self.datas.append(data)
+        So that an engine that repeats itself to the bit does not.
+        """
+        self.runs: list[Run] = []
+        self.forwards: list[Inputs] = []
+        self.datas: list[Any] = []
+        self._origin = _origin(model if model.backend != "mujoco" else model.raw)
+        self._nudge = nudge
+        self._current: dict[int, Run] = {}
 
-    def step(self, data: Any, advance: Callable[[], Any], nstep: int) -> Any:
+    def meet(self, data: Any) -> int:
+        """The number of a Data; the engine's own object behind a known one is no other.
+
+        Raises:
+            RuntimeError: There are too many.
+        """
+        for number, known in enumerate(self.datas):
+            if data is known or data is _raw(known):
+                return number
+        if len(self.datas) == _MOST:
+            raise RuntimeError(f"more than {_MOST} Data, which no exercise needs")
+        self.datas.append(data)
+        return len(self.datas) - 1
+
+    def inputs(self, data: Any) -> Inputs:
+        """What they are now."""
+        copies = (np.array(getattr(data, name)) for name in ("qpos", "qvel", "ctrl"))
+        return Inputs(self.meet(data), *copies)
+
+    def recomputed(self, data: Any) -> None:
+        """Note that what is derived was."""
+        if len(self.forwards) < _MOST:
+            self.forwards.append(self.inputs(data))
+
+    def step(self, model: Any, data: Any, advance: Callable[[], Any], nstep: int) -> Any:
         """Let `advance` move `data`, and note where from and where to."""
-        self.meet(data)
-        run = self._current.get(id(data))
+        number = self.meet(data)
+        run = self._current.get(number)
         if run is None or not run.continues(data):
-            run = self._begin(data)
+            now, time = self.inputs(data), float(data.time)
+            own = _origin(model) == self._origin
+            run = Run(number, own, now.qpos, now.qvel, now.ctrl, time, now.qpos, now.qvel, time)
+            if len(self.runs) < _MOST:
+                self.runs.append(run)
+            self._current[number] = run
         elif run.ctrl_changed is None and (data.ctrl != run.ctrl).any():
             run.ctrl_changed = run.nstep
         result = advance()
         run.nstep += nstep
-        if self.nudge and run is not self.runs[0] and run.nstep >= self.nudge.after:
-            place = self.nudge.place
-            data.qpos[place] = np.nextafter(data.qpos[place], self.nudge.towards)
+        if self._nudge and run is not self.runs[0] and run.nstep >= self._nudge.after:
+            place = self._nudge.place
+            data.qpos[place] = np.nextafter(data.qpos[place], self._nudge.towards)
         run.end, run.end_qvel = np.array(data.qpos), np.array(data.qvel)
         run.end_time = float(data.time)
         return result
-
-    def _begin(self, data: Any) -> Run:
-        qpos, qvel = np.array(data.qpos), np.array(data.qvel)
-        time = float(data.time)
-        run = Run(data, qpos, qvel, np.array(data.ctrl), time, qpos, qvel, time)
-        self.runs.append(run)
-        self._current[id(data)] = run
-        return run
 
 
 _watch: Watch | None = None
 
 
 @contextmanager
-def watching(nudge: Nudge | None = None) -> Iterator[Watch]:
-    """What happens meanwhile on Models that `watched` gave, and on MuJoCo itself."""
+def watching(model: Model, nudge: Nudge | None = None) -> Iterator[Watch]:
+    """What happens meanwhile, where `engine_watched` holds."""
     global _watch  # noqa: PLW0603  (the engine's functions are the process's too)
-    _watch = Watch(nudge)
+    _watch = Watch(model, nudge)
     try:
         yield _watch
     finally:
         _watch = None
 
 
-def watched(model: Model) -> Model:
-    """The same Model; the Data that it makes, and those of its variants, are seen."""
-    make_data, replace = model._make_data, model._replace
+@contextmanager
+def engine_watched(backend: str) -> Iterator[None]:
+    """Every Data made from now on is seen, and MuJoCo's own functions on the backend mujoco.
 
-    def made() -> Data:
-        data = make_data()
-        if _watch is not None:
-            _watch.meet(data)
-            if model.backend != "mujoco":  # whose own functions are watched
-                _listen(data)
-        return data
-
-    for name, value in (
-        ("_make_data", made),
-        ("_replace", lambda options: watched(replace(options))),
-    ):
-        object.__setattr__(model, name, value)
-    return model
-
-
-def _listen(data: Data) -> None:
-    advance = data._advance
-
-    def seen(nstep: int = 1) -> None:
-        if _watch is None:
-            advance(nstep)
-        else:
-            _watch.step(data, functools.partial(advance, nstep), nstep)
-
-    object.__setattr__(data, "_advance", seen)
+    Before a student's file can import them.
+    """
+    with ExitStack() as stack:
+        raw = backend == "mujoco"
+        if raw:
+            mujoco = require("mujoco")
+            for name in _STEPS:
+                stack.enter_context(_replaced(mujoco, name, _seen_step))
+            for name in _FORWARDS:
+                stack.enter_context(_replaced(mujoco, name, _seen_forward))
+        for kind in Data.__subclasses__():
+            if not (raw and kind.__module__.endswith("mujoco_backend")):
+                stack.enter_context(_replaced(kind, "_recompute", _seen_recompute))
+        stack.enter_context(_replaced(Data, "__init__", functools.partial(_seen_data, raw)))
+        yield
 
 
 @contextmanager
-def engine_watched(backend: str) -> Iterator[None]:
-    """MuJoCo's own functions are seen too; before a student's file can import them."""
-    if backend != "mujoco":
-        yield
-        return
-    mujoco = require("mujoco")
-    kept = {name: getattr(mujoco, name) for name in (*_STEPS, *_FORWARDS)}
+def _replaced(owner: Any, name: str, seen: Callable[[Any], Any]) -> Iterator[None]:
+    original = vars(owner)[name]
+    setattr(owner, name, seen(original))
     try:
-        for name in _STEPS:
-            setattr(mujoco, name, _seen_step(kept[name]))
-        for name in _FORWARDS:
-            setattr(mujoco, name, _seen_forward(kept[name]))
         yield
     finally:
-        _restore(mujoco, kept)
+        setattr(owner, name, original)
 
 
-def _restore(module: ModuleType, kept: dict[str, Any]) -> None:
-    for name, value in kept.items():
-        setattr(module, name, value)
+def _seen_data(raw: bool, original: Callable[..., None]) -> Callable[..., None]:
+    """`Data.__init__`; with `raw`, MuJoCo's own functions tell of its steps."""
+
+    @functools.wraps(original)
+    def seen(data: Any, model: Any, advance: Callable[..., None], *more: Any) -> None:
+        def advanced(nstep: int = 1) -> None:
+            if _watch is None:
+                advance(nstep)
+            else:
+                _watch.step(model, data, functools.partial(advance, nstep), nstep)
+
+        told = raw and model.backend == "mujoco"
+        original(data, model, advance if told else advanced, *more)
+        if _watch is not None:
+            _watch.meet(data)
+
+    return seen
+
+
+def _seen_recompute(original: Callable[..., None]) -> Callable[..., None]:
+    @functools.wraps(original)
+    def seen(data: Any) -> None:
+        original(data)
+        if _watch is not None:
+            _watch.recomputed(data)
+
+    return seen
 
 
 def _seen_step(original: Callable[..., Any]) -> Callable[..., Any]:
@@ -193,7 +235,7 @@ def _seen_step(original: Callable[..., Any]) -> Callable[..., Any]:
         given = (m, d) if nstep == 1 else (m, d, nstep)
         if _watch is None:
             return original(*given)
-        return _watch.step(d, functools.partial(original, *given), nstep)
+        return _watch.step(m, d, functools.partial(original, *given), nstep)
 
     return seen
 
@@ -201,11 +243,17 @@ def _seen_step(original: Callable[..., Any]) -> Callable[..., Any]:
 def _seen_forward(original: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(original)
     def seen(m: Any, d: Any) -> Any:
+        result = original(m, d)
         if _watch is not None:
-            _watch.meet(d)
-        return original(m, d)
+            _watch.recomputed(d)
+        return result
 
     return seen
+
+
+def _origin(model: Any) -> Any:
+    """What a Model and its variants have in common, and MuJoCo's own with its copies."""
+    return model.path if isinstance(model, Model) else model.names
 
 
 def _raw(data: Any) -> Any:

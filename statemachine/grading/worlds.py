@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 from ..backends import load
 from ..interface import Model
 from ..models import resolve
-from .watch import Nudge, watched
+from .watch import Nudge
 
 ELSEWHERE = "on a scene with a crate before the arm"
 _CRATE = """
@@ -50,23 +50,22 @@ class World:
         where: What sets it apart; nothing on the course's own model.
         model: What the function gets.
         arguments: What it gets beside it.
-        expected: What a judge worked out before any code of the student's ran.
         nudge: See `watch.Watch`.
     """
 
     where: str
     model: Model
-    arguments: tuple[Any, ...]
-    expected: Any
+    arguments: tuple[Any, ...] = ()
     nudge: Nudge | None = None
 
 
 class Scenes:
-    """Makes Models for one backend, from files that it writes into a folder."""
+    """Makes Models for one backend, each once, from files that it writes into a folder."""
 
     def __init__(self, backend: str, folder: Path) -> None:
         self._backend = backend
         self._folder = folder
+        self._made: dict[str, Model] = {}
 
     def ordinary(self, name: str) -> Model:
         """The course's own scene, without what is only seen."""
@@ -77,12 +76,14 @@ class Scenes:
         return self._load(name, "crowded", lambda root: _crowd(root, self._backend))
 
     def _load(self, name: str, kind: str, edit: Callable[[ElementTree.Element], None]) -> Model:
-        root = _merged(resolve(name))
-        _bare(root)
-        edit(root)
         file = self._folder / f"{kind}_{name.rpartition('/')[2]}.xml"
-        ElementTree.ElementTree(root).write(file)
-        return watched(load(file, backend=self._backend))
+        if file.name not in self._made:
+            root = _merged(resolve(name))
+            _bare(root)
+            edit(root)
+            ElementTree.ElementTree(root).write(file)
+            self._made[file.name] = load(file, backend=self._backend)
+        return self._made[file.name]
 
 
 def _merged(path: Path) -> ElementTree.Element:

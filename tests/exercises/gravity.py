@@ -162,6 +162,64 @@ def data_of_the_other_model(model, seconds=4):
     return _fall(model, seconds), _fall(_limp(model), seconds, data=data)
 
 
+@wrong("gravity", "you took 201 steps from 1 s to 2 s, where a second has 200: after 400 data.time")
+def stepped_by_the_clock(model, seconds=4):
+    def fall(model):
+        data = sm.make_data(model)
+        angles = [np.degrees(data.qpos[_lift(model)])]
+        for second in range(1, seconds + 1):
+            while data.time < second:
+                sm.step(model, data)
+            angles.append(np.degrees(data.qpos[_lift(model)]))
+        return angles
+
+    return fall(model), fall(_limp(model))
+
+
+@wrong("gravity", "to the model that you got (it steps a model of its own)")
+def loads_its_own(model, seconds=4):
+    own = sm.load("so101/scene", backend=model.backend)
+    return _fall(own, seconds), _fall(_limp(own), seconds)
+
+
+@wrong("gravity", "that is its speed, qvel")
+def speed_for_position(model, seconds=4):
+    def fall(model):
+        data = sm.make_data(model)
+        dof = model.jnt_dofadr[model.joint_id("shoulder_lift")]
+        speeds = [np.degrees(data.qvel[dof])]
+        for _ in range(seconds):
+            sm.step(model, data, round(1 / model.timestep))
+            speeds.append(np.degrees(data.qvel[dof]))
+        return speeds
+
+    return fall(model), fall(_limp(model))
+
+
+@wrong("gravity", "you took 1 step for a second, and at 5 ms a step a second has 200")
+def one_step_a_second(model, seconds=4):
+    return _fall(model, seconds, each=1), _fall(_limp(model), seconds, each=1)
+
+
+@right("gravity")
+def single_precision(model, seconds=4):
+    return np.array([_fall(model, seconds), _fall(_limp(model), seconds)], np.float32)
+
+
+@right("gravity")
+def a_step_after_the_last_reading(model, seconds=4):
+    def fall(model):
+        data, each = sm.make_data(model), round(1 / model.timestep)
+        angles = []
+        for k in range(seconds * each + 1):
+            if k % each == 0:
+                angles.append(np.degrees(data.qpos[_lift(model)]))
+            sm.step(model, data)
+        return angles
+
+    return fall(model), fall(_limp(model))
+
+
 @right("gravity")
 def rounded_arrays(model, seconds=4):
     return np.round([_fall(model, seconds), _fall(_limp(model), seconds)], 2)

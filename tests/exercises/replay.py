@@ -165,6 +165,47 @@ def three_runs(model, ctrl, nstep=600):
     return _compared(*[_once(model, ctrl, nstep) for _ in range(3)][1:])
 
 
+@wrong("replay", "first run: it took 1 step where 600")
+def one_step(model, ctrl, nstep=600):
+    return _compared(*(_once(model, ctrl, 1) for _ in range(2)))
+
+
+@wrong("replay", "first is float32, which forgets digits")
+def single_precision(model, ctrl, nstep=600):
+    return _compared(*(np.float32(_once(model, ctrl, nstep)) for _ in range(2)))
+
+
+@wrong("replay", "degrees were made of it; ctrl is in radians as it is")
+def command_in_degrees(model, ctrl, nstep=600):
+    return _compared(*(_once(model, np.degrees(ctrl), nstep) for _ in range(2)))
+
+
+@wrong("replay", "it did not begin at keyframe 0: qvel was up to 0.1 away")
+def pushed_at_the_start(model, ctrl, nstep=600):
+    def once():
+        data = sm.make_data(model)
+        sm.reset(model, data, keyframe=0)
+        data.time = 0.0
+        data.ctrl[:] = ctrl
+        data.qvel[0] += 0.1
+        sm.step(model, data, nstep)
+        return data.qpos.copy()
+
+    return _compared(once(), once())
+
+
+@wrong("replay", "no step was taken with the model that you got, but with another")
+def loads_its_own(model, ctrl, nstep=600):
+    own = sm.load("so101/scene_box", backend=model.backend)
+    return _compared(*(_once(own, ctrl, nstep) for _ in range(2)))
+
+
+@wrong("replay", "that is the end of the second run")
+def second_twice(model, ctrl, nstep=600):
+    first, second = (_once(model, ctrl, nstep) for _ in range(2))
+    return np.array_equal(first, second), second, second.copy()
+
+
 @right("replay")
 def one_data_reset_between_step_by_step(model, ctrl, nstep=600):
     data = sm.make_data(model)

@@ -117,9 +117,28 @@ def time_as_text(model):
     return _slots(model), f"{_time(model)} s"
 
 
+@wrong("state", "should be 2.5 s, you return 2")
+def whole_seconds(model):
+    return _slots(model), int(_time(model))
+
+
+@wrong("state", "it begins at the right place and has 3 numbers, not 7")
+def only_the_place(model):
+    return _slots(model, nq=lambda kind: min(kind.nq, 3)), _time(model)
+
+
 @wrong("state", "not written yet")
 def not_written(model):
     raise NotImplementedError("TODO(you): later")
+
+
+@right("state")
+def open_and_from_the_end(model):
+    slots = _slots(model)
+    last = model.joint_names[-1]
+    position, velocity = slots[last]
+    slots[last] = slice(position.start, None), slice(velocity.start - model.nv, None, 1)
+    return slots, _time(model)
 
 
 @right("state", raw=True)

@@ -1,17 +1,18 @@
 """The judges, one file for each function of the exercise.
 
-A judge is a module with `worlds(scenes)`, which makes the worlds to call the function on and
-works out there what is right, before any of the student's code runs; and
-`judge(function, world)`, which calls it and says what it did.
+A judge is a module with `worlds(scenes)`, the worlds to call the function on;
+`right(worlds)`, what is right on each; and `judge(answer, world, right)`, which says of what
+came of the call whether it is that, and if not, what it is.
 """
 
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 if TYPE_CHECKING:
-    from ..calls import Function, Remark
+    from ..answers import Answer
+    from ..calls import Remark
     from ..worlds import Scenes, World
 
 # By the functions of the student's file, in the order in which they stand there.
@@ -30,7 +31,11 @@ class Judge(Protocol):
         """The worlds, the course's own first."""
         ...
 
-    def judge(self, function: Function, world: World) -> list[Remark]:
+    def right(self, worlds: list[World]) -> list[Any]:
+        """What is right on each of the worlds, worked out by us."""
+        ...
+
+    def judge(self, answer: Answer, world: World, right: Any) -> list[Remark]:
         """What is wrong with what it did there; or, in one remark that holds, what is right.
 
         Raises:

@@ -1,15 +1,18 @@
-"""What the judges share: looking at returned values, and comparing without the student's NumPy."""
+"""What the judges share: looking at returned values, comparing, and wording."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ...interface import Model
 from ...records import Array
+from ..answers import kind
 from ..calls import FaultError
 
+T = TypeVar("T")
 LIFT, TIP = "shoulder_lift", "gripperframe"
 
 
@@ -18,17 +21,15 @@ def address(model: Model, joint: str = LIFT) -> int:
     return int(model.jnt_qposadr[model.joint_id(joint)])
 
 
-def parts(value: Any, count: int, what: str) -> list[Any]:
+def parts(value: Any, number: int, what: str) -> list[Any]:
     """A returned value as so many parts.
 
     Raises:
         FaultError: It has another number of them, or none.
     """
-    try:
-        found = list(value)
-    except TypeError:
-        raise FaultError(f"it returns {kind(value)}, where {what} is asked for") from None
-    if isinstance(value, (str, dict, set)) or len(found) != count:
+    several = isinstance(value, (tuple, list)) or (isinstance(value, np.ndarray) and value.shape)
+    found = list(value) if several else []
+    if not several or len(found) != number:
         raise FaultError(f"it returns {kind(value)}, where {what} is asked for")
     return found
 
@@ -50,6 +51,23 @@ def numbers(value: Any, shape: tuple[int, ...], what: str) -> Array:
     return array
 
 
+def short_float(value: Any) -> str:
+    """The name of the floating-point type in a value that has fewer digits than a float."""
+    if isinstance(value, (tuple, list)):
+        return next(filter(None, map(short_float, value)), "")
+    dtype = getattr(value, "dtype", None)
+    return str(dtype) if dtype is not None and dtype.kind == "f" and dtype.itemsize < 8 else ""
+
+
+def grain(values: Array) -> float:
+    """Half of the last decimal, if all values are rounded to two to eight; otherwise 0."""
+    with np.errstate(all="ignore"):
+        for decimals in range(2, 9):
+            if near(values, np.round(values, decimals), 1e-14 * (1 + abs(values).max())):
+                return 0.5 * 10.0**-decimals
+    return 0.0
+
+
 def near(one: Array, two: Array, tolerance: float) -> bool:
     """Whether no number is farther apart; NaN is far from everything."""
     return one.shape == two.shape and bool((abs(one - two) <= tolerance).all())
@@ -60,15 +78,9 @@ def same_bits(one: Array, two: Array) -> bool:
     return one.shape == two.shape and bool((one == two).all())
 
 
-def kind(value: Any) -> str:
-    """What a value is, in words."""
-    if isinstance(value, np.ndarray):
-        return f"an array of shape {value.shape}"
-    if isinstance(value, (tuple, list, dict, set)):
-        return f"a {type(value).__name__} of {len(value)}"
-    text, name = repr(value), type(value).__name__
-    name = f"{'an' if name[0] in 'aeiou' else 'a'} {name}"
-    return f"{name}: {text}" if len(text) < 40 else name
+def count(number: int, thing: str) -> str:
+    """'1 step', '2 steps'."""
+    return f"{number} {thing}" + "s" * (number != 1)
 
 
 def owner(model: Model, place: int) -> str:
@@ -80,3 +92,9 @@ def owner(model: Model, place: int) -> str:
 def listed(values: Array, digits: int = 4) -> str:
     """Numbers in brackets."""
     return "[" + " ".join(f"{v + 0.0:.{digits}g}" for v in values.tolist()) + "]"
+
+
+def told_apart(one: T, two: T, text: Callable[[T, int], str]) -> str:
+    """'x where y' with as many digits as it takes to tell them apart, four at least."""
+    digits = next((d for d in range(4, 17) if text(one, d) != text(two, d)), 17)
+    return f"{text(one, digits)} where {text(two, digits)}"

@@ -3,95 +3,100 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from ...interface import Model
+from ...interface import Data, Model
 from ...records import Array
 from ...verbs import forward, make_data
-from ..calls import Function, Remark, call
-from ..watch import Watch
+from ..answers import Answer
+from ..calls import Remark
+from ..watch import Inputs
 from ..worlds import ELSEWHERE, Scenes, World
-from ._values import LIFT, TIP, address, kind, near, numbers, owner, parts
+from ._values import LIFT, TIP, address, grain, near, numbers, owner, parts, short_float, told_apart
 
 SCENE = "so101/scene"
 ANGLE = 0.8  # [rad], what is written
 TOLERANCE = 1e-9  # [m]
+_SINGLE = 1e-7  # [m]: what float32 keeps of such places
 _READINGS = ("1, fresh", "2, after forward", "3, after the write", "4, after the second forward")
 
 
 @dataclass(frozen=True)
 class Tips:
-    """What is right on one world, and what is typically read instead.
+    """What is right on one world, and what other sites and bodies would give.
 
     Attributes:
         readings: (4, 3) the four readings [m].
-        in_degrees: (2, 3) the last one, if 0.8 is taken as degrees, or made degrees.
-        others: The last reading of other sites and bodies, by what they are.
-        course: (4, 3) the readings on the course's own model.
+        others: (4, 3) those of each other site and body, by what it is [m].
+        course: (4, 3) the readings on the course's own model [m].
     """
 
     readings: Array
-    in_degrees: Array
     others: dict[str, Array]
     course: Array
 
 
 def worlds(scenes: Scenes) -> list[World]:
     """The course's scene; a crate before the arm, and the fingertip elsewhere."""
-    course, crowded = scenes.ordinary(SCENE), scenes.crowded(SCENE)
-    usual = _tips(course, None)
-    return [
-        World("", course, (), usual),
-        World(ELSEWHERE, crowded, (), _tips(crowded, usual.readings)),
-    ]
+    return [World("", scenes.ordinary(SCENE)), World(ELSEWHERE, scenes.crowded(SCENE))]
+
+
+def right(worlds: list[World]) -> list[Tips]:
+    """The readings on each."""
+    first = _tips(worlds[0].model, None)
+    return [first, *(_tips(world.model, first.readings) for world in worlds[1:])]
 
 
 def _tips(model: Model, course: Array | None) -> Tips:
-    tip, place = model.site_id(TIP), address(model)
     with make_data(model) as data:
-        readings = [data.site_xpos[tip].copy()]
+        moments = [_places(model, data)]
         forward(model, data)
-        readings += [data.site_xpos[tip].copy()] * 2
-        turned = []
-        for angle in (math.radians(ANGLE), math.degrees(ANGLE), ANGLE):
-            data.qpos[place] = angle
-            forward(model, data)
-            turned.append(data.site_xpos[tip].copy())
-        others = {
-            f"site {name!r}": np.array(data.site_xpos[k])
-            for k, name in enumerate(model.site_names)
-            if k != tip
-        } | {f"body {name!r}": np.array(data.xpos[k]) for k, name in enumerate(model.body_names)}
-    right = np.array([*readings, turned[-1]])
-    return Tips(right, np.array(turned[:2]), others, right if course is None else course)
+        moments += [_places(model, data)] * 2
+        data.qpos[address(model)] = ANGLE
+        forward(model, data)
+        moments.append(_places(model, data))
+    places = {name: np.array([moment[name] for moment in moments]) for name in moments[0]}
+    tip = places.pop(f"site {TIP!r}")
+    return Tips(tip, places, tip if course is None else course)
 
 
-def judge(function: Function, world: World) -> list[Remark]:
+def _places(model: Model, data: Data) -> dict[str, Array]:
+    """Where each site and body is, (3,) [m]."""
+    sites = {f"site {name!r}": data.site_xpos[k].copy() for k, name in enumerate(model.site_names)}
+    return sites | {f"body {n!r}": data.xpos[k].copy() for k, n in enumerate(model.body_names)}
+
+
+def judge(answer: Answer, world: World, right: Tips) -> list[Remark]:
     """The four readings, and that no time passed."""
-    tips: Tips = world.expected
-    result, watch = call(function, world)
-    given = [
-        numbers(each, (3,), f"reading {k}")
-        for k, each in enumerate(parts(result, 4, "four positions"), start=1)
-    ]
-    remarks = _time_passed(watch)
-    if not remarks and _is_one_memory(result, np.array(given), tips):
-        return [
+    short = short_float(answer.result)
+    tolerance = _SINGLE if short == "float32" else TOLERANCE
+    given = np.array(
+        [
+            numbers(each, (3,), f"reading {k}")
+            for k, each in enumerate(parts(answer.result, 4, "four positions"), start=1)
+        ]
+    )
+    if passed := [run.end_time - run.time for run in answer.runs]:
+        remarks = [
             Remark(
-                f"all four readings are the last one, {_vector(given[3])}: what you read is the "
-                "simulator's own memory, which changes. Keep copies: data.site_xpos[…].copy()"
+                f"{passed[0]:g} s passed: step was called. forward recomputes what is derived "
+                "and takes no time"
             )
         ]
-    wrong = [k for k in range(4) if not near(given[k], tips.readings[k], TOLERANCE)]
-    # A first fault explains what comes after it, more often than not.
-    for k in wrong[:1]:
-        remarks.append(Remark(f"reading {_READINGS[k]}: {_why(k, given, world, watch)}"))
+    else:
+        remarks = _all_at_once(given, answer, right, tolerance)
+    wrong = [k for k in range(4) if not near(given[k], right.readings[k], tolerance)]
+    if wrong and not (remarks and not passed):
+        # A first fault explains what comes after it, more often than not.
+        why = _why(wrong[0], given, world, right, answer)
+        more = f"; {short} keeps few digits, leave the conversion out" if short else ""
+        remarks.append(Remark(f"reading {_READINGS[wrong[0]]}: {why}{more}"))
     if remarks:
         return remarks
-    moved = float(np.linalg.norm(tips.readings[3] - tips.readings[2]))
+    moved = float(np.linalg.norm(right.readings[3] - right.readings[2]))
     return [
         Remark(
             "readings 2 and 3 are equal: the write changed nothing that is derived; the second "
@@ -101,79 +106,121 @@ def judge(function: Function, world: World) -> list[Remark]:
     ]
 
 
-def _time_passed(watch: Watch) -> list[Remark]:
-    if not watch.runs:
+def _all_at_once(given: Array, answer: Answer, tips: Tips, tolerance: float) -> list[Remark]:
+    """One mistake that gives all four readings."""
+    if near(given, tips.readings, tolerance):
         return []
-    passed = watch.runs[0].end_time - watch.runs[0].time
-    return [
-        Remark(
-            f"{passed:g} s passed: step was called. forward recomputes what is derived and "
-            "takes no time"
-        )
-    ]
+    last = f"all four readings are the last one, {_vector(given[3])}: "
+    copies = "Keep copies: data.site_xpos[…].copy()"
+    if near(given, np.tile(given[3], (4, 1)), 0):
+        if answer.memory[3] == 0 or all(answer.live):
+            text = "what you read is the simulator's own memory, which changes. "
+            return [Remark(last + text + copies)]
+        if near(given[3], tips.readings[3], tolerance):
+            text = "read only at the end, or from the simulator's own memory, which changes. "
+            return [Remark(last + text + copies)]
+    if near(given / 1000, tips.readings, TOLERANCE):
+        return [Remark("the readings are in millimetres: positions are in metres here")]
+    if answer.forwards:  # without any, all are at the origin
+        names = [n for n, places in tips.others.items() if near(given, places, tolerance)]
+        if names:
+            of = " and ".join(names[:3])
+            return [Remark(f"that is the place of {of}; site {TIP!r} is asked for")]
+    return []
 
 
-def _is_one_memory(result: Any, given: Array, tips: Tips) -> bool:
-    """Whether all four show what was there at the end."""
-    if not all(near(each, given[3], 0) for each in given):
-        return False
-    kept = [each for each in result if isinstance(each, np.ndarray)]
-    views = len(kept) == 4 and bool(np.may_share_memory(kept[0], kept[3]))
-    return views or near(given[3], tips.readings[3], TOLERANCE)
-
-
-def _why(k: int, given: list[Array], world: World, watch: Watch) -> str:
-    """What reading k is, as far as it can be told."""
-    tips: Tips = world.expected
+def _why(k: int, given: Array, world: World, tips: Tips, answer: Answer) -> str:
+    """What reading k is, as far as the run shows it."""
     right, found = tips.readings[k], given[k]
     away = f"{_mm(float(np.linalg.norm(found - right)))} away"
     fresh, old, new = tips.readings[0], tips.readings[1], tips.readings[3]
+    slack = TOLERANCE + grain(found)
     if not np.isfinite(found).all():
         return f"you return {_vector(found)}"
-    if world.where and near(found, tips.course[k], TOLERANCE):
+    if world.where and near(found, tips.course[k], slack):
         return "that belongs to the course's own scene, not to the model that you got"
-    for name, position in tips.others.items() if k == 3 else ():
-        if near(found, position, TOLERANCE):
-            return f"that is the place of {name}, {away}; {TIP!r} is asked for"
+    if grain(found) and near(found, right, slack):
+        return f"it was rounded, {away}: return what you read as it is"
     if k and near(found, fresh, TOLERANCE):
-        return f"derived values were read before any forward: still at the origin, {away}"
+        never = "" if answer.forwards else ", which was never called"
+        return f"derived values were read before any forward{never}: still at the origin, {away}"
+    for name, places in tips.others.items() if k else ():
+        if near(found, places[k], slack):
+            return f"that is the place of {name}, {away}; {TIP!r} is asked for"
+    place = address(world.model)
+    early = bool(answer.forwards) and answer.forwards[0].qpos[place] == ANGLE
     if k < 3 and near(found, new, TOLERANCE):
+        if early:
+            return f"qpos was written before the first forward: that is the new pose, {away}"
         return f"forward was called before it was read: that is the new pose already, {away}"
     if k == 0 and near(found, old, TOLERANCE):
         return f"forward was called before it: a new Data has nothing derived yet; you are {away}"
-    if k == 3:
-        for angle, position in zip(
-            (f"{ANGLE} degrees", f"{math.degrees(ANGLE):.1f} rad"), tips.in_degrees, strict=True
-        ):
-            if near(found, position, TOLERANCE):
-                return f"that is the arm at {angle}, {away}: qpos is in radians, write {ANGLE}"
-        if written := _elsewhere(world.model, watch):
-            return f"{written}; the fingertip is {away}"
-        if near(found, old, TOLERANCE):
-            return f"derived values were read before forward: that is the old pose, {away}"
-    return f"you return {_vector(found)} where {_vector(right)} is expected, {away}"
+    if k == 3 and (text := next(_poses(found, world.model, answer, away), "")):
+        return text
+    return f"you return {told_apart(found, right, _vector)} is expected, {away}"
 
 
-def _elsewhere(model: Model, watch: Watch) -> str:
-    """Whether something else than the joint's own place was written."""
-    place = address(model)
+def _poses(found: Array, model: Model, answer: Answer, away: str) -> Iterator[str]:
+    """What the last reading is, if it belongs to one of the poses that forward met."""
+    place, lift = address(model), f"{LIFT} is at qpos[{address(model)}]"
     with make_data(model) as data:
-        start = data.qpos.copy()
-    for data in watch.datas:
-        moved = np.flatnonzero(np.array(data.qpos) != start).tolist()
-        if moved and place not in moved:
-            return (
-                f"you wrote qpos[{moved[0]}], which is {owner(model, moved[0])!r}; {LIFT} is at "
-                f"qpos[{place}]: model.jnt_qposadr[model.joint_id(…)]"
-            )
-    return ""
+        start = Inputs(0, data.qpos.copy(), data.qvel.copy(), data.ctrl.copy())
+        for met in reversed([each for each in answer.forwards if each.qpos.shape == (model.nq,)]):
+            data.qpos[:] = met.qpos
+            forward(model, data)
+            if not near(data.site_xpos[model.site_id(TIP)], found, TOLERANCE):
+                continue
+            angle, others = float(met.qpos[place]), _written(start, met)["qpos"]
+            if angle != start.qpos[place] and angle != ANGLE:
+                unit = f"{angle:.1f} rad"
+                if math.isclose(angle, math.radians(ANGLE)):
+                    unit = f"{ANGLE} degrees"
+                yield f"that is the arm at {unit}, {away}: qpos is in radians, write {ANGLE}"
+            if others := [entry for entry in others if entry != place]:
+                also = "also " * (angle == ANGLE)
+                yield (
+                    f"you {also}wrote qpos[{others[0]}], which is {owner(model, others[0])!r}; "
+                    f"{lift}: model.jnt_qposadr[model.joint_id(…)]; the fingertip is {away}"
+                )
+            if angle == start.qpos[place]:
+                yield _unmoved(start, answer, model, away)
+
+
+def _unmoved(start: Inputs, answer: Answer, model: Model, away: str) -> str:
+    """Why the last reading is the old pose, by what was written and when."""
+    place = address(model)
+    old = f"that is the old pose, {away}"
+    states = [each for each in (*answer.forwards, *answer.ends) if each.qpos.shape == (model.nq,)]
+    if any(each.qpos[place] == ANGLE for each in answer.forwards):
+        return f"it was read before the second forward: {old}"
+    if any(each.qpos[place] != start.qpos[place] for each in states):
+        return f"derived values were read before forward: {old}"
+    for name in ("qpos", "ctrl", "qvel"):
+        for each in states:
+            if written := _written(start, each)[name]:
+                what = {
+                    "qpos": f"which is {owner(model, written[0])!r}" if name == "qpos" else "",
+                    "ctrl": "a command, on which the arm would act with time",
+                    "qvel": "a speed",
+                }[name]
+                return f"you wrote {name}[{written[0]}], {what}: {old}; {LIFT} is at qpos[{place}]"
+    return (
+        f"nothing was written into qpos of a Data (into a copy of it?): {old}; "
+        f"data.qpos[…] = {ANGLE} writes"
+    )
+
+
+def _written(start: Inputs, inputs: Inputs) -> dict[str, list[int]]:
+    """Entries of the inputs that are no longer what a new Data has."""
+    return {
+        name: np.flatnonzero(getattr(inputs, name) != getattr(start, name)).tolist()
+        for name in ("qpos", "qvel", "ctrl")
+    }
 
 
 def _mm(metres: float) -> str:
     return f"{metres * 1e3:.3g} mm"
 
 
-def _vector(values: Array) -> str:
-    return (
-        "[" + " ".join(f"{v + 0.0:.4f}" for v in values) + "] m" if values.shape else kind(values)
-    )
+def _vector(values: Array, decimals: int = 4) -> str:
+    return "[" + " ".join(f"{v + 0.0:.{decimals}f}" for v in values) + "] m"

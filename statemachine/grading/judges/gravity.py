@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from ...interface import Model
 from ...records import Array, Ints
 from ...verbs import make_data, step
-from ..calls import Function, Remark, call
-from ..watch import Watch
+from ..answers import Answer
+from ..calls import Remark
 from ..worlds import ELSEWHERE, Scenes, World
-from ._values import LIFT, address, listed, near, numbers, owner, parts
+from ._values import LIFT, address, count, grain, listed, near, numbers, owner, parts, told_apart
 
 SCENE = "so101/scene"
 TOLERANCE = 0.006  # [degrees]: two decimals will do
@@ -24,82 +23,98 @@ _NO_STEP = "no step was taken with the model that you got"
 
 
 @dataclass(frozen=True)
+class Trace:
+    """qpos (steps + 1, nq), qvel (steps + 1, nv) and time (steps + 1,) [s] after each step."""
+
+    qpos: Array
+    qvel: Array
+    time: Array
+
+
+@dataclass(frozen=True)
 class Fall:
     """What is right on one world.
 
     Attributes:
-        on, off: (steps + 1, nq) qpos after each step, for a second longer than asked for.
+        on, off: What happens, for a second longer than asked for.
         marks: (seconds + 1,) the steps at which whole seconds are over.
         course: (2, …) what is right on the course's own model, if this is another [degrees].
     """
 
-    on: Array
-    off: Array
+    on: Trace
+    off: Trace
     marks: Ints
     course: Array | None = None
 
+    def trace(self, limp: bool) -> Trace:
+        """With the servos off, or on."""
+        return self.off if limp else self.on
+
     def degrees(self, limp: bool, place: int) -> Array:
         """(seconds + 1,) an entry of qpos at whole seconds, as degrees."""
-        return np.degrees((self.off if limp else self.on)[self.marks, place])
+        return np.degrees(self.trace(limp).qpos[self.marks, place])
 
 
 def worlds(scenes: Scenes) -> list[World]:
     """The course's scene; the Moon's gravity at another timestep; a crate before the arm."""
     course = scenes.ordinary(SCENE)
     moon = course.replace(gravity=_MOON, timestep=0.004)
-    fall = _fall(course, 4)
-    usual = np.array([fall.degrees(limp, address(course)) for limp in (False, True)])
     return [
-        World("", course, (4,), fall),
-        World("with the Moon's gravity and 4 ms a step", moon, (3,), _fall(moon, 3, usual)),
-        World(ELSEWHERE, crowded := scenes.crowded(SCENE), (2,), _fall(crowded, 2, usual)),
+        World("", course, (4,)),
+        World("with the Moon's gravity and 4 ms a step", moon, (3,)),
+        World(ELSEWHERE, scenes.crowded(SCENE), (2,)),
     ]
 
 
-def _fall(model: Model, seconds: int, course: Array | None = None) -> Fall:
+def right(worlds: list[World]) -> list[Fall]:
+    """The fall on each."""
+    course = worlds[0].model
+    first = _fall(worlds[0])
+    usual = np.array([first.degrees(limp, address(course)) for limp in (False, True)])
+    return [first, *(_fall(world, usual) for world in worlds[1:])]
+
+
+def _fall(world: World, course: Array | None = None) -> Fall:
+    model, (seconds,) = world.model, world.arguments
     each = round(1 / model.timestep)
     traces = []
     for variant in (model, model.replace(actuation=False)):
         with make_data(variant) as data:
-            trace = [data.qpos.copy()]
+            moments = [(data.qpos.copy(), data.qvel.copy(), data.time)]
             for _ in range((seconds + 1) * each):
                 step(variant, data)
-                trace.append(data.qpos.copy())
-        traces.append(np.array(trace))
+                moments.append((data.qpos.copy(), data.qvel.copy(), data.time))
+        traces.append(Trace(*(np.array(column) for column in zip(*moments, strict=True))))
     return Fall(traces[0], traces[1], np.arange(seconds + 1) * each, course)
 
 
-def judge(function: Function, world: World) -> list[Remark]:
+def judge(answer: Answer, world: World, right: Fall) -> list[Remark]:
     """Both traces in degrees; ctrl untouched; the Model as it was."""
-    fall: Fall = world.expected
-    before = _settings(world.model)
-    try:
-        result, watch = call(function, world)
-    finally:
-        after = _settings(world.model)
-    remarks = _left(before, after)
-    pair = parts(result, 2, "(on, off), two lists of degrees,")
-    count = len(fall.marks)
+    remarks = _left(answer)
+    pair = parts(answer.result, 2, "(on, off), two lists of degrees,")
+    size = len(right.marks)
     given = [
-        numbers(each, (count,), f"{name}, one number at each of 0 … {count - 1} s")
+        numbers(each, (size,), f"{name}, one number at each of 0 … {size - 1} s")
         for name, each in zip(_NAMES, pair, strict=True)
     ]
-    remarks += _command(watch)
+    remarks += _command(answer)
     place = address(world.model)
-    right = [fall.degrees(limp, place) for limp in (False, True)]
-    if near(given[0], right[1], TOLERANCE) and near(given[1], right[0], TOLERANCE):
+    falls = [right.degrees(limp, place) for limp in (False, True)]
+    if near(given[0], falls[1], TOLERANCE) and near(given[1], falls[0], TOLERANCE):
         return [*remarks, Remark("the two lists are swapped: (on, off) is the order")]
     for limp, name in enumerate(_NAMES):
-        if not near(given[limp], right[limp], TOLERANCE):
-            text = _why(given[limp], given[1 - limp], bool(limp), world, watch)
+        if not near(given[limp], falls[limp], TOLERANCE):
+            text = _why(given, bool(limp), world, right, answer)
             remarks.append(Remark(f"{name}: {text}"))
-    if not watch.runs:
+        elif text := _by_the_clock(given[limp], bool(limp), world, right):
+            remarks.append(Remark(f"{name}: {text}"))
+    if not answer.runs:
         remarks.append(Remark(_NO_STEP))
-    elif not remarks and sum(run.nstep >= fall.marks[-1] for run in watch.runs) < 2:
-        steps = ", ".join(str(run.nstep) for run in watch.runs[:4])
+    elif not remarks and sum(run.nstep >= right.marks[-1] for run in answer.runs) < 2:
+        steps = ", ".join(count(run.nstep, "step") for run in answer.runs[:4])
         remarks.append(
             Remark(
-                f"your runs took {steps} steps; {count - 1} s are {fall.marks[-1]} steps of "
+                f"your runs took {steps}; {size - 1} s are {right.marks[-1]} steps of "
                 f"{world.model.timestep:g} s, with the servos on and again with them off"
             )
         )
@@ -107,101 +122,143 @@ def judge(function: Function, world: World) -> list[Remark]:
         return remarks
     return [
         Remark(
-            f"after {count - 1} s {LIFT} is at {right[0][-1]:.3f}° with its servos on and at "
-            f"{right[1][-1]:.2f}° with them off; ctrl untouched, the model given back as it was",
+            f"after {size - 1} s {LIFT} is at {falls[0][-1]:.3f}° with its servos on and at "
+            f"{falls[1][-1]:.2f}° with them off; ctrl untouched, the model given back as it was",
             True,
         )
     ]
 
 
-def _why(given: Array, other: Array, limp: bool, world: World, watch: Watch) -> str:
-    """What a wrong list is, as far as it can be told."""
-    fall: Fall = world.expected
-    model, place = world.model, address(world.model)
-    right, wrong = fall.degrees(limp, place), fall.degrees(not limp, place)
+def _why(given: list[Array], limp: bool, world: World, fall: Fall, answer: Answer) -> str:
+    """What a wrong list is, where one mistake gives all of its numbers."""
+    mine, other = given[limp], given[not limp]
+    right = fall.degrees(limp, address(world.model))
     # The farthest, but not the start, where all is zero in any unit.
-    k = int(np.argmax(np.nan_to_num(abs(given - right), nan=np.inf)))
-    figures = f"you return {given[k]:.4g} at {k} s where {right[k]:.4g} is expected"
-    if near(given, np.radians(right), TOLERANCE / 60):
-        return f"{figures}: that is radians; np.degrees(…) makes degrees of them"
-    if near(given, np.degrees(right), TOLERANCE * 60):
-        return f"{figures}: degrees were made of it twice"
-    for entry in range(model.nq):
-        if given.any() and entry != place and near(given, fall.degrees(limp, entry), _SAME):
-            return (
-                f"{figures}: that is qpos[{entry}], of {owner(model, entry)!r}; {LIFT} is at "
-                "model.jnt_qposadr[model.joint_id(…)]"
-            )
-    if abs(given[0] - right[0]) > TOLERANCE and abs(given[0] - other[-1]) <= TOLERANCE:
-        return (
-            f"{figures}: this run goes on where the other one ended, at {given[0]:.3f}°; "
-            "a new Data begins at the default state"
+    k = int(np.argmax(np.nan_to_num(abs(mine - right), nan=np.inf)))
+    figures = told_apart(mine[k], right[k], lambda value, digits: f"{value + 0.0:.{digits}g}")
+    figures = f"you return {figures.replace(' where', f' at {k} s where')} is expected"
+    if text := _goes_on(mine, other, world, answer):
+        return f"{figures}: {text}"
+    for mistaken, text in _mistakes(limp, world, fall, answer):
+        if _is(mine, mistaken, right):
+            return f"{figures}: {text}"
+    if not any(run.own for run in answer.runs):
+        return f"{figures}: {_NO_STEP}"
+    return figures + _late(mine, limp, world, fall, answer)
+
+
+def _is(given: Array, mistaken: Array, right: Array) -> bool:
+    """Whether a mistake gives these numbers, and neither the right ones nor zeros."""
+    slack = 2 * _SAME + grain(given)
+    telling = not near(mistaken, right, 2 * slack) and bool((abs(mistaken) > 2 * slack).any())
+    return telling and near(given, mistaken, slack + 1e-9 * float(abs(mistaken).max()))
+
+
+def _mistakes(limp: bool, world: World, fall: Fall, answer: Answer) -> Iterator[tuple[Array, str]]:
+    """What typical mistakes give, and what to say of them."""
+    model, trace = world.model, fall.trace(limp)
+    place, dof = address(model), int(model.jnt_dofadr[model.joint_id(LIFT)])
+    right, marks = fall.degrees(limp, place), fall.marks
+    yield np.radians(right), "that is radians; np.degrees(…) makes degrees of them"
+    yield np.degrees(right), "degrees were made of it twice"
+    for entry in set(range(model.nq)) - {place}:
+        yield (
+            fall.degrees(limp, entry),
+            f"that is qpos[{entry}], of {owner(model, entry)!r}; {LIFT} is at "
+            "model.jnt_qposadr[model.joint_id(…)]",
         )
-    if fall.course is not None and near(given, fall.course[int(limp), : len(given)], TOLERANCE):
-        return f"{figures}: that belongs to the course's own scene, not to the model that you got"
-    if near(given, wrong, TOLERANCE):
-        how = "still on" if limp else "off already"
-        return f"{figures}: the servos were {how} in this run"
-    return figures + _when(given, limp, world, watch)
-
-
-def _when(given: Array, limp: bool, world: World, watch: Watch) -> str:
-    """Whether the list is right for other moments."""
-    fall: Fall = world.expected
-    seconds, timestep = len(given) - 1, world.model.timestep
-    trace = np.degrees((fall.off if limp else fall.on)[:, address(world.model)])
-    for nstep in dict.fromkeys(run.nstep for run in watch.runs):
-        each = nstep // seconds
-        marks = np.arange(seconds + 1) * each
-        if each != fall.marks[1] and marks[-1] < len(trace) and near(given, trace[marks], _SAME):
-            return (
-                f": you took {each} steps for a second, and at {timestep * 1e3:g} ms a step a "
-                f"second has {fall.marks[1]}: round(1 / model.timestep)"
+    for unit in (np.degrees, np.asarray):
+        yield unit(trace.qvel[marks, dof]), "that is its speed, qvel; its position is in qpos"
+    if fall.course is not None:
+        loaded = "" if all(run.own for run in answer.runs) else " (it steps a model of its own)"
+        yield (
+            fall.course[int(limp), : len(marks)],
+            f"that belongs to the course's own scene, not to the model that you got{loaded}",
+        )
+    how = "still on" if limp else "off already"
+    yield fall.degrees(not limp, place), f"the servos were {how} in this run"
+    degrees, last = np.degrees(trace.qpos[:, place]), len(trace.qpos) - 1
+    for nstep in dict.fromkeys(run.nstep for run in answer.runs):
+        each = nstep // (len(marks) - 1)
+        if each != marks[1] and (len(marks) - 1) * each <= last:
+            yield (
+                degrees[np.arange(len(marks)) * each],
+                f"you took {count(each, 'step')} for a second, and at "
+                f"{model.timestep * 1e3:g} ms a step a second has {marks[1]}: "
+                "round(1 / model.timestep)",
             )
-    for late in range(1 - int(fall.marks[1]), int(fall.marks[1]) + 1):
-        marks = fall.marks + late
-        if late and near(given[1:], trace[marks[1:]], _SAME):
-            word = "later" if late > 0 else "earlier"
-            return f": that is the arm {abs(late) * timestep:g} s {word} (the first is at 0 s)"
-    return "" if watch.runs else f": {_NO_STEP}"
 
 
-def _command(watch: Watch) -> list[Remark]:
+def _goes_on(given: Array, other: Array, world: World, answer: Answer) -> str:
+    """Whether a run began where another had ended."""
+    place = address(world.model)
+    fresh = sum(abs(np.degrees(run.qpos[place])) <= TOLERANCE for run in answer.runs if run.own)
+    if fresh >= 2 or abs(given[0]) <= TOLERANCE or abs(given[0] - other[-1]) > TOLERANCE:
+        return ""
+    return (
+        f"this run goes on where the other one ended, at {given[0]:.3f}°; "
+        "a new Data begins at the default state"
+    )
+
+
+def _late(given: Array, limp: bool, world: World, fall: Fall, answer: Answer) -> str:
+    """Whether the list is right for other moments, to which one of the runs came."""
+    place, marks, timestep = address(world.model), fall.marks, world.model.timestep
+    trace = np.degrees(fall.trace(limp).qpos[:, place])
+    slack = _SAME + grain(given)
+    found = [
+        late
+        for late in range(1 - int(marks[1]), int(marks[1]) + 1)
+        if late and near(given[1:], trace[marks[1:] + late], slack)
+    ]
+    # Where the arm rests it is the same at many moments: then what was stepped tells.
+    taken = {run.nstep - int(marks[-1]) for run in answer.runs}
+    if len(found) > 1:
+        found = [late for late in found if late in taken]
+    if len(found) != 1 or max(taken) < found[0]:
+        return ""
+    word = "later" if found[0] > 0 else "earlier"
+    return f": that is the arm {abs(found[0]) * timestep:g} s {word} (the first is at 0 s)"
+
+
+def _by_the_clock(given: Array, limp: bool, world: World, fall: Fall) -> str:
+    """Whether it was stepped while data.time was below whole seconds, where that is a step off."""
+    trace = fall.trace(limp)
+    degrees = np.degrees(trace.qpos[:, address(world.model)])
+    marks = np.searchsorted(trace.time, np.arange(len(fall.marks)))
+    if not _is(given, degrees[marks], degrees[fall.marks]):
+        return ""
+    k = int(np.argmax(np.diff(marks) != fall.marks[1])) + 1
+    before = int(marks[k]) - 1
+    return (
+        f"you took {marks[k] - marks[k - 1]} steps from {k - 1} s to {k} s, where a second has "
+        f"{fall.marks[1]}: after {before} data.time is {float(trace.time[before])!r}, since "
+        f"adding up {world.model.timestep:g} rounds each time. A sum of time is no counter of "
+        "steps: count them, round(1 / model.timestep)"
+    )
+
+
+def _command(answer: Answer) -> list[Remark]:
     """Whether ctrl was written."""
-    for run in watch.runs:
+    for run in answer.runs:
         if run.ctrl.any() or run.ctrl_changed is not None:
-            command = listed(np.array(run.data.ctrl))
+            command = listed(answer.ends[run.data].ctrl)
             return [Remark(f"ctrl was written ({command}): here it must stay as a new Data has it")]
     return []
 
 
-def _settings(model: Model) -> dict[str, list[float]]:
-    """What of the engine's own model a student can reach: its options, and its arrays' sums."""
-    if model.backend != "mujoco":
-        return {}
-    options = model.raw.opt
-    names = ("disableflags", "enableflags", "timestep", "gravity", "integrator")
-    found = {f"opt.{name}": np.atleast_1d(getattr(options, name)).tolist() for name in names}
-    for name in dir(model.raw):
-        value = None if name.startswith("_") else getattr(model.raw, name)
-        if isinstance(value, np.ndarray):
-            found[name] = [float(zlib.crc32(value.tobytes()))]
-    return found
-
-
-def _left(before: dict[str, list[float]], after: dict[str, list[float]]) -> list[Remark]:
+def _left(answer: Answer) -> list[Remark]:
     """Whether the Model was given back as it was."""
-    changed = [name for name in before if before[name] != after[name]]
-    if "opt.disableflags" in changed:
+    if "opt.disableflags" in answer.changed:
+        before, after = (int(flags[0]) for flags in answer.changed["opt.disableflags"])
         return [
             Remark(
                 "the model was given back with its servos off (model.raw.opt.disableflags is "
-                f"{after['opt.disableflags'][0]:.0f}, it was "
-                f"{before['opt.disableflags'][0]:.0f}): switch "
+                f"{after}, it was {before}): switch "
                 "the bit back, or use model.replace(actuation=False)"
             )
         ]
     return [
         Remark(f"the model was given back with another model.raw.{name}: a Model never changes")
-        for name in changed
+        for name in answer.changed
     ]

@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ...interface import Model
 from ...records import Array
 from ...verbs import make_data, reset
-from ..calls import Function, Remark, call
-from ..watch import Nudge, Run, Watch
+from ..answers import Answer, kind
+from ..calls import Remark
+from ..watch import Nudge, Run
 from ..worlds import ELSEWHERE, Scenes, World
-from ._values import address, kind, listed, near, numbers, parts, same_bits
+from ._values import (
+    address,
+    count,
+    grain,
+    listed,
+    near,
+    numbers,
+    parts,
+    same_bits,
+    short_float,
+)
 
 SCENE = "so101/scene_box"
 _CTRL = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)
@@ -37,10 +47,9 @@ def worlds(scenes: Scenes) -> list[World]:
     """The course's scene; fewer steps with a crate before the arm; runs that do end apart."""
     course = scenes.ordinary(SCENE)
     crowded = scenes.crowded(SCENE).replace(timestep=0.004)
-    start = _start(course)
     return [
-        World("", course, (np.array(_CTRL), 600), start),
-        World(ELSEWHERE, crowded, (np.array(_OTHER), 150), _start(crowded)),
+        World("", course, (np.array(_CTRL), 600)),
+        World(ELSEWHERE, crowded, (np.array(_OTHER), 150)),
         # One bit, in the middle and upwards, at the end and downwards: nearly equal, equal in
         # part, equal in sum and not smaller all pass for equal in one of the two.
         *(
@@ -48,8 +57,7 @@ def worlds(scenes: Scenes) -> list[World]:
                 f"with {what} of the second run one bit off",
                 course,
                 (np.array(_CTRL), _STEPS),
-                start,
-                nudge=Nudge(place, towards, _STEPS),
+                Nudge(place, towards, _STEPS),
             )
             for what, place, towards in (
                 ("a joint", address(course, "elbow_flex"), np.inf),
@@ -59,28 +67,41 @@ def worlds(scenes: Scenes) -> list[World]:
     ]
 
 
+def right(worlds: list[World]) -> list[Start]:
+    """Where the runs begin on each."""
+    return [_start(world.model) for world in worlds]
+
+
 def _start(model: Model) -> Start:
     with make_data(model) as data:
         reset(model, data, keyframe=0)
         return Start(data.qpos.copy(), data.qvel.copy(), data.time, data.ctrl.copy())
 
 
-def judge(function: Function, world: World) -> list[Remark]:
+def judge(answer: Answer, world: World, right: Start) -> list[Remark]:
     """Two runs as asked for, what they ended in, and whether that is equal."""
     _, nstep = world.arguments
-    result, watch = call(function, world)
-    same, first, second = parts(result, 3, "(same, first, second)")
-    if not isinstance(same, (bool, np.bool_)):
+    same, *copies = parts(answer.result, 3, "(same, first, second)")
+    if not isinstance(same, bool):
         return [Remark(f"same: True or False is asked for; got {kind(same)}")]
-    remarks = _memory(first, second, watch)
+    remarks = _memory(answer)
+    for name, each in zip(_COUNT, copies, strict=True):
+        if short := short_float(each):
+            remarks.append(
+                Remark(
+                    f"{name} is {short}, which forgets digits: qpos is float64, and every bit "
+                    "counts here. Leave the conversion out"
+                )
+            )
+            break
     ends = [
         numbers(each, (world.model.nq,), f"{name}, qpos at the end")
-        for name, each in zip(_COUNT, (first, second), strict=True)
+        for name, each in zip(_COUNT, copies, strict=True)
     ]
-    remarks += _runs(watch.runs, world)
+    remarks += _runs(answer.runs, world, right)
     if remarks:
         return remarks
-    one, two = watch.runs
+    one, two = answer.runs
     apart = float(abs(one.end - two.end).max())
     if apart and world.nudge is None:
         return [
@@ -111,36 +132,33 @@ def judge(function: Function, world: World) -> list[Remark]:
     ]
 
 
-def _memory(first: Any, second: Any, watch: Watch) -> list[Remark]:
+def _memory(answer: Answer) -> list[Remark]:
     """Whether what was returned is the simulator's own memory."""
-    if first is second or _shared(first, second):
+    if answer.memory[2] == 1:
         return [
             Remark(
                 "first and second are one array: both show the last run. Keep a copy of each, "
                 "data.qpos.copy()"
             )
         ]
-    for name, each in zip(_COUNT, (first, second), strict=True):
-        if any(_shared(each, data.qpos) for data in watch.datas):
+    for name, live in zip(_COUNT, answer.live[1:], strict=True):
+        if live:
             return [
                 Remark(
-                    f"{name} is data.qpos itself, which changes with the next step or reset: "
-                    "return a copy, data.qpos.copy()"
+                    f"{name} is data.{live} itself, which changes with the next step or reset: "
+                    f"return a copy, data.{live}.copy()"
                 )
             ]
     return []
 
 
-def _shared(one: Any, two: Any) -> bool:
-    arrays = isinstance(one, np.ndarray) and isinstance(two, np.ndarray)
-    return arrays and np.may_share_memory(one, two)
-
-
-def _runs(runs: list[Run], world: World) -> list[Remark]:
+def _runs(runs: tuple[Run, ...], world: World, start: Start) -> list[Remark]:
     """Whether there were two runs, each as it was asked for; the first fault of each kind."""
     _, nstep = world.arguments
     if not runs:
         return [Remark(f"no step was taken: two runs of {nstep} steps are asked for")]
+    if not any(run.own for run in runs):
+        return [Remark("no step was taken with the model that you got, but with another")]
     if len(runs) == 1 and runs[0].nstep >= 2 * nstep:
         return [
             Remark(
@@ -157,57 +175,72 @@ def _runs(runs: list[Run], world: World) -> list[Remark]:
     if len(runs) > 2:
         return [
             Remark(
-                f"there were {len(runs)} runs, of {', '.join(str(run.nstep) for run in runs[:6])} "
-                "steps: two are asked for, and nothing may be written into qpos, qvel or time "
-                "between their steps"
+                f"there were {len(runs)} runs, of {', '.join(str(run.nstep) for run in runs[:6])}"
+                f"{', …' * (len(runs) > 6)} steps: two are asked for, and nothing may be written "
+                "into qpos, qvel or time between their steps"
             )
         ]
     found: dict[str, str] = {}
     for name, run in zip(_COUNT, runs, strict=True):
-        for concept, text in _faults(run, world).items():
+        for concept, text in _faults(run, world, start).items():
             found.setdefault(concept, f"{name} run: {text}")
     return [Remark(text) for text in found.values()]
 
 
-def _faults(run: Run, world: World) -> dict[str, str]:
-    start: Start = world.expected
+def _faults(run: Run, world: World, start: Start) -> dict[str, str]:
     ctrl, nstep = world.arguments
     faults = {}
     if not (near(run.qpos, start.qpos, _START) and near(run.qvel, start.qvel, _START)):
-        away = abs(run.qpos - start.qpos).max()
+        gaps = {
+            name: float(abs(was - should).max())
+            for name, was, should in (
+                ("qpos", run.qpos, start.qpos),
+                ("qvel", run.qvel, start.qvel),
+            )
+        }
+        name = max(gaps, key=lambda each: gaps[each])
         faults["start"] = (
-            f"it did not begin at keyframe 0: qpos was up to {away:.2g} away. "
+            f"it did not begin at keyframe 0: {name} was up to {gaps[name]:.2g} away. "
             "sm.reset(model, data, keyframe=0)"
         )
     elif run.time:
         of = ", the keyframe's time" if run.time == start.time else ""
         faults["time"] = f"it began at {run.time:g} s{of}: set data.time to zero"
     if not same_bits(run.ctrl, ctrl):
-        had = "the keyframe's own" if same_bits(run.ctrl, start.ctrl) else listed(run.ctrl)
-        late = ""
+        own = same_bits(run.ctrl, start.ctrl)
+        had = "the keyframe's own" if own else listed(run.ctrl)
+        text = f"at its first step ctrl was {had}"
         if run.ctrl_changed is not None:
-            late = f", and was written only after step {run.ctrl_changed}"
-        order = " (a reset overwrites ctrl: write it after)" if not late else ""
-        faults["ctrl"] = (
-            f"at its first step ctrl was {had}{late}; {listed(ctrl)} is asked for{order}"
-        )
+            text += f", and was written only after {count(run.ctrl_changed, 'step')}"
+        text += f"; {listed(ctrl)} is asked for"
+        if own and run.ctrl_changed is None:
+            text += " (a reset overwrites ctrl: write it after)"
+        for unit, convert in (("degrees", np.degrees), ("radians", np.radians)):
+            if near(run.ctrl, convert(ctrl), 1e-9):
+                text += f": {unit} were made of it; ctrl is in radians as it is"
+        faults["ctrl"] = text
     elif run.ctrl_changed is not None:
         faults["ctrl"] = f"ctrl was changed after step {run.ctrl_changed}: it must stay fixed"
     if run.nstep != nstep:
-        faults["steps"] = f"it took {run.nstep} steps where {nstep} are asked for"
+        faults["steps"] = f"it took {count(run.nstep, 'step')} where {nstep} are asked for"
     return faults
 
 
-def _ends(ends: list[Array], runs: tuple[Run, Run]) -> list[Remark]:
+def _ends(ends: list[Array], runs: tuple[Run, ...]) -> list[Remark]:
     """Whether what was returned is what the runs ended in."""
     for name, given, run in zip(_COUNT, ends, runs, strict=True):
         if same_bits(given, run.end):
             continue
         away = float(abs(given - run.end).max())
+        rounding = grain(given)
         if same_bits(given, run.qpos):
             why = "that is qpos at the start"
         elif same_bits(given, runs[0].end):
             why = "the first run was returned twice"
+        elif same_bits(given, runs[1].end):
+            why = "that is the end of the second run"
+        elif rounding and away <= rounding * 1.001:
+            why = "was it rounded? Every bit counts here"
         elif away < 1e-3:
             why = "was it rounded, or read before the last step?"
         else:

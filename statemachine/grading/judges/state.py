@@ -11,9 +11,10 @@ from typing import Any
 from ...interface import Model
 from ...records import JointType
 from ...verbs import make_data, reset
-from ..calls import FaultError, Function, Remark, call
+from ..answers import Answer, kind
+from ..calls import FaultError, Remark
 from ..worlds import ELSEWHERE, Scenes, World
-from ._values import kind, parts
+from ._values import count, parts
 
 SCENE = "so101/scene_box"
 
@@ -34,12 +35,13 @@ class Layout:
 
 def worlds(scenes: Scenes) -> list[World]:
     """The course's scene; a crate before the arm, and a keyframe with another time."""
-    course, crowded = scenes.ordinary(SCENE), scenes.crowded(SCENE)
-    usual = _time(course)
-    return [
-        World("", course, (), Layout(_slots(course), usual, usual)),
-        World(ELSEWHERE, crowded, (), Layout(_slots(crowded), _time(crowded), usual)),
-    ]
+    return [World("", scenes.ordinary(SCENE)), World(ELSEWHERE, scenes.crowded(SCENE))]
+
+
+def right(worlds: list[World]) -> list[Layout]:
+    """The layout of each."""
+    usual = _time(worlds[0].model)
+    return [Layout(_slots(world.model), _time(world.model), usual) for world in worlds]
 
 
 def _slots(model: Model) -> dict[str, tuple[Slot, Slot]]:
@@ -57,22 +59,18 @@ def _time(model: Model) -> float:
         return data.time
 
 
-def judge(function: Function, world: World) -> list[Remark]:
+def judge(answer: Answer, world: World, right: Layout) -> list[Remark]:
     """A pair of slices for every joint, and the time."""
-    layout: Layout = world.expected
-    result, _ = call(function, world)
-    slots, time = parts(result, 2, "(slots, time)")
-    remarks = [*_names(slots, layout), *_first_wrong(slots, layout, world.model)]
-    remarks += _clock(time, layout, world.model)
+    slots, time = parts(answer.result, 2, "(slots, time)")
+    remarks = [*_names(slots, right), *_first_wrong(slots, right, world.model)]
+    remarks += _clock(time, right, world.model, bool(answer.runs))
     if remarks:
         return remarks
-    frees = [
-        name for name, (one, two) in layout.slots.items() if one[1] - one[0] != two[1] - two[0]
-    ]
+    frees = [name for name, (one, two) in right.slots.items() if one[1] - one[0] != two[1] - two[0]]
     return [
         Remark(
-            f"the slots of all {len(layout.slots)} joints, {', '.join(frees)} with 7 numbers in "
-            f"qpos and 6 in qvel; {layout.time:g} s at keyframe 0",
+            f"the slots of all {len(right.slots)} joints, {', '.join(frees)} with 7 numbers in "
+            f"qpos and 6 in qvel; {right.time:g} s at keyframe 0",
             True,
         )
     ]
@@ -104,7 +102,8 @@ def _first_wrong(slots: dict[str, Any], layout: Layout, model: Model) -> list[Re
         if name not in slots:
             continue
         pair = parts(slots[name], 2, f"{name}: (slice of qpos, slice of qvel)")
-        given = [_slot(each, name) for each in pair]
+        totals = (model.nq, model.nv)
+        given = [_slot(each, name, total) for each, total in zip(pair, totals, strict=True)]
         for which, array in enumerate(("qpos", "qvel")):
             if given[which] != right[which]:
                 start, stop = given[which]
@@ -116,13 +115,16 @@ def _first_wrong(slots: dict[str, Any], layout: Layout, model: Model) -> list[Re
     return []
 
 
-def _slot(value: Any, name: str) -> Slot:
+def _slot(value: Any, name: str, total: int) -> Slot:
+    """Where a slice of an array of so many numbers begins and ends."""
     if not isinstance(value, slice) or value.step not in (None, 1):
         raise FaultError(f"{name}: a pair of slices is asked for; got {kind(value)}")
     try:
-        return operator.index(value.start or 0), operator.index(value.stop)
+        start = 0 if value.start is None else operator.index(value.start)
+        stop = total if value.stop is None else operator.index(value.stop)
     except TypeError:
         raise FaultError(f"{name}: a slice wants two whole numbers; got {value}") from None
+    return (start + total if start < 0 else start), (stop + total if stop < 0 else stop)
 
 
 def _why(name: str, given: list[Slot], which: int, layout: Layout, model: Model) -> str:
@@ -140,7 +142,10 @@ def _why(name: str, given: list[Slot], which: int, layout: Layout, model: Model)
             return "a place has three numbers and a quaternion four: seven in qpos, not six"
         if stop == ends - 1:
             return "a slice ends one after the last number"
-        return f"it begins at the right place and has {stop - start} numbers, not {ends - begins}"
+        return (
+            f"it begins at the right place and has {count(stop - start, 'number')}, "
+            f"not {ends - begins}"
+        )
     if start == right[1 - which][0]:
         return f"that is where it begins in {('qvel', 'qpos')[which]}; see {table}"
     if start == number:
@@ -151,7 +156,7 @@ def _why(name: str, given: list[Slot], which: int, layout: Layout, model: Model)
     return f"it begins elsewhere: see {table}, no arithmetic"
 
 
-def _clock(time: Any, layout: Layout, model: Model) -> list[Remark]:
+def _clock(time: Any, layout: Layout, model: Model, stepped: bool) -> list[Remark]:
     right = layout.time
     if not isinstance(time, Real) or isinstance(time, bool):
         return [Remark(f"time: a number of seconds is asked for; got {kind(time)}")]
@@ -165,6 +170,6 @@ def _clock(time: Any, layout: Layout, model: Model) -> list[Remark]:
         text += f": that is keyframe {next(k for k, each in others.items() if each == time)}"
     elif time == layout.course_time:
         text += ": that is the course's own scene; ask the model that you got"
-    elif abs(float(time) - right) < 1:
+    elif stepped:
         text += ": read it right after the reset, before any step"
     return [Remark(text)]

@@ -1,4 +1,8 @@
-"""A test file against the healthy arm, then against every mutant, each in a process of its own."""
+"""A test file against the healthy arm, then against every mutant, each in a process of its own.
+
+The tests and what records them share a process: tests that look into it can learn that there is
+a fault without looking at the arm, or write the record themselves.
+"""
 
 from __future__ import annotations
 
@@ -7,20 +11,26 @@ import json
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ...backends import backend_names
 from ...engines import engine_version, require
 from ...errors import BadInputError, EngineError, MissingEngineError, ModelFileError, unknown_name
 from .. import sandbox
+from ..recording import content
+from ..unwinding import unwinding
 from . import BACKENDS, FAULT, MUTANTS, Mutant
 
-_SECONDS = 60.0  # for the tests on the healthy arm
-# Under a fault they may take longer, and the machine may be busy with others.
-_TIMES, _AND = 5.0, 15.0
+_SECONDS = 60.0  # of computing, for the tests on the healthy arm
+_CLOCK = 300.0  # on the clock: the machine may be busy with others
+# Under a fault they may take longer: so many times as long, and so many seconds more.
+_TIMES, _AND, _CLOCK_AND = 5.0, 15.0, 120.0
+_RECORD_MOST = 10_000_000  # bytes
 _IMPORT = "the import of the file"
 _OWN = ("PYTEST_ADDOPTS", "PYTEST_PLUGINS", "PYTEST_DEBUG")  # settings of another pytest
 
@@ -92,6 +102,7 @@ def examine(
     backend: str = "mujoco",
     only: Sequence[str] = (),
     seconds: float = _SECONDS,
+    clock: float = _CLOCK,
     progress: Callable[[float], None] = lambda _fraction: None,
 ) -> Examination:
     """Run a student's tests on the healthy arm and on every mutant.
@@ -100,7 +111,8 @@ def examine(
         file: Tests as pytest takes them.
         backend: What the fixture `model` is loaded on.
         only: Names of mutants; none for all.
-        seconds: What the tests may take on the healthy arm.
+        seconds: What the tests may compute on the healthy arm [s].
+        clock: What they may take there on the clock, from when the arm is ready [s].
         progress: Told the fraction that is done.
 
     Raises:
@@ -113,7 +125,20 @@ def examine(
     path = _test_file(file)
     mutants = [_mutant(name) for name in dict.fromkeys(only or MUTANTS)]
     version = _ready(backend)
-    healthy = _run(path, backend, None, seconds)
+    with unwinding():
+        return _examine(path, backend, version, mutants, seconds, clock, progress)
+
+
+def _examine(
+    path: Path,
+    backend: str,
+    version: str,
+    mutants: Sequence[Mutant],
+    seconds: float,
+    clock: float,
+    progress: Callable[[float], None],
+) -> Examination:
+    healthy = _run(path, backend, None, seconds, clock)
     if healthy.broken:
         raise BadInputError(f"{path.name} cannot be imported: {healthy.broken}")
     if not healthy.tests:
@@ -122,15 +147,19 @@ def examine(
     trials: dict[str, Trial] = {}
     if not healthy.failures:
         progress(1 / (len(mutants) + 1))
-        patience = _TIMES * healthy.wall + _AND
+        patience = _TIMES * healthy.cpu + _AND, _TIMES * healthy.wall + _CLOCK_AND
+        stop = threading.Event()
         pool = ThreadPoolExecutor(os.cpu_count() or 1)
         try:
-            running = {pool.submit(_run, path, backend, m.name, patience): m for m in mutants}
+            running = {
+                pool.submit(_run, path, backend, m.name, *patience, stop): m for m in mutants
+            }
             for done in as_completed(running):
                 mutant = running[done]
                 trials[mutant.name] = Trial(mutant, done.result().failures)
                 progress((len(trials) + 1) / (len(mutants) + 1))
-        finally:  # those that have not begun, after an interrupt, never will
+        finally:  # after an interrupt nothing goes on
+            stop.set()
             pool.shutdown(cancel_futures=True)
     return Examination(
         file=path.name,
@@ -182,10 +211,18 @@ class _Record:
     skipped: int
     failures: tuple[Failure, ...]
     broken: str
+    cpu: float
     wall: float
 
 
-def _run(path: Path, backend: str, fault: str | None, seconds: float) -> _Record:
+def _run(
+    path: Path,
+    backend: str,
+    fault: str | None,
+    seconds: float,
+    clock: float,
+    stop: threading.Event | None = None,
+) -> _Record:
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         here = Path(folder)
         settings, record = here / "pytest.ini", here / "record"
@@ -197,8 +234,17 @@ def _run(path: Path, backend: str, fault: str | None, seconds: float) -> _Record
         command += ["-p", f"{__package__}.plugin", "--engine", backend, "--record", str(record)]
         command += [os.path.join(os.curdir, path.name)]  # brackets in a whole path confuse pytest
         env = _environment() | ({FAULT: fault} if fault else {})  # where no test looks for it
-        outcome = sandbox.run(command, seconds=seconds, cwd=path.parent, env=env)
-        return _read(record, outcome, seconds)
+        outcome = sandbox.run(
+            command,
+            cpu=seconds,
+            wall=clock,
+            started=lambda: record.stat().st_size > 0,
+            cwd=path.parent,
+            env=env,
+            writable=folder,
+            stop=stop,
+        )
+        return _read(record, outcome, seconds, clock)
 
 
 def _environment() -> dict[str, str]:
@@ -215,51 +261,67 @@ def _environment() -> dict[str, str]:
     }
 
 
-def _read(record: Path, outcome: sandbox.Outcome, seconds: float) -> _Record:
+def _read(record: Path, outcome: sandbox.Outcome, seconds: float, clock: float) -> _Record:
     tests: list[str] | None = None
     ready = False
     running, broken = "", ""
     ended: list[str] = []
     skipped: set[str] = set()
     failures: dict[str, str] = {}
-    for line in record.read_text(encoding="utf-8").splitlines():
-        match json.loads(line):
-            case {"ready": _}:
+    for found in _lines(record):
+        match found:
+            case {"ready": True}:
                 ready = True
-            case {"tests": names}:
+            case {"tests": [*names]} if all(isinstance(name, str) for name in names):
                 tests = names
-            case {"began": name}:
+            case {"began": str(name)}:
                 running = name
-            case {"failed": name, "why": why}:
+            case {"failed": str(name), "why": str(why)}:
                 failures.setdefault(name, why)  # the test itself, before its teardown
-            case {"skipped": name}:
+            case {"skipped": str(name)}:
                 skipped.add(name)
-            case {"ended": name}:
+            case {"ended": str(name)}:
                 ended.append(name)
-            case {"broken": why}:
+            case {"broken": str(why)}:
                 broken = why
+            case _:
+                raise BadInputError("the tests wrote into the record of what they do")
     if not ready:  # of which no test can be the reason
         lines = outcome.stderr.strip().splitlines()
         said = [line for line in lines if "rror" in line] or lines or ["it said nothing"]
-        raise EngineError(f"pytest {_end(outcome, seconds)} before the tests: {said[-1]}")
+        raise EngineError(f"pytest {_end(outcome, seconds, clock)} before the tests: {said[-1]}")
     if broken or tests is None:
-        broken = broken or f"it {_end(outcome, seconds)}"
+        broken = broken or f"it {_end(outcome, seconds, clock)}"
         failures[_IMPORT] = broken
     elif len(ended) < len(tests):  # one ended them all
-        failures.setdefault(running or tests[0], _end(outcome, seconds))
+        failures.setdefault(running or tests[0], _end(outcome, seconds, clock))
     return _Record(
         tests=tuple(test for test in tests or () if test not in skipped),
         skipped=len(skipped),
         failures=tuple(Failure(test, why) for test, why in failures.items()),
         broken=broken,
+        cpu=outcome.cpu,
         wall=outcome.wall,
     )
 
 
-def _end(outcome: sandbox.Outcome, seconds: float) -> str:
+def _lines(record: Path) -> Iterator[Any]:
+    """What the lines of a record say; None for one that says nothing."""
+    for line in content(record, _RECORD_MOST).splitlines():
+        try:
+            yield json.loads(line)
+        except (ValueError, RecursionError):
+            yield None
+
+
+def _end(outcome: sandbox.Outcome, seconds: float, clock: float) -> str:
     """How a run ended that did not come to its end."""
+    if outcome.out_of_cpu:
+        return f"took longer than {seconds:.0f} s of computing"
+    if outcome.flooded:
+        return "wrote without end"
     if outcome.timed_out:
-        return f"took longer than {seconds:.0f} s"
+        return f"took longer than {clock:.0f} s on the clock, and computed for {outcome.cpu:.0f} s"
     if outcome.out_of_memory:
         return "took more memory than it may"
     if outcome.signal is not None:
