@@ -62,6 +62,10 @@ class ClosedDataError(StateMachineError, RuntimeError):
     """A Data was used after `close`."""
 
 
+class BusyDataError(StateMachineError, RuntimeError):
+    """A Data was used while another thread was using it."""
+
+
 class DivergedError(StateMachineError, ArithmeticError):
     """A coordinate stopped being finite while the engine stepped."""
 
