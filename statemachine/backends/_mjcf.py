@@ -13,6 +13,8 @@ import numpy as np
 from ..errors import BadInputError, ModelError
 from ..model import Model
 from ..records import Array, Keyframe
+from ._mjb import check_binary
+from ._mjcf_numbers import problems
 
 _DISABLE = mujoco.mjtDisableBit
 _SWITCHES = {  # option of `replace` -> the flag that turns it off
@@ -33,16 +35,21 @@ def compile_file(path: str | os.PathLike[str]) -> mujoco.MjModel:
     """Compile an MJCF, URDF or MJB file.
 
     Raises:
-        ModelError: MuJoCo cannot compile the file; with its reason.
+        ModelError: MuJoCo cannot compile the file, or what it holds makes no simulation; with
+            the reason.
     """
     text = os.fspath(path)
+    binary = text.lower().endswith(".mjb")
+    if binary:
+        check_binary(text)
     try:
-        if text.lower().endswith(".mjb"):
-            return mujoco.MjModel.from_binary_path(text)
-        return mujoco.MjModel.from_xml_path(text)
-    except (ValueError, mujoco.FatalError) as error:
-        reason = " ".join(str(error).split())
+        raw = (mujoco.MjModel.from_binary_path if binary else mujoco.MjModel.from_xml_path)(text)
+    except (ValueError, MemoryError, mujoco.FatalError) as error:
+        reason = " ".join(str(error).split()) or "out of memory"
         raise ModelError(f"MuJoCo cannot read {text}: {reason}") from error
+    for problem in problems(raw):
+        raise ModelError(f"{text}: {problem}")
+    return raw
 
 
 def edited(raw: mujoco.MjModel, options: dict[str, Any]) -> mujoco.MjModel:

@@ -167,7 +167,8 @@ class Alarms:
         # Without a reset what is bad stays bad: each step since the first has counted.
         steps = 1 if resets else max(fatal.values())
         quantity = next(name for name in fatal if resets or fatal[name] == steps)
-        time = float(raw.time) if resets else float(raw.time - steps * opt.timestep)
+        # Without the last digits, which are those of a long sum.
+        time = float(raw.time) if resets else round(raw.time - steps * opt.timestep, 9)
         index = int(self._now[_FATAL[quantity], 0])
         if trusted and (resets or steps > 1):
             for text in reversed(list(_TEXTS)):

@@ -129,10 +129,16 @@ class MujocoModel(Model):
         )
 
     def _make_data(self) -> MujocoData:
-        return MujocoData(self)
+        try:
+            return MujocoData(self)
+        except (MemoryError, mujoco.FatalError) as error:
+            raise _gave_up(error) from error
 
     def _replace(self, options: dict[str, Any]) -> MujocoModel:
-        raw = edited(self.raw, options)
+        try:
+            raw = edited(self.raw, options)
+        except (MemoryError, mujoco.FatalError) as error:
+            raise _gave_up(error) from error
         if "integrator" in options:
             raw.opt.integrator = int(_INTEGRATORS[options["integrator"]])
         substeps = options.get("substeps", self.substeps)
@@ -242,9 +248,9 @@ class MujocoData(Data):
 
     def _failed(self, error: Exception) -> None:
         if isinstance(error, mujoco.FatalError):
-            reason = " ".join(str(error).split())
-            self._give_up(f"MuJoCo gave up: {reason}")
-            raise EngineError(f"MuJoCo gave up: {reason}") from error
+            gave_up = _gave_up(error)
+            self._give_up(str(gave_up))
+            raise gave_up from error
         if isinstance(error, AlarmError):
             self._raise(error.quantity, error.index, error.time)
 
@@ -265,6 +271,10 @@ class MujocoData(Data):
             "This Data now takes only reset and set_state",
             **facts,
         ) from None
+
+
+def _gave_up(error: Exception) -> EngineError:
+    return EngineError(f"MuJoCo gave up: {' '.join(str(error).split()) or 'out of memory'}")
 
 
 def _transition(model: MujocoModel, raw: mujoco.MjData, alarms: Alarms) -> Callable[..., None]:
