@@ -109,7 +109,7 @@ class EngineWarning(UserWarning):
 
 def shown(value: object) -> str:
     """What somebody gave, on one line of a message."""
-    text = " ".join(repr(value).split())
+    text = " ".join("".join(c if c.isprintable() else " " for c in repr(value)).split())
     return text if len(text) <= 200 else f"{text[:197]}..."
 
 

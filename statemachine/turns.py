@@ -9,6 +9,7 @@ Model, that it is usable, and that nobody else uses it.
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -42,37 +43,54 @@ def alone(
     turn, held = data._turn, False
     key = (even_troubled and data._trouble) or data._home
     try:
-        # fmt: off
-        del turn[key]; held = True  # noqa: E702  (between two lines a debugger may interrupt)
-        # fmt: on
+        try:
+            del turn[key]
+            held = True
+        except KeyError:
+            if not even_troubled:
+                data._refuse_if_troubled()
+            with _LOCK:
+                if not _in_use_here(data):
+                    if not even_troubled:  # once more: another thread may have ended just now
+                        data._refuse_if_troubled()
+                    turn.clear()
+                    held = True
         return call(*args)
     except Exception as error:
         if held:
             data._failed(error)
-            raise
-        if not isinstance(error, KeyError):
-            raise
+        raise
     finally:
         if held:
             turn[data._trouble or data._home] = True
-    if not even_troubled:
-        data._refuse_if_troubled()
-    refuse_if_busy(data)
-    return call(*args)
 
 
-def refuse_if_busy(data: Data) -> None:
-    """Raise BusyDataError unless it is this thread that uses `data`: a callback, or a hook."""
-    frame: Any = sys._getframe(1)
-    while frame is not None:
-        if frame.f_code in HOLDERS and frame.f_locals["data"] is data and frame.f_locals["held"]:
-            return
-        frame = frame.f_back
-    raise BusyDataError(
-        "another thread is using this Data: a Data belongs to one thread at a time. Make one "
-        "for each thread (a Model can be shared), or take a lock around every use"
-    )
+def _in_use_here(data: Data) -> bool:
+    """Whether this thread is using `data` already: in a callback, a hook, a signal handler.
+
+    The key is gone. So somebody uses the Data, or was interrupted between taking it and
+    giving it back; the stacks tell which.
+
+    Raises:
+        BusyDataError: It is another thread.
+    """
+    here = threading.get_ident()
+    for thread, top in sys._current_frames().items():
+        frame: Any = top
+        while frame is not None:
+            if frame.f_code in HOLDERS and frame.f_locals.get("data") is data:
+                if thread != here:
+                    raise BusyDataError(
+                        "another thread is using this Data: a Data belongs to one thread at a "
+                        "time. Make one for each thread (a Model can be shared), or take a lock "
+                        "around every use"
+                    )
+                if frame.f_locals.get("held"):
+                    return True
+            frame = frame.f_back
+    return False
 
 
+_LOCK = threading.Lock()
 # The functions that take a Data: each has the locals `data` and `held`.
 HOLDERS = {alone.__code__}

@@ -58,9 +58,8 @@ def step(model: Model, data: Data, nstep: int = 1) -> None:
         nstep = as_count(nstep, "nstep")
     try:  # as `alone`, but in line, which is faster
         turn = data._turn
-        # fmt: off
-        del turn[model]; held = True  # noqa: E702  (between two lines a debugger may interrupt)
-        # fmt: on
+        del turn[model]
+        held = True
         data._advance(nstep)
         return
     except Exception as error:

@@ -166,7 +166,7 @@ class MujocoData(Data):
         facts = {"_raw": raw, "_views": views, "_layout": _layout(model), "_alarms": alarms}
         for name, value in facts.items():
             object.__setattr__(self, name, value)
-        inputs = {name: getattr(raw, name) for name in INPUTS}
+        inputs = {name: getattr(raw, name).view() for name in INPUTS}
         super().__init__(model, _transition(model, raw, alarms), inputs)
 
     @property
