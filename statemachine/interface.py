@@ -20,12 +20,12 @@ from .checks import as_scalar, as_vector
 from .errors import ClosedDataError, DivergedError, ReadOnlyError
 from .model import OPTIONS, Model
 from .records import INPUTS, Array, Contacts, State, read_only
-from .turns import alone
+from .turns import Turn, alone
 
 __all__ = ["OPTIONS", "Data", "Model"]
 
 # By name, so that type checkers take the inputs for the descriptors below.
-_SLOTS = ("_home", "_turn", "_trouble", "_advance", *INPUTS)
+_SLOTS = ("_home", "_turn", "_trouble", "_advance", "_warned", "_told", *INPUTS)
 
 if TYPE_CHECKING:
 
@@ -69,9 +69,11 @@ class Data(ABC):
     __slots__ = _SLOTS
 
     _home: Model  # the owner
-    _turn: dict[object, bool]  # see `turns`
+    _turn: Turn
     _trouble: str  # why the Data refuses; "" if it does not
-    _advance: Callable[..., None]  # the engine's own step: (nstep=1); raises what went wrong
+    _advance: Callable[..., None]  # the engine's own step: (nstep=1)
+    _warned: Any  # differs from `_told` when the engine has something to say
+    _told: Any
     if TYPE_CHECKING:
         qpos = _Input()
         qvel = _Input()
@@ -89,6 +91,7 @@ class Data(ABC):
         model: Model,
         advance: Callable[..., None],
         inputs: Mapping[str, Array],
+        warnings: tuple[Any, Any] = (None, None),
     ) -> None:
         """Fill the slots; a backend's own `__init__` calls this.
 
@@ -97,9 +100,14 @@ class Data(ABC):
             advance: The engine's own step, called with a number of steps or, for
                 one, with nothing.
             inputs: The arrays qpos, qvel and ctrl, the same for the whole life.
+            warnings: Two things of the engine's; when they differ after a step, the verb
+                calls `_attend`.
         """
-        for name, value in (("_home", model), ("_advance", advance), ("_turn", {model: True})):
-            object.__setattr__(self, name, value)
+        object.__setattr__(self, "_home", model)
+        object.__setattr__(self, "_advance", advance)
+        object.__setattr__(self, "_turn", Turn(model))
+        object.__setattr__(self, "_warned", warnings[0])
+        object.__setattr__(self, "_told", warnings[1])
         for name in INPUTS:
             object.__setattr__(self, name, inputs[name])
         self._recover()
@@ -200,7 +208,8 @@ class Data(ABC):
             view = getattr(self, name)
             object.__setattr__(self, name, read_only(view))
             view.setflags(write=False)
-        object.__setattr__(self, "_advance", None)
+        for name in ("_advance", "_warned", "_told"):
+            object.__setattr__(self, name, None)
         self._close()
 
     def __enter__(self) -> Data:
@@ -261,6 +270,9 @@ class Data(ABC):
 
     def _recover(self) -> None:
         object.__setattr__(self, "_trouble", "")
+
+    def _attend(self) -> None:  # noqa: B027  (optional hook)
+        """Raise, or pass on, what the engine warned of since the last time."""
 
     def _failed(self, error: Exception) -> None:  # noqa: B027  (optional hook)
         """Raise what `error`, out of the engine, means for this Data, if it means more."""

@@ -1,9 +1,8 @@
 """One thread at a time: who uses a Data takes it, and gives it back.
 
-`data._turn` is a dict with one key while the Data is free, and empty while it is used. The
-key is its Model, or the reason why it refuses. To delete the key is to take the Data; a
-second thread finds none. So a step needs one deletion to know that the Data belongs to the
-Model, that it is usable, and that nobody else uses it.
+Each Data has a `Turn`. To delete what is in it is to take the Data, which only one thread
+can do; a second one finds nothing. So a step learns from one attribute that the Data belongs
+to the Model, that it is usable, and that nobody else uses it.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from .errors import BusyDataError
@@ -19,6 +19,22 @@ if TYPE_CHECKING:
     from .interface import Data
 
 T = TypeVar("T")
+
+
+class Turn:
+    """Whose turn it is.
+
+    Attributes:
+        free: While nobody uses the Data its Model, or the reason why it refuses; nothing at
+            all while somebody does.
+    """
+
+    __slots__ = ("free",)
+
+    free: object
+
+    def __init__(self, free: object) -> None:
+        self.free = free
 
 
 def alone(
@@ -44,16 +60,20 @@ def alone(
     key = (even_troubled and data._trouble) or data._home
     try:
         try:
-            del turn[key]
-            held = True
-        except KeyError:
+            if turn.free is key:
+                del turn.free
+                held = True
+        except AttributeError:  # nothing is there
+            pass
+        if not held:
             if not even_troubled:
                 data._refuse_if_troubled()
             with _LOCK:
                 if not _in_use_here(data):
                     if not even_troubled:  # once more: another thread may have ended just now
                         data._refuse_if_troubled()
-                    turn.clear()
+                    with suppress(AttributeError):
+                        del turn.free
                     held = True
         return call(*args)
     except Exception as error:
@@ -62,13 +82,13 @@ def alone(
         raise
     finally:
         if held:
-            turn[data._trouble or data._home] = True
+            turn.free = data._trouble or data._home
 
 
 def _in_use_here(data: Data) -> bool:
     """Whether this thread is using `data` already: in a callback, a hook, a signal handler.
 
-    The key is gone. So somebody uses the Data, or was interrupted between taking it and
+    Nothing is in its turn. So somebody uses the Data, or was interrupted between taking it and
     giving it back; the stacks tell which.
 
     Raises:

@@ -54,25 +54,34 @@ def step(model: Model, data: Data, nstep: int = 1) -> None:
         ClosedDataError: `data` is closed.
     """
     held = False
-    if nstep is not _ONE:  # by identity, which True and 1.0 do not pass
-        nstep = as_count(nstep, "nstep")
     try:  # as `alone`, but in line, which is faster
         turn = data._turn
-        del turn[model]
-        held = True
-        data._advance(nstep)
-        return
+        if turn.free is model:
+            del turn.free
+            held = True
+            if nstep is _ONE:  # by identity, which True and 1.0 do not pass
+                data._advance()
+            else:
+                data._advance(as_count(nstep, "nstep"))
+            if data._warned != data._told:
+                data._attend()
+            return
     except Exception as error:
         if held:
             data._failed(error)
             raise
-        if not isinstance(error, (AttributeError, KeyError, TypeError)):
+        if not isinstance(error, AttributeError):
             raise
     finally:
         if held:
-            turn[data._trouble or model] = True
+            turn.free = data._trouble or model
     _admit(model, data)
-    alone(data, data._advance, nstep)
+    alone(data, _step, data, as_count(nstep, "nstep"))
+
+
+def _step(data: Data, nstep: int) -> None:
+    data._advance(nstep)
+    data._attend()
 
 
 HOLDERS.add(step.__code__)

@@ -101,6 +101,7 @@ class HiddenData(Data):
         try:
             try:
                 self._world._advance(nstep)
+                self._world._attend()
             except Exception as error:
                 self._world._failed(error)
                 raise

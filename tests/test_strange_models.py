@@ -99,11 +99,11 @@ def test_a_binary_model_that_crashes_a_process_is_refused(
 ) -> None:
     crash = "import ctypes; ctypes.string_at(0)"
     monkeypatch.setattr(_mjb, "_CODE", crash)
-    with pytest.raises(ModelError, match="damaged.*compile it anew"):
+    with pytest.raises(ModelError, match=r"damaged.*compile it anew"):
         sm.load(binary)
     monkeypatch.setattr(_mjb, "_CODE", "import time; time.sleep(60)")
     monkeypatch.setattr(_mjb, "_SECONDS", 0.5)
-    with pytest.raises(ModelError, match="within 0.5 s"):
+    with pytest.raises(ModelError, match=r"within 0\.5 s"):
         sm.load(binary)
 
 
@@ -129,12 +129,14 @@ def test_what_is_no_name_of_a_model(model: Any) -> None:
 @pytest.mark.parametrize("word", [[], {}, None, 5, np.array([1, 2]), b"mujoco"])
 def test_what_is_no_name_of_a_backend_or_of_defaults(word: Any) -> None:
     for words in ({"backend": word}, {"defaults": word}):
-        with pytest.raises(StateMachineError, match="no (backend|defaults) named"):
+        with pytest.raises(StateMachineError, match=r"no (backend|defaults) named"):
             sm.load("so101", **words)
 
 
-@pytest.mark.parametrize("option", ["gravity", "timestep", "substeps", "armature", "damping",
-                                    "frictionloss", "limits", "integrator", "contacts"])  # fmt: skip
+@pytest.mark.parametrize(
+    "option",
+    ["gravity", "timestep", "substeps", "armature", "damping", "limits", "integrator"],
+)
 @pytest.mark.parametrize(
     "value",
     [10**400, [[1, 2], [3]], [10**400, 0, 0], np.array(["x", "y"]), np.zeros((2, 2, 2)), {}, "1",

@@ -6,6 +6,7 @@ its own buffers, seen read-only.
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -167,7 +168,7 @@ class MujocoData(Data):
         for name, value in facts.items():
             object.__setattr__(self, name, value)
         inputs = {name: getattr(raw, name).view() for name in INPUTS}
-        super().__init__(model, _transition(model, raw, alarms), inputs)
+        super().__init__(model, _transition(model, raw), inputs, (alarms.now, alarms.seen))
 
     @property
     def raw(self) -> mujoco.MjData:
@@ -208,7 +209,7 @@ class MujocoData(Data):
 
     def _recompute(self) -> None:
         mujoco.mj_forward(self._home.raw, self.raw)
-        self._alarms.attend()
+        self._attend()
 
     def _reset(self, key: int | None) -> None:
         if key is None:
@@ -246,6 +247,9 @@ class MujocoData(Data):
             object.__setattr__(self, name, None)
         self._views.clear()
 
+    def _attend(self) -> None:
+        self._alarms.attend()
+
     def _failed(self, error: Exception) -> None:
         if isinstance(error, mujoco.FatalError):
             gave_up = _gave_up(error)
@@ -277,18 +281,21 @@ def _gave_up(error: Exception) -> EngineError:
     return EngineError(f"MuJoCo gave up: {' '.join(str(error).split()) or 'out of memory'}")
 
 
-def _transition(model: MujocoModel, raw: mujoco.MjData, alarms: Alarms) -> Callable[..., None]:
-    """The engine's step, with the little that Python has to do about it."""
-    # Bound here, once: this runs at every step.
+def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:
+    """The engine's step bound to its arguments; Python runs only where it must."""
     mj_step, engine_model, substeps = mujoco.mj_step, model.raw, model.substeps
-    now, seen, attend = alarms.now, alarms.seen, alarms.attend
+    bare = functools.partial(mj_step, engine_model, raw)
+
+    def finer(nstep: int = 1) -> None:
+        if nstep * substeps >= 2**31:  # the engine counts in a C int
+            raise BadInputError(f"nstep {nstep} × {substeps} substeps is too large for one call")
+        bare(nstep * substeps)
+
+    advance = bare if substeps == 1 else finer
     qpos, low, high = memoryview(raw.qpos), -TINY, TINY
     starts = [start for _, start in model._quaternions]
-
-    def advance(nstep: int = 1) -> None:
-        mj_step(engine_model, raw, nstep)
-        if now != seen:
-            attend()
+    if not starts:
+        return advance
 
     def checked(nstep: int = 1) -> None:
         # MuJoCo takes a zero quaternion for the identity without a word. One whose first
@@ -296,20 +303,9 @@ def _transition(model: MujocoModel, raw: mujoco.MjData, alarms: Alarms) -> Calla
         for start in starts:
             if low < qpos[start] < high:
                 model._check_quaternions(raw.qpos)
-        mj_step(engine_model, raw, nstep)
-        if now != seen:
-            attend()
+        advance(nstep)
 
-    once = checked if starts else advance
-    if substeps == 1:
-        return once
-
-    def finer(nstep: int = 1) -> None:
-        if nstep * substeps >= 2**31:  # the engine counts in a C int
-            raise BadInputError(f"nstep {nstep} × {substeps} substeps is too large for one call")
-        once(nstep * substeps)
-
-    return finer
+    return checked
 
 
 def _layout(model: MujocoModel) -> tuple[str, tuple[tuple[str, int], ...]]:
