@@ -8,12 +8,12 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install -q --disable-pip-version-check
 # The first of these that exists, is new enough and can make environments. 3.11 comes
-# first because it is the newest Python for which every engine has a wheel.
+# first because PyBullet's own wheels end there; later ones take a fork's (pyproject.toml).
 PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13 python3.14; do \
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null \
 	&& { echo $$p; break; }; done)
 
-.PHONY: help lesson test test-fast test-newest check format hooks bench picture extras report urdf traces docs notebook clean
+.PHONY: help lesson test test-fast test-pythons test-newest check format hooks bench picture extras report urdf traces docs notebook clean
 
 help:
 	@sed -n 's/^# make /  make /p' Makefile
@@ -40,6 +40,20 @@ test: check
 test-fast: $(VENV)/test.stamp
 	@$(BIN)/python -m pytest -n auto -m "not slow"
 
+# make test-pythons the fast tests on each of these Pythons that is installed here
+PYTHONS ?= 3.11 3.12 3.13
+test-pythons:
+	@failed=""; for version in $(PYTHONS); do \
+	found=""; for python in python$$version "$$(uv python find $$version 2>/dev/null)" \
+	"$$(pyenv prefix $$version 2>/dev/null)/bin/python"; do \
+	"$$python" -c "import sys, venv, ensurepip; sys.exit('%d.%d' % sys.version_info[:2] != '$$version')" \
+	2>/dev/null && { found="$$python"; break; }; done; \
+	test -n "$$found" || { echo "Python $$version is not installed here: left out"; continue; }; \
+	echo "Python $$version: $$found"; \
+	{ make --no-print-directory VENV=.venv-$$version PYTHON="$$found" .venv-$$version/test.stamp \
+	&& .venv-$$version/bin/python -m pytest -n auto -m "not slow"; } || failed="$$failed $$version"; \
+	done; test -z "$$failed" || { echo "failed on Python$$failed"; exit 1; }
+
 # make test-newest  the same tests with the newest versions that pyproject.toml allows
 test-newest:
 	@rm -f .venv-newest/*.stamp
@@ -52,6 +66,7 @@ check: $(VENV)/test.stamp
 	@$(BIN)/ruff format --check .
 	@$(BIN)/lint-imports
 	@$(BIN)/pyright --pythonpath $(BIN)/python
+	@$(BIN)/check-jsonschema -q --builtin-schema vendor.github-workflows .github/workflows/*.yml
 
 # make format       put the sources into the project's format
 format: $(VENV)/test.stamp
@@ -98,7 +113,7 @@ notebook: $(VENV)/test.stamp
 
 # make clean        remove what the others made
 clean:
-	rm -rf .venv .venv-newest build dist docs/_build docs/path docs/reference docs/comparisons .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-newest .venv-3.* build dist docs/_build docs/path docs/reference docs/comparisons .pytest_cache .ruff_cache .hypothesis
 
 CONSTRAINTS ?= -c constraints.txt
 

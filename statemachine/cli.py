@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import codecs
 import difflib
 import io
 import os
@@ -17,6 +18,7 @@ from .commands import COMMANDS, lesson
 from .commands._common import BAD_INPUT, MISSING, NO_OUTPUT, PROGRAM, complain
 from .errors import EngineWarning, MissingEngineError, StateMachineError
 from .lessons import LESSONS
+from .report.terminal import spelled
 
 _SAID: set[str] = set()
 _NAMES = [command.__name__.rpartition(".")[2] for command in COMMANDS]
@@ -73,9 +75,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Closed by the caller, as by >&- or 2>&-.
     sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    codecs.register_error("spelled", spelled)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a console without Unicode must not end a lesson
-            stream.reconfigure(errors="replace")
+            stream.reconfigure(errors="spelled")
     warnings.showwarning = _show_warning
     try:
         options = _options(list(sys.argv[1:] if arguments is None else arguments))

@@ -50,7 +50,9 @@ class Data(ABC):
         qpos: (nq,) positions [rad or m]; quaternions wxyz.
         qvel: (nv,) velocities [rad/s or m/s]; of a free joint, linear in world axes,
             then angular in body axes.
-        ctrl: (nu,) commands [unit of the actuator].
+        ctrl: (nu,) commands [unit of the actuator]. A step clamps each to its range,
+            an infinite one too, and leaves the array as it is; `forward` and `get_state`
+            refuse what is not finite.
         time: simulated time [s].
     An assignment is checked before anything changes. NumPy's in-place operators
     (`data.ctrl *= x`) write first: what they leave is checked then, and by the verbs.

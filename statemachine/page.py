@@ -61,7 +61,7 @@ class Traces:
         title: What they show.
         across: What the horizontal axis is, with its unit; up: the vertical one.
         curves: (x, y) by name, each a sequence of numbers.
-        log: Whether the vertical axis is logarithmic; what is zero is left out then.
+        log: Whether the vertical axis is logarithmic; what is zero has a level below it.
     """
 
     title: str

@@ -47,8 +47,9 @@ def step(model: Model, data: Data, nstep: int = 1) -> None:
         BusyDataError: Another thread is using `data`.
         BadInputError: `nstep` is no whole number, or an input is not a number. In
             the second case the Data may have moved: it then refuses all but
-            `reset` and `set_state`. (A ctrl that is infinite lies beyond its range
-            like any other and may be clamped to it.)
+            `reset` and `set_state`. A ctrl that is infinite, written in place, is
+            clamped to its range like any other that lies beyond it; where it has no
+            range, it is refused.
         DivergedError: A coordinate stopped being finite, now or earlier.
         EngineError: The engine gave up.
         ClosedDataError: `data` is closed.
@@ -74,7 +75,7 @@ def step(model: Model, data: Data, nstep: int = 1) -> None:
             raise
     finally:
         if held:
-            turn.free = data._trouble or model
+            turn.free = data._trouble or model  # pyright: ignore[reportPossiblyUnboundVariable]
     _admit(model, data)
     alone(data, _step, data, as_count(nstep, "nstep"))
 

@@ -340,7 +340,8 @@ def test_pybullet_computes_when_it_is_read() -> None:
         "sm.forward(model, data)\nprint(data.site_xpos)\nprint(data.site_xpos)\n"
         "sm.step(model, data, 4)\nprint(data.site_xpos)",
     )
-    assert (forward.calls, forward.changed) == ((), ())
+    assert (forward.calls, forward.changed, forward.due) == ((), (), ("data",))
+    assert (read.due, again.due, step.due, late.due) == ((), (), ("data",), ())
     for line in (read, late):
         asked = {call.function: call.on for call in line.calls if call.engine == "pybullet"}
         assert asked["getLinkStates"] == "the still copy of model"
@@ -542,8 +543,9 @@ def test_a_page_shows_the_same_line_in_both_engines_words() -> None:
     code = "sm.forward(model, data)\ndata.qpos[1] = 0.8\nprint(data.qacc)\nsm.step(model, data, 7)"
     page, text = page_of("mujoco", "pybullet", code=code)
     assert max(map(len, text.splitlines())) <= 80
-    for words_ in ("pybullet: No call. Nothing changed.", "Changed: data.qpos[1], and nothing"):
+    for words_ in ("pybullet: No call yet. All that is derived", "Changed: data.qpos[1], and"):
         assert words_ in text
+    assert "pybullet: No call. Nothing changed." not in text
     assert 'backend="mujoco"' in text
     assert 'backend="pybullet"' in text
     assert "import statemachine" not in text

@@ -25,10 +25,12 @@ from statemachine.compare import (
     touches,
     witness,
 )
+from statemachine.compare.series import normal_forces, total_forces
 from statemachine.compare.tolerances import COUNT
 from statemachine.engines import available
 from statemachine.errors import BadInputError, MissingEngineError, TraceError, UnknownNameError
 from statemachine.experiments.scenarios import SCENARIOS
+from statemachine.page import Text
 from statemachine.report import compare as report
 from statemachine.report import terminal
 from statemachine.traces import Trace, record, record_scenario, write
@@ -70,7 +72,7 @@ def test_a_trace_agrees_with_itself(box: Trace) -> None:
     assert {each.max for each in found.agreements} == {0.0}
     names = set(by_name(found))
     assert {"elbow_flex", "box, position", "box, rotation", "gripperframe, position"} <= names
-    assert {"energy", "gripper – box, force", "gripper – box, first touch"} <= names
+    assert {"energy", "gripper – box, normal force", "gripper – box, first touch"} <= names
 
 
 def test_a_shifted_joint_is_found_with_its_size_and_time(hold: Trace) -> None:
@@ -131,7 +133,7 @@ def test_a_moved_and_turned_fingertip(hold: Trace) -> None:
 def test_one_blow_does_not_widen_what_a_force_may_differ(box: Trace) -> None:
     force = box["contact_force"].copy()
     force[box["contact_row"] == 40] *= 20.0
-    name = "gripper – box, force"
+    name = "gripper – box, normal force"
     calm, struck = (
         by_name(compare(one, one))[name] for one in (box, changed(box, contact_force=force))
     )
@@ -152,7 +154,9 @@ def mean_force(trace: Trace, name: str) -> float:
     header, total = trace.header, 0.0
     for pair, force in zip(trace["contact_geom"], trace["contact_force"], strict=True):
         bodies = sorted(header.geom_bodyid[geom] for geom in pair)
-        if " – ".join(header.bodies[body] for body in bodies) == name.removesuffix(", force"):
+        if " – ".join(header.bodies[body] for body in bodies) == name.removesuffix(
+            ", normal force"
+        ):
             total += force[0]
     return float(total / len(trace))
 
@@ -194,6 +198,46 @@ def test_what_becomes_of_a_contact(box: Trace, hold: Trace) -> None:
     other = found["moving_jaw_so101_v1 – box"].one
     assert grip.force == pytest.approx(other.force, rel=0.05)
     assert touches(hold, box)[0].two.first is None
+
+
+def test_the_whole_force_of_a_contact_is_the_engines(box: Trace) -> None:
+    """Friction and all, added as vectors; on the box the two jaws and its weight balance."""
+    model = sm.load("so101/scene_box")
+    row = len(box) - 1
+    with sm.make_data(model) as data:
+        data.qpos, data.qvel, data.ctrl = box.qpos[row], box.qvel[row], box.ctrl[row]
+        sm.forward(model, data)
+        found: dict[tuple[int, ...], Any] = {}
+        for geoms, frame, force in zip(
+            data.contacts.geom, data.contacts.frame, data.contacts.force, strict=True
+        ):
+            bodies = [int(model.geom_bodyid[geom]) for geom in geoms]
+            push = frame.reshape(3, 3).T @ force * (1 if bodies[0] < bodies[1] else -1)
+            found[tuple(sorted(bodies))] = found.get(tuple(sorted(bodies)), 0.0) + push
+    given, normal = total_forces(box), normal_forces(box)
+    assert len(found) == len(given) == 2
+    for bodies, push in found.items():
+        pair = " – ".join(box.header.bodies[body] for body in bodies)
+        assert given[pair][row] == pytest.approx(np.linalg.norm(push), rel=0.02)
+    one, two = given.values()
+    # Both press alike, and together they carry the box: 96 g of friction.
+    assert one.mean() == pytest.approx(two.mean(), rel=0.05)
+    assert all(abs(given[pair] - normal[pair]).max() > 1e-3 for pair in given)
+    assert touches(box, box)[0].one.total == pytest.approx(one[-len(box) // 10 :].mean(), rel=0.01)
+
+
+def test_a_force_is_named_and_both_figures_are_given() -> None:
+    need_engine("pybullet")
+    (one, two), _ = sides_of("hold")
+    (touch,) = touches(one, two)
+    found = report.page(compare(one, two), touches=[touch])
+    text = [b.text for b in found.blocks if isinstance(b, Text)]
+    said = f"pressed with {touch.one.force:.1f} N (with friction {touch.one.total:.1f} N)"
+    assert any(said in each for each in text)
+    assert "world – gripper, normal force" in by_name(compare(one, two))
+    # The greatest that the course's page shows, and that of the vectors.
+    assert normal_forces(one)["world – gripper"].max() == pytest.approx(351, abs=1)
+    assert total_forces(one)["world – gripper"].max() == pytest.approx(383, abs=1)
 
 
 def test_the_hold_ends_pressed_on_one_engine_and_free_on_the_other() -> None:

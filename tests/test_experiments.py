@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
+import random
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +19,7 @@ from statemachine.experiments import (
     forward,
     gravity,
     hold,
+    in_turns,
     replay,
     speed,
     state,
@@ -107,9 +111,55 @@ def test_speed_runs_every_step_it_counts(monkeypatch: pytest.MonkeyPatch) -> Non
     counted: list[int] = []
     monkeypatch.setattr(speed, "step", lambda _model, _data, n=1: counted.append(n))
     found = speed.run(sm.load("so101"), steps=47)
-    assert sum(counted) == 2 * 47
+    assert sum(counted) == 3 * 47  # in bulk twice
     assert counted.count(1) >= 47
     assert found.simulated == pytest.approx(47 * 0.005)
+
+
+def _times(monkeypatch: pytest.MonkeyPatch, cost: Any) -> speed.Speed:
+    """The experiment by a clock that only `cost` of a call moves: (nstep, calls before) -> s."""
+    now, calls = [0.0], [0]
+
+    def step(_model: Any, _data: Any, n: int = 1) -> None:
+        now[0] += cost(n, calls[0])
+        calls[0] += 1
+
+    monkeypatch.setattr(speed, "step", step)
+    monkeypatch.setattr(in_turns.time, "perf_counter", lambda: now[0])
+    return speed.run(sm.load("so101"), steps=400)
+
+
+def test_what_is_smaller_than_the_noise_is_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    noise = random.Random(1)
+    equal = _times(monkeypatch, lambda n, _: n * noise.uniform(0.9, 1.4))
+    assert not equal.told_apart
+    assert equal.null.low < 1 < equal.null.high
+    # Once, something else takes the machine while it measures one way.
+    disturbed = _times(monkeypatch, lambda n, k: n * (1.0 if k != 3 else 500.0))
+    assert not disturbed.told_apart
+    assert disturbed.loop.median == 1
+    dear = _times(monkeypatch, lambda n, _: n + 0.3 + noise.uniform(-0.1, 0.1))
+    assert dear.told_apart
+    assert dear.loop.median == pytest.approx(1.28, abs=0.05)
+    assert dear.null.median == pytest.approx(1.0, abs=0.05)
+
+
+def test_few_rounds_tell_nothing() -> None:
+    ratio = in_turns.Ratio.of("dear", [3.0] * 4, [1.0] * 4)
+    null = in_turns.Ratio.of("null", [1.0] * 20, [1.0] * 20)
+    assert (ratio.median, ratio.rounds) == (3.0, 4)
+    assert not ratio.differs_from(null)
+    assert in_turns.Ratio.of("dear", [3.0] * 5, [1.0] * 5).differs_from(null)
+    assert in_turns.Ratio.of("once", [3.0], [1.0]).median == 3.0
+
+
+def test_every_way_has_its_turn_in_every_round() -> None:
+    order: list[str] = []
+    times = in_turns.in_turns({name: functools.partial(order.append, name) for name in "abc"}, 10)
+    assert {name: len(each) for name, each in times.items()} == dict.fromkeys("abc", 10)
+    turns = [tuple(order[k : k + 3]) for k in range(0, 30, 3)]
+    assert all(sorted(turn) == ["a", "b", "c"] for turn in turns)
+    assert len(set(turns)) > 1
 
 
 def test_forward_compares_bits() -> None:

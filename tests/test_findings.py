@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import threading
+from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.backends import _mujoco_alarms, mujoco_backend
-from statemachine.errors import DivergedError
+from statemachine.backends import _mjcf, mujoco_backend
+from statemachine.errors import BadInputError, DivergedError
+from statemachine.interface import Data
+
+from .conftest import need_engine
 
 
 @pytest.fixture
@@ -43,7 +47,7 @@ def test_automatic_reset_is_off_and_would_rewind_time() -> None:
     assert not native.opt.disableflags & flag
     data = mujoco.MjData(native)
     data.time, data.qpos[0] = 5.0, np.nan
-    with _mujoco_alarms.heard():
+    with _mjcf.heard():
         mujoco.mj_step(native, data)
     assert data.time < 1.0
     assert np.isfinite(data.qpos).all()
@@ -145,3 +149,47 @@ def test_without_the_floor_the_arm_goes_on_to_its_stop() -> None:
     with sm.make_data(model) as data:
         sm.step(model, data, 2000)
         assert np.degrees(data.qpos[1]) == pytest.approx(100, abs=0.5)
+
+
+@pytest.mark.parametrize("limited", [True, False])
+@pytest.mark.parametrize("huge", [np.inf, -np.inf, 1e200])
+def test_an_infinite_ctrl_is_clamped_alike(
+    backend: str, huge: float, limited: bool, tmp_path: Path
+) -> None:
+    """By MuJoCo itself, and by what stands in for it; without a range it is refused."""
+    path = tmp_path / "servo.xml"
+    reach = 'ctrlrange="-1 2"' if limited else ""
+    path.write_text(
+        "<mujoco><worldbody><body><joint name='j' damping='.1'/><geom size='.1' pos='.2 0 0'/>"
+        f"</body></worldbody><actuator><position joint='j' kp='5' {reach}/></actuator></mujoco>"
+    )
+    model = sm.load(path, backend=backend)
+    record = model.capabilities.behaviours["position servo"]
+    assert "infinite ctrl is clamped to its range, or refused" in record.note
+    with sm.make_data(model) as data, sm.make_data(model) as at_end:
+        data.ctrl[0] = huge
+        if not limited:
+            with pytest.raises(BadInputError, match=r"ctrl\[0\]"):
+                sm.step(model, data, 20)
+            return
+        at_end.ctrl[0] = 2.0 if huge > 0 else -1.0
+        for _ in range(2):
+            sm.step(model, data, 20)
+            sm.step(model, at_end, 20)
+        assert np.array_equal(data.qpos, at_end.qpos)
+        assert np.array_equal(data.qacc, at_end.qacc)
+        assert data.ctrl[0] == huge
+    for text in (sm.step.__doc__, Data.__doc__):
+        assert text
+        assert "infinite" in text
+
+
+def test_pybullet_as_it_comes_refuses_an_infinite_ctrl() -> None:
+    need_engine("pybullet")
+    model = sm.load("so101", backend="pybullet", defaults="engine")
+    note = model.capabilities.behaviours["position servo"].note
+    assert "infinite ctrl is refused" in note
+    with sm.make_data(model) as data:
+        data.ctrl[1] = np.inf
+        with pytest.raises(BadInputError, match="ctrl"):
+            sm.step(model, data)

@@ -259,6 +259,34 @@ def test_a_body_that_turns(backend: str, integrator: str, centre: str, tmp_path:
         assert ("fourth stage" in str(found)) == (backend == "mujoco")
 
 
+@pytest.mark.parametrize("name", ["qacc", "qfrc_bias"])
+def test_a_vector_counts_by_its_length(tmp_path: Path, name: str) -> None:
+    """As a position does; two joints without a name are not one vector."""
+    path = tmp_path / "body.xml"
+    path.write_text(
+        "<mujoco><worldbody><body><freejoint name='f'/><geom size='.1'/></body>"
+        "<body><joint name='b' type='ball'/><geom size='.1' pos='1 0 0'/></body>"
+        "<body><joint/><joint axis='0 1 0'/><geom size='.1' pos='1 0 0'/></body>"
+        "<body><joint name='s' type='slide'/><geom size='.1'/></body></worldbody></mujoco>"
+    )
+    model = sm.load(path)
+    units = ("m/s²", "rad/s²") if name == "qacc" else ("N", "N·m")
+
+    def found(*entries: tuple[int, float]) -> dict[str, tuple[float | None, str]]:
+        now = np.zeros(model.nv)
+        for k, value in entries:
+            now[k] = value
+        return {
+            gap.unit: (gap.size, gap.where) for gap in gaps(model, name, np.zeros(model.nv), now)
+        }
+
+    assert found((0, 1.0), (1, -2.0), (2, 2.0)) == {units[0]: (pytest.approx(3.0), "f")}
+    assert found((4, 3.0), (5, 4.0)) == {units[1]: (pytest.approx(5.0), "f")}
+    assert found((6, 3.0), (8, -4.0), (10, 4.5)) == {units[1]: (pytest.approx(5.0), "b")}
+    assert found((9, 3.0), (10, 4.0)) == {units[1]: (4.0, "")}
+    assert found((11, -1e-200)) == {units[0]: (1e-200, "s")}
+
+
 def test_going_back_is_the_inverse_of_the_engines_way() -> None:
     model = sm.load("so101/scene_box")
     random = np.random.default_rng(3)

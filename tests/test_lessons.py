@@ -19,9 +19,10 @@ import pytest
 from rich.cells import cell_len
 
 import statemachine as sm
+from statemachine.experiments.in_turns import Ratio
 from statemachine.lessons import LESSONS, STATIONS, module
 from statemachine.lessons.session import Session, Taken, load_line, page_of_lesson, play, take
-from statemachine.page import Code, Page, Printed, Question, Verdict
+from statemachine.page import Code, Page, Printed, Question, Text, Verdict
 from statemachine.report import quiz
 
 from .conftest import ROOT, Cli, need_engine
@@ -157,8 +158,29 @@ def test_the_right_choice_is_computed() -> None:
     fallen = dataclasses.replace(gravity, servos_on=gravity.servos_off)
     assert (right("gravity", gravity), right("gravity", fallen)) == (2, 0)
     speed = _take("speed", "mujoco")[1].result
-    slow = [dataclasses.replace(speed, one_by_one=speed.bulk * x) for x in (1, 3, 10)]
-    assert [right("speed", each) for each in slow] == [0, 1, 2]
+    quiet = Ratio("null", 1.0, 0.99, 1.01, 20)
+    slow = [
+        dataclasses.replace(speed, loop=Ratio("loop", x, x - 0.1, x + 0.1, 20), null=quiet)
+        for x in (0.5, 1.05, 1.5, 10)
+    ]
+    assert [right("speed", each) for each in slow] == [0, 0, 1, 2]
+
+
+def test_what_cannot_be_told_apart_is_said_so() -> None:
+    _, taken = _take("speed", "mujoco")
+    quiet = Ratio("null", 1.0, 0.99, 1.01, 20)
+    for loop, said in (
+        (Ratio("loop", 1.5, 1.4, 1.6, 20), "takes 1.50 times as long"),
+        (Ratio("loop", 1.02, 1.0, 1.04, 20), "the bulk way differs from itself by as much"),
+        (Ratio("loop", 1.5, 1.4, 1.6, 4), "4 rounds cannot tell"),
+    ):
+        page = _repage("speed", "mujoco", dataclasses.replace(taken.result, loop=loop, null=quiet))
+        assert any(said in b.text for b in page.blocks if isinstance(b, Text))
+    # The code measures the steps that the table does.
+    page, taken = _take("speed", "mujoco", steps=123)
+    assert "nstep=123" in taken.code
+    assert "calls=123" in taken.code
+    assert any("123 steps" in b.text for b in page.blocks if isinstance(b, Text))
 
 
 def test_six_questions_are_answered_by_runs(backend: str) -> None:
@@ -423,3 +445,57 @@ def test_a_station_that_says_no_is_the_exit_code_of_the_path(
 
 def test_answers_are_told_where_nobody_is_asked(cli: Cli) -> None:
     assert cli("lesson", "questions").stdout.count("Answer: ") == 6
+
+
+_SMALL = {
+    "objects": {"worlds": 2},
+    "forward": {"seconds": 0.005},
+    "hold": {"seconds": 0.005},
+    "gravity": {"seconds": 0.005, "longer": 0.0},
+    "replay": {"steps": 1},
+    "time": {"realtime": True, "seconds": 0.005},
+    "speed": {"steps": 1},
+}
+
+
+@pytest.mark.parametrize("name", _SMALL)
+def test_the_code_runs_with_the_smallest_options(name: str) -> None:
+    _, taken = _take(name, "mujoco", **_SMALL[name])
+    assert taken.printed
+    assert "Error" not in taken.printed
+
+
+@pytest.mark.parametrize("steps", [1, 40])
+@pytest.mark.parametrize("way", ["extra-step", "late-ctrl"])
+def test_broken_code_differs_as_its_page_says(way: str, steps: int) -> None:
+    _, taken = _take("replay", "mujoco", steps=steps, **{"break": way})
+    printed = float(taken.printed.split()[-1])
+    assert printed == taken.result.difference[-1] > 0
+    assert max(map(cell_len, taken.code.splitlines())) <= 76
+
+
+def test_two_worst_joints_are_named() -> None:
+    page, taken = _take("hold", "mujoco")
+    target, free = taken.result.goal, taken.result.without_contacts
+    (said,) = (b.text for b in page.blocks if isinstance(b, Text) and "contacts left out" in b.text)
+    for gaps in (taken.result.qpos[-1] - target, free - target):
+        joint = int(np.argmax(np.abs(gaps)))
+        assert f"{taken.result.joints[joint]}, by {np.degrees(abs(gaps[joint])):.2f}°" in said
+    assert "worst joint" not in said
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--from", "9", "hold"), "statemachine lesson --from time, or statemachine lesson hold"),
+        (("--from", "hold", "questions"), "statemachine lesson questions"),
+        (("time", "--seconds", "3"), "--seconds goes with --realtime"),
+    ],
+)
+def test_an_option_that_would_be_ignored_is_refused(
+    cli: Cli, words: tuple[str, ...], said: str
+) -> None:
+    done = cli("lesson", *words)
+    assert done.returncode == 2
+    assert not done.stdout
+    assert said in done.stderr

@@ -8,6 +8,7 @@ import threading
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -70,8 +71,9 @@ def test_a_divergence_is_noticed_whoever_set_the_handler(
         data.ctrl[2], before = np.nan, data.time
         with pytest.raises(BadInputError, match="elbow_flex") as caught:
             sm.step(model, data, nstep)
-        assert (caught.value.quantity, caught.value.index) == ("ctrl", 2)
-        assert caught.value.time == pytest.approx(before)
+        facts: Any = caught.value
+        assert (facts.quantity, facts.index) == ("ctrl", 2)
+        assert facts.time == pytest.approx(before)
         assert len(heard) == (handler == "a function")
         sm.reset(model, data)
         data.qvel[1] = np.nan
@@ -177,7 +179,8 @@ def test_three_threads_that_diverge_at_once_each_hear_of_their_own() -> None:
                     sm.step(model, data, 2)
                     wrong.append(f"{name} passed")
                 except (BadInputError, DivergedError) as error:
-                    if (error.quantity, error.index) != (name, k % 6):
+                    facts: Any = error
+                    if (facts.quantity, facts.index) != (name, k % 6):
                         wrong.append(f"{error} for {name}[{k % 6}]")
 
     threads = [threading.Thread(target=diverge, args=(n,)) for n in ("qpos", "ctrl", "qvel")]

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.backends import _mujoco_alarms, mujoco_backend
+from statemachine.backends import mujoco_backend
 from statemachine.errors import (
     BadInputError,
     ClosedDataError,
@@ -278,7 +278,7 @@ def test_warnings_of_compiling_come_up(tmp_path: Path, monkeypatch: pytest.Monke
     right = mujoco_backend.compile_file
 
     def noisy(path: object) -> object:
-        _mujoco_alarms._KEEP("the mesh looks odd")
+        mujoco.get_mju_user_warning()("the mesh looks odd")
         return right(path)  # pyright: ignore[reportArgumentType]
 
     monkeypatch.setattr(mujoco_backend, "compile_file", noisy)

@@ -83,15 +83,7 @@ def test_the_installed_wheel_runs_a_lesson_from_another_folder(wheel: Path, tmp_
     assert not list(elsewhere.iterdir())
 
 
-def test_requirements_name_where_wheels_exist() -> None:
-    markers = {
-        re.split(r"[><=;\s]", line)[0]: line.partition(";")[2].strip()
-        for line in PROJECT["dependencies"]
-    }
-    assert markers["mujoco"] == ""
-    for word in ("linux", "x86_64", "CPython", "3.12"):
-        assert word in markers["pybullet"]
-    assert "win32" in markers["pin"]
+def test_python_3_11_is_the_oldest() -> None:
     assert PROJECT["requires-python"] == ">=3.11"
 
 

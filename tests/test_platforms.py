@@ -2,42 +2,91 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import json
+import os
+import platform as machine
 import re
 import subprocess
 import sys
 import tomllib
 import unicodedata
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from packaging.requirements import Requirement
 
+from statemachine import engines
+from statemachine.engines import ENGINES, engine_version
+from statemachine.errors import MissingEngineError
+
 from .conftest import ROOT, Cli, need_engine
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+PINS = [line for line in (ROOT / "constraints.txt").read_text().splitlines() if line[:1] != "#"]
+NAMES = {"pybullet", "pybullet-arm64", "pin"}
 
+LINUX, LINUX_ARM = "x86_64-unknown-linux-gnu", "aarch64-unknown-linux-gnu"
+MAC, WINDOWS, WINDOWS_ARM = (
+    "aarch64-apple-darwin", "x86_64-pc-windows-msvc", "aarch64-pc-windows-msvc",
+)  # fmt: skip
 # (platform, Python) -> the engines that it has besides MuJoCo; README's table.
+FORK = "pybullet-arm64==3.2.8"
 PLATFORMS = {
-    ("x86_64-unknown-linux-gnu", "3.11"): {"pybullet", "pin"},
-    ("x86_64-unknown-linux-gnu", "3.12"): {"pin"},
-    ("x86_64-unknown-linux-gnu", "3.13"): {"pin"},
-    ("aarch64-unknown-linux-gnu", "3.11"): {"pin"},
-    ("aarch64-apple-darwin", "3.11"): {"pin"},
-    ("aarch64-apple-darwin", "3.13"): {"pin"},
-    ("x86_64-pc-windows-msvc", "3.11"): set[str](),
-    ("x86_64-pc-windows-msvc", "3.13"): set[str](),
+    (LINUX, "3.11"): {"pybullet==3.2.7", "pin"},
+    (LINUX, "3.12"): {FORK, "pin"},
+    (LINUX, "3.13"): {FORK, "pin"},
+    (LINUX, "3.14"): {"pin"},
+    (LINUX_ARM, "3.11"): {"pin"},
+    (LINUX_ARM, "3.13"): {"pin"},
+    (MAC, "3.11"): {FORK, "pin"},
+    (MAC, "3.12"): {FORK, "pin"},
+    (MAC, "3.13"): {"pybullet-arm64==3.2.7", "pin"},
+    (MAC, "3.14"): {"pin"},
+    (WINDOWS, "3.11"): {FORK},
+    (WINDOWS, "3.12"): {FORK},
+    (WINDOWS, "3.13"): {FORK},
+    (WINDOWS, "3.14"): set[str](),
 }
+_SYSTEMS = {"linux-gnu": "linux", "darwin": "darwin", "windows-msvc": "win32"}
+_MACHINES = {MAC: "arm64", WINDOWS: "AMD64", WINDOWS_ARM: "ARM64"}
 
 
-def _resolve(platform: str, python: str) -> subprocess.CompletedProcess[str]:
-    """The versions that an installer would take there, from wheels alone."""
+def _machine(platform: str) -> tuple[str, str]:
+    """What Python calls the system and the processor of a platform."""
+    processor, _, system = platform.split("-", 2)
+    return _SYSTEMS[system], _MACHINES.get(platform, processor)
+
+
+def asked(platform: str, python: str, lines: Iterable[str]) -> dict[str, Requirement]:
+    """The requirements whose markers hold there, by name; no name twice."""
+    system, machine = _machine(platform)
+    environment = {
+        "sys_platform": system,
+        "platform_machine": machine,
+        "platform_python_implementation": "CPython",
+        "python_version": python,
+    }
+    every = [Requirement(line) for line in lines]
+    found = [r for r in every if r.marker is None or r.marker.evaluate(environment)]
+    assert len({r.name for r in found}) == len(found)
+    return {r.name: r for r in found}
+
+
+def _resolve(
+    platform: str, python: str, name: str | None = None
+) -> subprocess.CompletedProcess[str]:
+    """The versions that an installer would take there, from wheels alone; of us or of another."""
     command = (
         "uv", "pip", "compile", "-q", "--no-header", "--no-annotate", "--only-binary", ":all:",
-        "--python-platform", platform, "--python-version", python, ROOT / "pyproject.toml",
+        "--python-platform", platform, "--python-version", python,
+        "-" if name else ROOT / "pyproject.toml",
     )  # fmt: skip
     done = subprocess.run(
         [sys.executable, "-m", *map(str, command)],
+        input=name,
         capture_output=True,
         text=True,
         check=False,
@@ -50,17 +99,33 @@ def _resolve(platform: str, python: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.parametrize(("platform", "python"), PLATFORMS)
 def test_markers_name_the_engines_of_each_platform(platform: str, python: str) -> None:
-    machine, system = platform.split("-", maxsplit=1)[0], platform.split("-", 2)[2]
-    environment = {
-        "sys_platform": {"linux-gnu": "linux", "darwin": "darwin", "windows-msvc": "win32"}[system],
-        "platform_machine": machine,
-        "platform_python_implementation": "CPython",
-        "python_version": python,
-    }
-    asked = [Requirement(line) for line in PROJECT["dependencies"]]
-    found = {r.name for r in asked if r.marker is None or r.marker.evaluate(environment)}
+    found = asked(platform, python, PROJECT["dependencies"])
     assert "mujoco" in found
-    assert found & {"pybullet", "pin"} == PLATFORMS[platform, python]
+    assert set(found) & NAMES == {name.partition("==")[0] for name in PLATFORMS[platform, python]}
+    pinned = asked(platform, python, PINS)
+    for wanted in PLATFORMS[platform, python]:
+        name, _, version = wanted.partition("==")
+        assert version in str(pinned[name].specifier)
+        assert pinned[name].specifier.contains(version or "4.1.0")
+        assert found[name].specifier.contains(version or "4.1.0")
+
+
+@pytest.mark.parametrize("platform", [LINUX, LINUX_ARM, MAC, WINDOWS, WINDOWS_ARM])
+@pytest.mark.parametrize("minor", [11, 12, 13, 14])
+def test_what_the_engines_say_to_install_is_what_the_markers_take(
+    platform: str, minor: int
+) -> None:
+    found = asked(platform, f"3.{minor}", PROJECT["dependencies"])
+    for engine in ENGINES.values():
+        said = [wheel for wheel in engine.wheels if wheel.fits(*_machine(platform), minor)]
+        assert {wheel.distribution for wheel in said} == set(found) & set(engine.distributions)
+        assert len(said) <= 1
+        for wheel in said:
+            if "==" in wheel.requirement:
+                assert (
+                    Requirement(wheel.requirement).specifier
+                    == found[said[0].distribution].specifier
+                )
 
 
 @pytest.mark.slow
@@ -69,9 +134,22 @@ def test_markers_name_the_engines_of_each_platform(platform: str, python: str) -
 def test_what_is_installed_needs_no_compiler(platform: str, python: str) -> None:
     done = _resolve(platform, python)
     assert done.returncode == 0, done.stderr
-    found = set(re.findall(r"^([\w-]+)==", done.stdout, re.MULTILINE))
+    found = dict(re.findall(r"^([\w-]+)==(\S+)", done.stdout, re.MULTILINE))
     assert "mujoco" in found
-    assert found & {"pybullet", "pin"} == PLATFORMS[platform, python]
+    assert set(found) & NAMES == {name.partition("==")[0] for name in PLATFORMS[platform, python]}
+    for wanted in PLATFORMS[platform, python]:
+        name, _, version = wanted.partition("==")
+        assert found[name] == version or not version
+
+
+@pytest.mark.slow
+@pytest.mark.network
+@pytest.mark.parametrize(("platform", "python"), [(LINUX_ARM, "3.12"), (WINDOWS, "3.14")])
+def test_where_pybullet_is_not_asked_for_it_has_no_wheel(platform: str, python: str) -> None:
+    """When one comes, the table can say so."""
+    for name in ENGINES["pybullet"].distributions:
+        done = _resolve(platform, python, name)
+        assert done.returncode != 0, done.stdout
 
 
 @pytest.mark.slow
@@ -96,7 +174,7 @@ def without_pybullet(tmp_path: Path) -> dict[str, str]:
         "            raise ModuleNotFoundError(f'No module named {name!r}', name=name)\n"
         "sys.meta_path.insert(0, Hide())\n"
     )
-    return {"PYTHONPATH": f"{hidden}:{ROOT}"}
+    return {"PYTHONPATH": os.pathsep.join((str(hidden), str(ROOT)))}
 
 
 def test_one_line_says_what_is_missing(cli: Cli, without_pybullet: dict[str, str]) -> None:
@@ -104,8 +182,86 @@ def test_one_line_says_what_is_missing(cli: Cli, without_pybullet: dict[str, str
     assert done.returncode == 3
     assert not done.stdout
     (line,) = done.stderr.splitlines()
-    assert "pip install pybullet" in line
-    assert "CPython 3.11" in line
+    here = engines.wheel_here(ENGINES["pybullet"])
+    assert (f"pip install {here.requirement} " if here else "no wheel for") in line
+    assert "CPython 3.11 to 3.13" in line
+
+
+@pytest.fixture
+def elsewhere(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, str, int], None]:
+    """Another machine, as far as Python tells, on which no engine is installed."""
+
+    def version(name: str) -> str:
+        raise importlib.metadata.PackageNotFoundError(name)
+
+    def go(system: str, processor: str, minor: int) -> None:
+        monkeypatch.setattr(engines.sys, "platform", system)
+        monkeypatch.setattr(machine, "machine", lambda: processor)
+        monkeypatch.setattr(machine, "system", lambda: system)
+        monkeypatch.setattr(
+            engines.sys, "version_info", SimpleNamespace(major=3, minor=minor, micro=0)
+        )
+        monkeypatch.setattr(importlib.metadata, "version", version)
+
+    return go
+
+
+def test_what_to_install_depends_on_the_machine(
+    elsewhere: Callable[[str, str, int], None],
+) -> None:
+    told = {
+        ("linux", "x86_64", 11): "pip install pybullet (",
+        ("linux", "x86_64", 13): "pip install pybullet-arm64==3.2.8 (",
+        ("win32", "AMD64", 12): "pip install pybullet-arm64==3.2.8 (",
+        ("darwin", "arm64", 13): "pip install pybullet-arm64==3.2.7 (",
+        (
+            "linux",
+            "aarch64",
+            12,
+        ): "no wheel for linux aarch64 and Python 3.12, only for Linux",
+        ("win32", "ARM64", 12): "no wheel for win32 ARM64 and Python 3.12",
+    }
+    for where, text in told.items():
+        elsewhere(*where)
+        with pytest.raises(MissingEngineError, match=re.escape(text)):
+            engine_version("pybullet")
+
+
+def test_two_distributions_at_once_are_an_error_that_says_what_to_type(
+    cli: Cli, tmp_path: Path
+) -> None:
+    need_engine("pybullet")
+    both = tmp_path / "both"
+    for name in ENGINES["pybullet"].distributions:
+        (folder := both / f"{name.replace('-', '_')}-3.2.9.dist-info").mkdir(parents=True)
+        (folder / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 3.2.9\n")
+    path = {"PYTHONPATH": os.pathsep.join((str(both), str(ROOT)))}
+    done = cli("lesson", "gravity", "--backend", "pybullet", **path)
+    assert done.returncode == 3
+    (line,) = done.stderr.splitlines()
+    assert "pybullet and pybullet-arm64 are both installed" in line
+    assert "pip uninstall -y pybullet pybullet-arm64, then pip install pybullet" in line
+    found = json.loads(cli("doctor", "--json", **path).stdout)["findings"]
+    (finding,) = (f for f in found if f["name"] == "pybullet")
+    assert not finding["works"]
+    assert "are both installed" in finding["found"]
+
+
+def test_the_record_names_the_distribution(monkeypatch: pytest.MonkeyPatch) -> None:
+    installed = {"pybullet": "3.2.7"}
+
+    def version(name: str) -> str:
+        if name not in installed:
+            raise importlib.metadata.PackageNotFoundError(name)
+        return installed[name]
+
+    monkeypatch.setattr(importlib.metadata, "version", version)
+    assert engine_version("pybullet") == "3.2.7"
+    installed = {"pybullet-arm64": "3.2.8"}
+    assert engine_version("pybullet") == "3.2.8 (pybullet-arm64)"
+    installed["pybullet"] = "3.2.7"
+    with pytest.raises(MissingEngineError, match="both installed"):
+        engine_version("pybullet")
 
 
 def test_all_goes_on_with_the_engines_that_are_there(
@@ -126,7 +282,7 @@ def test_the_doctor_calls_it_optional(cli: Cli, without_pybullet: dict[str, str]
     assert done.returncode == 0
     (finding,) = (f for f in json.loads(done.stdout)["findings"] if f["name"] == "pybullet")
     assert not finding["works"]
-    assert "pip install" in finding["found"]
+    assert re.search("pip install|no wheel", finding["found"])
 
 
 def test_with_it_every_lesson_speaks_of_both(cli: Cli) -> None:

@@ -301,13 +301,13 @@ def test_a_joint_on_its_limit_is_no_slower(tmp_path: Path) -> None:
 
     model = sm.load("so101/scene", backend="pybullet")
     solved = []
-    right = np.linalg.solve
+    right = _bullet_law.dense.factored
     with sm.make_data(model) as data, pytest.MonkeyPatch.context() as patch:
         data.ctrl[4] = 9.0  # beyond the joint's own range
         sm.step(model, data, 600)
-        patch.setattr(_bullet_law.np.linalg, "solve", lambda *a: solved.append(1) or right(*a))
+        patch.setattr(_bullet_law.dense, "factored", lambda m: solved.append(1) or right(m))
         sm.step(model, data, 100)
-    assert 100 <= len(solved) <= 400
+    assert 100 <= len(solved) - 2 * 100 <= 400  # two a step are of the mass matrices
 
 
 def test_a_variant_is_looked_at_like_a_file() -> None:

@@ -20,6 +20,7 @@ from PIL import Image
 
 import statemachine as sm
 from statemachine.compare import Comparison, compare, series, sides_of
+from statemachine.compare.series import total_forces
 from statemachine.compare.sides import Request
 from statemachine.compare.why import Attribution, Gap, Touch, Trial
 from statemachine.drawing import drawing_of
@@ -400,7 +401,13 @@ def test_who_presses_on_what(hold: Made) -> None:
     assert found.deepest == -float(one["contact_dist"].min())
     never, said = pressing_words(comparison, (one, two))
     assert never == []
-    assert f"gripper presses on floor with {mean:.1f} N" in said[0]
+    both = f"with {mean:.1f} N (with friction {found.total['gripper on floor']:.1f} N)"
+    assert f"gripper presses on floor {both}" in said[0]
+    whole = total_forces(one)["world – gripper"][360:]
+    assert found.total == {"gripper on floor": pytest.approx(whole.mean())}
+    assert whole.mean() > mean
+    said_under = "it is at most 351 N; the whole force, friction added as vectors, is at most 383 N"
+    assert said_under in page_of(hold)
     last = float(two.time[two["contact_row"][-1]])
     assert f"on pybullet nothing touches after {last:.3f} s" in said[0]
     # A side that never touches.
@@ -414,7 +421,7 @@ def test_who_presses_on_what(hold: Made) -> None:
     assert "on pybullet nothing touches at all" in said[0]
     text = page_of(of_look(one, bare, hold[3]))
     assert "On pybullet gripper never touches floor" in text
-    assert "world – gripper force over time on both sides" in text
+    assert "world – gripper normal force over time on both sides" in text
 
 
 def test_names_in_a_list_have_no_comma(hold: Made, page: Path) -> None:
@@ -423,7 +430,7 @@ def test_names_in_a_list_have_no_comma(hold: Made, page: Path) -> None:
         text = tab.locator("main").inner_text()
     assert "gripperframe rotation" in text
     assert "gripperframe, " not in text
-    assert "gripper, force" not in text
+    assert "gripper, normal force" not in text
     assert "largest difference: wrist_flex; gripperframe rotation" in text.lower()
     # One sign for minus in all figures but those of a command.
     assert not re.findall(r"(?<![\w–-])-\d|\de-\d", text)

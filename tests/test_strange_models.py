@@ -1,167 +1,108 @@
-"""Models that are no simulation, binary ones that are damaged, and arguments of the wrong kind."""
+"""Numbers of a model that nothing can be computed with are refused by name, on each engine."""
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
-from typing import Any
 
-import mujoco
-import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.backends import _mjb
-from statemachine.errors import ModelError, StateMachineError
+from statemachine.errors import ModelError
 
-ARM = (
-    "<body name='b' {body}><joint name='j' axis='0 1 0' {joint}/>"
-    "<geom name='g' size='.1' {geom}/></body>"
-)
-SERVO = "<actuator><position name='a' joint='j' {}/></actuator>"
-KEY = "<keyframe><key name='home' {}/></keyframe>"
+from .conftest import ROOT, need_engine
+
+_BODY = '<body name="arm"{}><joint name="lift"{}/><geom name="part" size="0.1"{}/></body>'
 
 
-def _text(before: str = "", after: str = "", **parts: str) -> str:
-    body = ARM.format(**({"body": "", "joint": "", "geom": ""} | parts))
-    return f"<mujoco>{before}<worldbody>{body}</worldbody>{after}</mujoco>"
+def _model(
+    body: str = "", joint: str = "", geom: str = "", before: str = "", after: str = ""
+) -> str:
+    inside = _BODY.format(body, joint, geom)
+    return f"<mujoco>{before}<worldbody>{inside}</worldbody>{after}</mujoco>"
 
 
-@pytest.mark.parametrize(
-    ("text", "named"),
-    [
-        (_text("<option timestep='nan'/>"), "timestep is nan"),
-        (_text("<option timestep='0'/>"), "timestep is 0.0"),
-        (_text("<option timestep='-1'/>"), "timestep is -1.0"),
-        (_text("<option gravity='0 0 inf'/>"), "gravity"),
-        (_text(body="pos='nan 0 0'"), r"body_pos\[1, 0\] \(b\) is nan"),
-        (_text(joint="armature='-5'"), r"dof_armature\[0\] \(j\) is -5.0"),
-        (_text(joint="range='nan nan' limited='true'"), r"jnt_range\[0, 0\] \(j\) is nan"),
-        (_text(geom="friction='nan 0 0'"), r"geom_friction\[0, 0\] \(g\) is nan"),
-        (_text(geom="mass='inf'"), r"body_\w+\[1.*\] \(b\) is inf"),
-        (_text().replace(".1", "1e200"), r"body_\w+\[1.*\] \(b\) is inf"),
-        (_text(after=SERVO.format("kp='nan'")), r"actuator_\w+\[0, \d\] \(a\) is nan"),
-        (_text(after=KEY.format("qpos='nan'")), r"key_qpos\[0, 0\] \(home\) is nan"),
-        (_text(after=KEY.format("time='nan'")), r"key_time\[0\] \(home\) is nan"),
-    ],
-)
-def test_numbers_that_make_no_simulation_are_refused_by_name(
-    tmp_path: Path, text: str, named: str
-) -> None:
-    file = tmp_path / "strange.xml"
+# The file, and how the error names what is wrong in it.
+STRANGE = {
+    "timestep NaN": (_model(before='<option timestep="nan"/>'), "timestep is nan"),
+    "timestep 0": (_model(before='<option timestep="0"/>'), "timestep is 0, .* above 0"),
+    "timestep -1": (_model(before='<option timestep="-1"/>'), "timestep is -1, .* above 0"),
+    "gravity": (_model(before='<option gravity="0 0 inf"/>'), "gravity of the options"),
+    "position": (_model(body=' pos="nan 0 0"'), "body_pos of body arm is NaN"),
+    "friction": (_model(geom=' friction="nan 1 1"'), "geom_friction of geom part is NaN"),
+    "softness": (_model(geom=' solimp="nan 1 1"'), "geom_solimp of geom part is NaN"),
+    "range": (_model(joint=' range="nan nan" limited="true"'), "jnt_range of joint lift is NaN"),
+    "armature": (_model(joint=' armature="-5"'), "dof_armature of joint lift is negative"),
+    "frictionloss": (_model(joint=' frictionloss="-1"'), "dof_frictionloss of joint lift"),
+    "kp": (
+        _model(after='<actuator><position name="servo" joint="lift" kp="nan"/></actuator>'),
+        "actuator_.*prm of actuator servo is NaN",
+    ),
+    "keyframe": (
+        _model(after='<keyframe><key name="up" qpos="nan"/></keyframe>'),
+        "key_qpos of key up is NaN",
+    ),
+}
+
+
+@pytest.mark.filterwarnings("ignore::statemachine.errors.EngineWarning")
+@pytest.mark.parametrize("backend", ["mujoco", "pybullet"])
+@pytest.mark.parametrize("name", STRANGE)
+def test_a_strange_number_is_refused_by_name(name: str, backend: str, tmp_path: Path) -> None:
+    need_engine(backend)
+    file = tmp_path / "m.xml"
+    text, named = STRANGE[name]
     file.write_text(text)
-    with pytest.raises(ModelError, match=named) as caught:
-        sm.load(file)
+    with pytest.raises(ModelError, match=f"m.xml.*{named}") as caught:
+        sm.load(file, backend=backend)
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        _text(joint="range='-inf inf' limited='true'"),
-        _text(after=SERVO.format("kp='1' forcerange='-inf inf' forcelimited='true'")),
-        _text("<option timestep='1e-6'/>", joint="armature='0' damping='-1'"),
-    ],
-)
-def test_unusual_numbers_are_not(tmp_path: Path, text: str) -> None:
-    file = tmp_path / "unusual.xml"
-    file.write_text(text)
-    assert sm.load(file).nq == 1
-
-
-def test_public_models_are_not(menagerie: Path) -> None:
-    files = sorted(menagerie.glob("*/scene.xml"))
-    assert files
-    for file in files:
-        sm.load(file)
-
-
-@pytest.fixture
-def binary(tmp_path: Path) -> Path:
-    file = tmp_path / "arm.mjb"
-    mujoco.mj_saveModel(sm.load("so101/scene_box").raw, str(file))
-    return file
-
-
-def test_a_sound_binary_model_is_tried_once(binary: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    tries, right = [], _mjb.subprocess.run
-    monkeypatch.setattr(
-        _mjb.subprocess, "run", lambda *a, **k: (tries.append(a), right(*a, **k))[1]
-    )
-    for _ in range(2):
-        model = sm.load(binary)
-        with sm.make_data(model) as data:
-            sm.step(model, data, 5)
-    assert len(tries) == 1
-
-
-def test_a_binary_model_that_crashes_a_process_is_refused(
-    binary: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    crash = "import ctypes; ctypes.string_at(0)"
-    monkeypatch.setattr(_mjb, "_CODE", crash)
-    with pytest.raises(ModelError, match=r"damaged.*compile it anew"):
-        sm.load(binary)
-    monkeypatch.setattr(_mjb, "_CODE", "import time; time.sleep(60)")
-    monkeypatch.setattr(_mjb, "_SECONDS", 0.5)
-    with pytest.raises(ModelError, match=r"within 0\.5 s"):
-        sm.load(binary)
-
-
-def test_a_binary_model_with_a_wild_number_is_refused(binary: Path) -> None:
-    """The ids of bodies that geoms belong to are read as they are in the file."""
-    raw = mujoco.MjModel.from_binary_path(str(binary))
-    ids = raw.geom_bodyid.tobytes()
-    whole = binary.read_bytes()
-    assert whole.count(ids) >= 1
-    wild = np.full_like(raw.geom_bodyid, 2**30).tobytes()
-    binary.write_bytes(whole.replace(ids, wild))
-    with pytest.raises(ModelError):
-        sm.load(binary)
-
-
-@pytest.mark.parametrize("model", [5, None, b"so101", ["so101"], 1.5, object()])
-def test_what_is_no_name_of_a_model(model: Any) -> None:
-    with pytest.raises(TypeError, match="its name or a path") as caught:
-        sm.load(model)
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("word", [[], {}, None, 5, np.array([1, 2]), b"mujoco"])
-def test_what_is_no_name_of_a_backend_or_of_defaults(word: Any) -> None:
-    for words in ({"backend": word}, {"defaults": word}):
-        with pytest.raises(StateMachineError, match=r"no (backend|defaults) named"):
-            sm.load("so101", **words)
-
-
-@pytest.mark.parametrize(
-    "option",
-    ["gravity", "timestep", "substeps", "armature", "damping", "limits", "integrator"],
-)
-@pytest.mark.parametrize(
-    "value",
-    [10**400, [[1, 2], [3]], [10**400, 0, 0], np.array(["x", "y"]), np.zeros((2, 2, 2)), {}, "1",
-     None, [None, 1, 2], np.full((40, 3), 7), object()],
-)  # fmt: skip
-def test_options_of_the_wrong_kind_are_one_line(option: str, value: Any) -> None:
-    model = sm.load("so101")
-    with pytest.raises(StateMachineError) as caught:
-        model.replace(**{option: value})
-    assert "\n" not in str(caught.value)
-
-
-def test_a_repr_of_many_lines_is_one_line_of_a_message() -> None:
-    class Lines:
-        def __repr__(self) -> str:
-            return "a\nb\x1b[31m" * 300
-
-    model = sm.load("so101")
+@pytest.mark.parametrize("backend", ["mujoco", "pybullet"])
+def test_what_compiling_warns_of_is_said_and_leaves_no_file(backend: str, tmp_path: Path) -> None:
+    """MuJoCo takes the density for a mass that is no number, and says so in a log file."""
+    need_engine(backend)
+    (tmp_path / "m.xml").write_text(_model(geom=' mass="nan"'))
+    code = f"""
+import warnings
+import statemachine as sm
+with warnings.catch_warnings(record=True) as caught:
+    warnings.simplefilter("always")
+    model = sm.load("m.xml", backend="{backend}")
     with sm.make_data(model) as data:
-        for call in (
-            lambda: sm.step(model, data, Lines()),  # pyright: ignore[reportArgumentType]
-            lambda: sm.reset(model, data, Lines()),  # pyright: ignore[reportArgumentType]
-            lambda: model.replace(limits=Lines()),
-        ):
-            with pytest.raises(StateMachineError) as caught:
-                call()
-            assert len(str(caught.value).splitlines()) == 1
-            assert "\x1b" not in str(caught.value)
+        sm.step(model, data)
+for each in caught:
+    print(each.category.__name__, each.message)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("EngineWarning MuJoCo")
+    assert "contains a 'NaN'" in done.stdout
+    if backend == "pybullet":
+        assert "m.xml" in done.stdout
+    assert [path.name for path in tmp_path.iterdir()] == ["m.xml"]
+
+
+def test_a_load_gives_back_the_handler_of_others(tmp_path: Path) -> None:
+    need_engine("pybullet")
+    mujoco = pytest.importorskip("mujoco")
+    file, heard = tmp_path / "m.xml", []
+    file.write_text(_model(geom=' mass="nan"'))
+    handler, before = heard.append, mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(handler)
+    try:
+        with pytest.warns(sm.errors.EngineWarning, match="m.xml"):
+            sm.load(file, backend="pybullet")
+        assert mujoco.get_mju_user_warning() is handler
+    finally:
+        mujoco.set_mju_user_warning(before)

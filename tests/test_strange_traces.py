@@ -59,7 +59,7 @@ def with_nan(array: Any, row: int) -> Any:
         ("site_xpos", "gripperframe, position"),
         ("site_xmat", "gripperframe, rotation"),
         ("energy", "energy"),
-        ("contact_force", "gripper – box, force"),
+        ("contact_force", "gripper – box, normal force"),
     ],
 )
 def test_what_is_no_number_never_agrees(
@@ -152,7 +152,7 @@ def test_bodies_without_names_are_told_apart(tmp_path: Path) -> None:
         for each in compare(trace, trace).agreements
         if each.kind == "force"
     }
-    assert set(force) == {"world – body 1, force", "world – body 2, force"}
+    assert set(force) == {"world – body 1, normal force", "world – body 2, normal force"}
 
 
 def test_joints_of_other_kinds_and_written_states_are_said(box: Trace) -> None:

@@ -1,7 +1,7 @@
 """Record on PyBullet every scenario of `statemachine compare`: `make traces`.
 
-PyBullet has wheels for one platform. Elsewhere its side of a comparison comes from these
-files, which are part of the package. A test records them anew and compares.
+Where PyBullet has no wheel its side of a comparison comes from these files, which are
+part of the package. A test records them anew and compares.
 """
 
 from __future__ import annotations
@@ -15,26 +15,31 @@ from statemachine.experiments.scenarios import SCENARIOS
 from statemachine.traces import Trace, record_scenario, write
 
 FOLDER = Path(__file__).resolve().parents[2] / "statemachine" / "traces" / "recorded"
-DEFAULTS: tuple[Literal["model", "engine"], ...] = ("model", "engine")
 
 
-def traces() -> dict[str, Trace]:
-    """Every trace by the name of its file."""
-    found = {}
-    for name, scenario in SCENARIOS.items():
-        for defaults in DEFAULTS:
-            model = sm.load(scenario.model, backend="pybullet", defaults=defaults)
-            typed = f"statemachine trace record {name} --backend pybullet"
-            typed += " --defaults engine" if defaults == "engine" else ""
-            trace = record_scenario(scenario, model, defaults=defaults, command=typed)
-            header = dataclasses.replace(trace.header, single=True)
-            suffix = ".engine" if defaults == "engine" else ""
-            found[f"{name}.pybullet{suffix}"] = Trace(header, trace.columns)
-    return found
+# Name of the file: the scenario, and how PyBullet is loaded.
+RUNS: dict[str, tuple[str, Literal["model", "engine"]]] = {
+    f"{name}.pybullet{suffix}": (name, defaults)
+    for name in SCENARIOS
+    for suffix, defaults in (("", "model"), (".engine", "engine"))
+}
+
+
+def recorded(run: str) -> Trace:
+    """A trace by the name of its file, recorded now."""
+    name, defaults = RUNS[run]
+    scenario = SCENARIOS[name]
+    model = sm.load(scenario.model, backend="pybullet", defaults=defaults)
+    typed = f"statemachine trace record {name} --backend pybullet"
+    typed += " --defaults engine" if defaults == "engine" else ""
+    trace = record_scenario(scenario, model, defaults=defaults, command=typed)
+    header = dataclasses.replace(trace.header, single=True)
+    return Trace(header, trace.columns)
 
 
 if __name__ == "__main__":
     FOLDER.mkdir(exist_ok=True)
-    for name, trace in traces().items():
-        path = write(trace, FOLDER / f"{name}.npz")
+    for run in RUNS:
+        trace = recorded(run)
+        path = write(trace, FOLDER / f"{run}.npz")
         print(f"{path.name}: {path.stat().st_size / 1000:.0f} kB, {trace!r}")

@@ -16,7 +16,7 @@ from ..checks import as_count
 from ..errors import BadInputError, DivergedError
 from ..experiments._common import Progress, Provenance, provenance, silent
 from ..model import Model
-from . import apart, elsewhere, look, repeat, restore
+from . import apart, elsewhere, falls, look, repeat, restore
 from .conclusions import Conclusion, conclude
 from .drivers import Driver, Run, Seen, drivers
 from .drivers.interface_driver import InterfaceDriver
@@ -107,6 +107,8 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
             found[driver] += restore.forgets(driver, runs[driver])
             found[driver] += apart.threads(driver, runs[driver])
             found[driver] += elsewhere.findings(answer.result(), driver, runs[driver])
+            if driver.layer == "engine":
+                found[driver] += falls.findings(driver)
         found[interface] += elsewhere.pickled(answer.result(), interface, runs[interface], states)
     audited = []
     for driver in everyone:

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from ..records import Array
+from . import _dense as dense
 from ._bullet_client import pb
 from ._bullet_law import Law, Solution
 from ._bullet_world import Tree, World
@@ -74,10 +75,9 @@ class Arm:
         last, contact = self.last, self.contact
         assert last is not None  # it was read after a step
         total = last.actuator + last.passive + last.friction + last.limit + contact
-        inertia = last.mass + np.diag(self.law.armature)
-        acceleration: Array = np.linalg.inv(inertia) @ (total - last.bias)
+        factor = dense.factored(last.mass + np.diag(self.law.armature))
         return {
-            "qacc": acceleration,
+            "qacc": dense.solved(factor, total - last.bias),
             "qfrc_bias": last.bias,
             "qfrc_actuator": last.actuator,
             "qfrc_passive": last.passive,
@@ -89,6 +89,10 @@ class Arm:
     def command(self, ctrl: Array) -> None:
         """Take a new command (nu,) of the whole model."""
         self._aim = self.law.aim(ctrl)
+
+    def clamp(self, ctrl: Array) -> None:
+        """Bring its entries of a command (nu,) within their ranges, in place."""
+        ctrl[self.law.ids] = self.law.within(ctrl)
 
     def drive(self, afresh: bool = False) -> None:
         """Give the engine the torque of the next step."""
@@ -129,7 +133,8 @@ class Motors:
 
     def place(self, qpos: Array, qvel: Array, *_: Array) -> None:
         """Start from a state."""
-        self.angles, self.speed = qpos[self.tree.qpos], qvel[self.tree.qvel]
+        # Copies: a slice would follow what is written into the arrays.
+        self.angles, self.speed = qpos[self.tree.qpos].copy(), qvel[self.tree.qvel].copy()
 
     def read(self) -> None:
         """Take over what the engine made of the last step."""
@@ -147,6 +152,9 @@ class Motors:
             physicsClientId=self._world.client,
         )
         return {"qfrc_bias": np.array(bias), "qfrc_actuator": self.torque}
+
+    def clamp(self, ctrl: Array) -> None:
+        """Nothing: a motor aims at whatever it is told."""
 
     def command(self, ctrl: Array) -> None:
         """Take a new command (nu,) of the whole model."""

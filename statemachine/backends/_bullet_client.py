@@ -12,19 +12,54 @@ from typing import Any
 
 from ..engines import require
 from ..errors import EngineError
-from ..silence import apart
 
 pb: Any = require("pybullet")
 
 
+_WORLD = 35  # [MB] that a client takes, nearly all of it for messages to the engine
+
+
 def connect() -> int:
-    client = pb.connect(pb.DIRECT)
-    if client < 0:
-        gc.collect()  # Data that nobody closed may hold the places
+    """Open a client.
+
+    Raises:
+        EngineError: There is no place for another, or no memory.
+    """
+    room, client = _room(), -1
+    if room >= 2 * _WORLD:  # without memory, the engine ends the process
         client = pb.connect(pb.DIRECT)
     if client < 0:
-        raise EngineError("PyBullet holds 1024 worlds in one process at most: close some Data")
+        gc.collect()  # Data that nobody closed may hold the places
+        room = _room()
+        if room < 2 * _WORLD:
+            raise EngineError(
+                f"no memory for another world of PyBullet's: one takes {_WORLD} MB, and "
+                f"{room} MB are left: close some Data"
+            )
+        client = pb.connect(pb.DIRECT)
+    if client < 0:
+        raise EngineError(
+            f"PyBullet holds 1024 worlds in one process at most, of {_WORLD} MB each: "
+            "close some Data"
+        )
     return client
+
+
+def _room() -> int:
+    """Megabytes that this process may still take, as far as Linux tells; else many."""
+    try:
+        import resource
+
+        with open("/proc/meminfo") as file:
+            lines = dict(line.split(":", 1) for line in file)
+        room = int(lines["MemAvailable"].split()[0]) << 10
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if limit != resource.RLIM_INFINITY:
+            with open("/proc/self/statm") as file:
+                room = min(room, limit - int(file.read().split()[0]) * resource.getpagesize())
+    except (ImportError, OSError, KeyError):  # not Linux
+        return 1 << 20
+    return room >> 20
 
 
 def disconnect(client: int) -> None:
@@ -41,15 +76,11 @@ def as_file(text: str) -> Iterator[str]:
         with open(os.memfd_create("urdf"), "wb") as file:
             file.write(text.encode())
             file.flush()
-            fd = apart(file.fileno())  # silence takes the places of stdout and stderr
-            try:
-                yield f"/proc/self/fd/{fd}"
-            finally:
-                os.close(fd)
+            yield f"/proc/self/fd/{file.fileno()}"
         return
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.urdf"
-        path.write_text(text)
+        path.write_text(text, encoding="utf-8")
         yield str(path)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import mujoco
@@ -9,6 +10,7 @@ import numpy as np
 
 from ..records import Array, Contacts
 from ..rotations import matrix_from_quat
+from . import _dense as dense
 from ._bullet_world import World
 
 _GEOM = mujoco.mjtGeom
@@ -32,7 +34,7 @@ def contacts(raw: mujoco.MjModel, world: World, xpos: Array, xquat: Array) -> Co
         b, candidates = geoms[body, link]
         if len(candidates) == 1:
             return candidates[0]
-        local = matrix_from_quat(xquat[b]).T @ (point - xpos[b])
+        local = dense.times(matrix_from_quat(xquat[b]).T, point - xpos[b])
         return min(candidates, key=lambda g: abs(_distance(raw, g, local)))
 
     found: list[tuple[Any, ...]] = []
@@ -49,7 +51,7 @@ def contacts(raw: mujoco.MjModel, world: World, xpos: Array, xquat: Array) -> Co
         if pair[0] > pair[1]:
             pair, normal, force = pair[::-1], -normal, -force
         frame = _axes(normal)
-        found.append((pair, dist, (on_a + on_b) / 2, frame, frame @ force))
+        found.append((pair, dist, (on_a + on_b) / 2, frame, dense.times(frame, force)))
     count = len(found)
     columns = list(zip(*found, strict=True)) or [()] * 5
     return Contacts(
@@ -65,25 +67,25 @@ def contacts(raw: mujoco.MjModel, world: World, xpos: Array, xquat: Array) -> Co
 def _axes(normal: Array) -> Array:
     """Contact axes (3, 3) as rows, the first the normal."""
     aside = np.array([0.0, 1.0, 0.0]) if abs(normal[1]) < 0.5 else np.array([0.0, 0.0, 1.0])
-    first = aside - normal * (normal @ aside)
-    first /= np.linalg.norm(first)
+    first = aside - normal * dense.dot(normal, aside)
+    first /= math.hypot(*first)
     return np.array([normal, first, np.cross(normal, first)])
 
 
 def _distance(raw: mujoco.MjModel, geom: int, point: Array) -> float:
     """Signed distance of a point, in the body's frame, from the surface of its geom [m]."""
     turn = matrix_from_quat(raw.geom_quat[geom])
-    local = turn.T @ (point - raw.geom_pos[geom])
+    local = dense.times(turn.T, point - raw.geom_pos[geom])
     size, kind = raw.geom_size[geom], int(raw.geom_type[geom])
     if kind == int(_GEOM.mjGEOM_SPHERE):
-        return float(np.linalg.norm(local) - size[0])
+        return float(math.hypot(*local) - size[0])
     if kind == int(_GEOM.mjGEOM_CAPSULE):
         along = min(max(local[2], -size[1]), size[1])
-        return float(np.linalg.norm(local - [0, 0, along]) - size[0])
+        return float(math.hypot(*local[:2], local[2] - along) - size[0])
     if kind == int(_GEOM.mjGEOM_CYLINDER):
         beyond = np.array([np.hypot(local[0], local[1]) - size[0], abs(local[2]) - size[1]])
     else:  # a mesh by the box around it
         half = size if kind == int(_GEOM.mjGEOM_BOX) else raw.geom_aabb[geom, 3:]
         middle = np.zeros(3) if kind == int(_GEOM.mjGEOM_BOX) else raw.geom_aabb[geom, :3]
         beyond = np.abs(local - middle) - half
-    return float(np.linalg.norm(np.maximum(beyond, 0)) + min(beyond.max(), 0.0))
+    return float(math.hypot(*np.maximum(beyond, 0)) + min(beyond.max(), 0.0))

@@ -21,6 +21,7 @@ torque it got, by inverse dynamics, is the e of the next step.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -29,13 +30,13 @@ import mujoco
 import numpy as np
 
 from ..records import Array
+from . import _dense as dense
 from ._bullet_client import pb
 from ._bullet_world import Tree
 
 _OFF = mujoco.mjtDisableBit
 _PIVOTS, _SWEEPS, _SETTLED = 30, 500, 1e-9
 _STEADY = 1e-5  # of the largest friction: a change of it that is worth the whole solution
-_TINY = 1e-15  # smallest pivot
 _EXPLICIT = (int(mujoco.mjtIntegrator.mjINT_EULER), int(mujoco.mjtIntegrator.mjINT_RK4))
 
 
@@ -81,7 +82,7 @@ class Law:
         rub = not (off["friction"] or off["constraint"])
         self._frictionloss = raw.dof_frictionloss[dofs] * rub
         self._least_rub, self._rubs = -self._frictionloss, self._frictionloss.any()
-        self._steady = _STEADY**2 * float(self._frictionloss @ self._frictionloss)
+        self._steady = _STEADY**2 * dense.dot(self._frictionloss, self._frictionloss)
         weight = raw.dof_invweight0[dofs]
         floor = 0.0 if off["refsafe"] else 2 * h
         solref, solimp = raw.dof_solref[dofs], raw.dof_solimp[dofs]
@@ -129,13 +130,16 @@ class Law:
     def _with_slope(self, free: Array) -> Array:
         """Both inertias, with the slope of the actuators that are not at their limit."""
         found = self._inertia.copy()
-        found[1] += np.diag(self._slope @ free)
+        found[1] += np.diag(dense.times(self._slope, free))
         return found
 
     def aim(self, ctrl: Array) -> Array:
         """What a command (nu,) of the whole model adds to the force of each actuator."""
-        goal = np.minimum(np.maximum(ctrl[self.ids], self._ctrl_low), self._ctrl_high)
-        return self._gain * goal
+        return self._gain * self.within(ctrl)
+
+    def within(self, ctrl: Array) -> Array:
+        """What the actuators take for a command (nu,) of the whole model: it within its range."""
+        return np.minimum(np.maximum(ctrl[self.ids], self._ctrl_low), self._ctrl_high)
 
     def solve(
         self,
@@ -165,18 +169,18 @@ class Law:
         bias = np.array(pb.calculateInverseDynamics(body, q, v, self._zeros, 0, client))
         n = len(q)
         speed = x[n:-1]
-        linear = self._linear @ x
+        linear = dense.times(self._linear, x)
         passive, damped, wanted = linear[:n], linear[n : 2 * n], linear[2 * n :] + aim
         force = np.minimum(np.maximum(wanted, self._low_force), self._high_force)
-        actuator = force if self._straight else self._gear @ force
+        actuator = force if self._straight else dense.times(self._gear, force)
         if self._fence is not None:
             actuator = np.minimum(np.maximum(actuator, self._fence[0]), self._fence[1])
         inertia = self._unsaturated
         if force.tobytes() != wanted.tobytes():
             inertia = self._with_slope(force == wanted)
         explicit, implicit = mass + inertia
-        mujoco.mju_cholFactor(explicit, _TINY)
-        mujoco.mju_cholFactor(implicit, _TINY)
+        dense.factored(explicit)
+        dense.factored(implicit)
         others = actuator + passive - bias + contact
         limit = self._nothing
         solve = afresh
@@ -186,22 +190,21 @@ class Law:
         if not solve and self._rubs:
             # One sweep from the last step's friction, of all joints at once: enough where
             # it hardly changes, as in a joint that rests or slides.
-            rest = _solved(explicit, others + friction) + damped + self._rub_r * friction
+            rest = dense.solved(explicit, others + friction) + damped + self._rub_r * friction
             moved = np.minimum(
                 np.maximum(friction - rest / self._rub_weight, self._least_rub), self._frictionloss
             )
             change = moved - friction
             friction = moved
-            solve = change.dot(change) > self._steady
+            solve = dense.dot(change, change) > self._steady
         if solve:
-            inverse = np.linalg.inv(mass + self._inertia[0])
-            friction, limit = self._constrained(inverse, others, x, friction)
+            friction, limit = self._constrained(explicit, others, x, friction)
             others = others + limit
-        acceleration = _solved(implicit, others + friction)
+        acceleration = dense.solved(implicit, others + friction)
         return Solution(q, v, speed, bias, mass, actuator, passive, friction, limit, acceleration)
 
     def _constrained(
-        self, inverse: Array, others: Array, x: Array, friction: Array
+        self, factor: Array, others: Array, x: Array, friction: Array
     ) -> tuple[Array, Array]:
         """Friction and limit force, by pivoting between free and bounded rows.
 
@@ -221,8 +224,9 @@ class Law:
         goal = np.concatenate([-self._rub_b * speed, stop])
         least = np.concatenate([self._least_rub, np.zeros(len(hit))])
         most = np.concatenate([self._frictionloss, np.full(len(hit), np.inf)])
-        matrix = sign[:, None] * inverse[np.ix_(at, at)] * sign + np.diag(soft)
-        right = goal - sign * (inverse @ others)[at]
+        inverse = dense.inverse(factor)[np.ix_(at, at)]
+        matrix = sign[:, None] * inverse * sign + np.diag(soft)
+        right = goal - sign * dense.solved(factor, others)[at]
         force = np.concatenate([friction, np.zeros(len(hit))])
         force = _pivoted(matrix, right, least, most, force)
         limit = np.zeros(n)
@@ -240,12 +244,12 @@ def _pivoted(matrix: Array, right: Array, least: Array, most: Array, start: Arra
     force = np.minimum(np.maximum(start, least), most)
     free = (force > least) & (force < most) | (least == 0) & (most > 0)
     for _ in range(_PIVOTS):
-        force[free] = np.linalg.solve(
-            matrix[np.ix_(free, free)], right[free] - matrix[np.ix_(free, ~free)] @ force[~free]
-        )
+        bound = dense.times(matrix[np.ix_(free, ~free)], force[~free])
+        factor = dense.factored(matrix[np.ix_(free, free)])
+        force[free] = dense.solved(factor, right[free] - bound)
         outside = free & ((force < least) | (force > most))
         force = np.minimum(np.maximum(force, least), most)
-        miss = matrix @ force - right
+        miss = dense.times(matrix, force) - right
         back = ~free & (least < most) & np.where(force <= least, miss < 0, miss > 0)
         if not (outside.any() or back.any()):
             return force
@@ -253,7 +257,7 @@ def _pivoted(matrix: Array, right: Array, least: Array, most: Array, start: Arra
     for _ in range(_SWEEPS):
         before = force.copy()
         for k in range(len(force)):
-            new = force[k] - (matrix[k] @ force - right[k]) / matrix[k, k]
+            new = force[k] - (dense.dot(matrix[k], force) - right[k]) / matrix[k, k]
             force[k] = min(max(new, least[k]), most[k])
         if np.abs(force - before).max() < _SETTLED * np.abs(force).max():
             break
@@ -273,13 +277,6 @@ _FLAGS = {
 }
 
 
-def _solved(factor: Array, right: Array) -> Array:
-    """Solve with a factor of `mju_cholFactor`, which is quicker than NumPy for few joints."""
-    found = np.empty(len(right))
-    mujoco.mju_cholSolve(found, factor, right)
-    return found
-
-
 def _range(ranges: Array, limited: Any) -> tuple[Array, Array]:
     low, high = np.where(limited[:, None], ranges, [-np.inf, np.inf]).T
     return low, high
@@ -293,10 +290,15 @@ def _impedance(solimp: Array, distance: Array) -> Array:
         [[0.9999], [0.9999], [9e9], [0.9999], [9e9]],
     )
     x = np.minimum(np.abs(distance) / width, 1.0)
-    rising = x**power / middle ** (power - 1)
-    falling = 1 - (1 - x) ** power / (1 - middle) ** (power - 1)
+    rising = _powers(x, power) / _powers(middle, power - 1)
+    falling = 1 - _powers(1 - x, power) / _powers(1 - middle, power - 1)
     found = low + np.where(x <= middle, rising, falling) * (high - low)
     return np.where(solimp[:, 2] <= 1e-15, (low + high) / 2, found)
+
+
+def _powers(base: Array, exponent: Array) -> Array:
+    """Powers one by one: the last bits of NumPy's are those of the processor."""
+    return np.array([math.pow(*pair) for pair in zip(base, exponent, strict=True)])
 
 
 def _softness(impedance: Array, inverse_weight: Array) -> Array:

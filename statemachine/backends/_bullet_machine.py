@@ -19,6 +19,7 @@ from ..checks import HUGE, check_entries
 from ..errors import BadInputError, DivergedError
 from ..records import DERIVED, POSES, Array, Contacts
 from ..rotations import matrix_from_quat
+from . import _dense as dense
 from ._bullet_arm import Arm, Motors
 from ._bullet_client import pb
 from ._bullet_contacts import contacts
@@ -112,6 +113,20 @@ class Machine:
         """Give the world back."""
         self.world.close()
 
+    def check_writable(self, *names: str) -> None:
+        """Raise for an input that NumPy will not write into, before anything moves.
+
+        Raises:
+            BadInputError: Its flag was taken away with `setflags`.
+        """
+        for name in names:
+            if not getattr(self, name).flags.writeable:
+                raise BadInputError(
+                    f"{name} was made read-only, and the engine writes into it: "
+                    f"data.{name}.setflags(write=True)",
+                    quantity=name,
+                )
+
     def restart(
         self,
         time: float,
@@ -141,8 +156,9 @@ class Machine:
         place(self.qpos, self.qvel)
         for arm, known in zip(self._arms, observed or self._unobserved, strict=True):
             arm.place(self.qpos, self.qvel, *known)
-        self._last_qpos, self._last_qvel = self.qpos.copy(), self.qvel.copy()
-        self._known = self.qpos.tobytes(), self.qvel.tobytes()
+        # What the arrays were left at, and its bytes, by which a write is seen.
+        qpos, qvel = self.qpos.copy(), self.qvel.copy()
+        self._left = qpos, qvel, qpos.tobytes(), qvel.tobytes()
         self._astray = False
 
     def _heed(self) -> None:
@@ -158,8 +174,12 @@ class Machine:
         steps = nstep * self._substeps
         if steps >= 2**31:
             raise BadInputError(f"nstep {nstep} × {self._substeps} substeps is too large")
+        self.check_writable("qpos", "qvel")
         if self.ctrl.tobytes() != self._commanded:
-            check_entries(self.ctrl, "ctrl", self._label)
+            reached = self.ctrl.copy()  # by the servos: what is infinite may end at a limit
+            for arm in self._arms:
+                arm.clamp(reached)
+            check_entries(reached, "ctrl", self._label)
             self._heed()
         if self._written:
             check_entries(self.qpos, "qpos", self._label)
@@ -169,25 +189,27 @@ class Machine:
         elif self._astray:
             self._place(self._observed)
         self._used, start = True, self._observed
+        kept = self._moment, self._derived
         try:
             time = self._several(steps - 1, self.time)
-            before = self._read() if steps > 1 else (self._last_qpos, self._last_qvel)
+            before = self._read() if steps > 1 else self._left[:2]
             observed = start if steps == 1 else self._observed
             moment = Moment(*before, self._ctrl, observed)
             time = self._several(1, time)
             qpos, qvel = self._read()
             if self._free and not (qpos.dot(qpos) < _MANY and qvel.dot(qvel) < _MANY):
                 self._diverge(time)
+            left = qpos, qvel, qpos.tobytes(), qvel.tobytes()
+            self._moment, self._lives, self._derived = moment, True, {}
+            # Nothing can interrupt this line, and no other moves the Data.
+            self.qpos[:], self.qvel[:], self.time, self._left = qpos, qvel, time, left
         except BaseException:
             # The engine is elsewhere now; the arrays are not, nor is what else is known.
             self._astray, self._lives = True, False
+            self._moment, self._derived = kept
             for arm, known in zip(self._arms, start, strict=True):
                 arm.place(self.qpos, self.qvel, *known)
             raise
-        self.qpos[:], self.qvel[:], self.time = qpos, qvel, time
-        self._last_qpos, self._last_qvel = qpos, qvel
-        self._known = qpos.tobytes(), qvel.tobytes()
-        self._moment, self._lives, self._derived = moment, True, {}
 
     def _several(self, steps: int, time: float) -> float:
         """Take engine steps; returns the time after them."""
@@ -235,7 +257,7 @@ class Machine:
     @property
     def _written(self) -> bool:
         """Whether qpos or qvel is no longer what it was left at."""
-        return self._known != (self.qpos.tobytes(), self.qvel.tobytes())
+        return self._left[2:] != (self.qpos.tobytes(), self.qvel.tobytes())
 
     @property
     def _observed(self) -> Observed:
@@ -255,10 +277,11 @@ class Machine:
     def derive(self, name: str) -> Any:
         """An array of `records.DERIVED`, or "contacts"; computed at the first reading."""
         if name not in self._derived:
-            self._derived |= self._compute(name)
-            for value in self._derived.values():
+            found = self._compute(name)
+            for value in found.values():
                 if isinstance(value, np.ndarray):
                     value.setflags(write=False)
+            self._derived |= found
         return self._derived[name]
 
     def _compute(self, name: str) -> dict[str, Any]:
@@ -292,7 +315,7 @@ class Machine:
         self._once(afresh=True)
         for arm in self._arms:
             arm.read()
-        _, self._last_qvel = self._read()
+        self._left = (*self._read(), b"", b"")
         return {"contacts": self.derive("contacts"), **self._forces()}
 
     def _contacts(self) -> Contacts:
@@ -314,9 +337,10 @@ class Machine:
             inertia, bias = free_dynamics(raw, tree.root, turn, moment.qvel[own])
             found["qfrc_bias"][own] = bias
             if tree.root in touched:  # what it did beyond falling, contact did
-                rate = (self._last_qvel[own] - moment.qvel[own]) / self._timestep
-                found["qfrc_contact"][own] = inertia @ rate + bias
-            found["qacc"][own] = np.linalg.solve(inertia, found["qfrc_contact"][own] - bias)
+                rate = (self._left[1][own] - moment.qvel[own]) / self._timestep
+                found["qfrc_contact"][own] = dense.times(inertia, rate) + bias
+            pushed = found["qfrc_contact"][own] - bias
+            found["qacc"][own] = dense.solved(dense.factored(inertia), pushed)
         parts = ("contact", "friction", "limit")
         for part in parts:
             found["qfrc_constraint"] += found[f"qfrc_{part}"]

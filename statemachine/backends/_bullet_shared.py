@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import os
 import threading
 from functools import cached_property
 from typing import Any, Literal
@@ -11,6 +13,7 @@ import numpy as np
 
 from ..records import POSES, Array
 from ..rotations import matrix_from_quat, times, wxyz_from_xyzw
+from . import _dense as dense
 from ._bullet_plan import Plan
 from ._bullet_world import World
 from ._mjcf import gravity
@@ -24,13 +27,15 @@ class Shared:
     Attributes:
         plan: What every world is made from; raw: its compiled model.
         kind: "stepped" for the emulated contract, "engine" for PyBullet as it comes.
-        lock: Held while one of the shared worlds is used.
+        lock: Held while one of the shared worlds is used. One for all Models: PyBullet
+            takes one call at a time anyway.
     """
+
+    lock = threading.RLock()
 
     def __init__(self, plan: Plan, kind: Literal["stepped", "engine"]) -> None:
         self.plan, self.raw = plan, plan.raw
         self.kind: Literal["stepped", "engine"] = kind
-        self.lock = threading.RLock()
         self._ghost: World | None = None
         self._still_joints = np.zeros(plan.raw.nv)
 
@@ -78,12 +83,22 @@ class Shared:
         for joint in np.flatnonzero(raw.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)):
             body, start = int(raw.jnt_bodyid[joint]), int(raw.jnt_qposadr[joint])
             quat = qpos[start + 3 : start + 7]
-            xpos[body], xquat[body] = qpos[start : start + 3], quat / np.linalg.norm(quat)
+            xpos[body], xquat[body] = qpos[start : start + 3], quat / math.hypot(*quat)
             turn = matrix_from_quat(xquat[body])
             for site in np.flatnonzero(raw.site_bodyid == body):
-                site_xpos[site] = xpos[body] + turn @ raw.site_pos[site]
-                site_xmat[site] = (turn @ matrix_from_quat(raw.site_quat[site])).ravel()
+                site_xpos[site] = xpos[body] + dense.times(turn, raw.site_pos[site])
+                own = matrix_from_quat(raw.site_quat[site])
+                site_xmat[site] = dense.product(turn, own).ravel()
         return dict(zip(POSES, (xpos, xquat, site_xpos, site_xmat), strict=True))
+
+
+def _renew() -> None:
+    """Start anew in the child of a fork: another thread may have held the lock."""
+    Shared.lock = threading.RLock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_renew)
 
 
 def free_dynamics(raw: mujoco.MjModel, body: int, turn: Array, qvel: Array) -> tuple[Array, Array]:
@@ -97,10 +112,13 @@ def free_dynamics(raw: mujoco.MjModel, body: int, turn: Array, qvel: Array) -> t
     spin = qvel[3:]
     cross = np.cross(np.eye(3), centre)  # cross @ w = w × centre … of rows
     jacobian = np.zeros((3, 6))
-    jacobian[:, :3], jacobian[:, 3:] = np.eye(3), turn @ cross.T
-    total = mass * (jacobian.T @ jacobian)
+    jacobian[:, :3], jacobian[:, 3:] = (
+        np.eye(3),
+        dense.product(turn, np.asarray(cross.T, dtype=np.float64)),
+    )
+    total = mass * dense.product(jacobian.T, jacobian)
     total[3:, 3:] += inertia
-    whirl = turn @ np.cross(spin, np.cross(spin, centre))
-    bias: Array = jacobian.T @ (mass * np.asarray(whirl - gravity(raw), dtype=np.float64))
-    bias[3:] += np.cross(spin, inertia @ spin)
+    whirl = dense.times(turn, np.asarray(np.cross(spin, np.cross(spin, centre)), dtype=np.float64))
+    bias = dense.times(jacobian.T, mass * (whirl - gravity(raw)))
+    bias[3:] += np.cross(spin, dense.times(inertia, spin))
     return total, bias

@@ -6,6 +6,7 @@ priority. PyBullet decides by pairs of links, and multiplies what each link has.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -81,14 +82,14 @@ class Surfaces:
         for i, j, (slide, _, _) in wanted:
             if slide > 0:
                 rows.append(np.isin(np.arange(count), (i, j)).astype(np.float64))
-                right.append(np.log(slide))
+                right.append(math.log(slide))
         self.slide = np.zeros(count)
         if rows and np.ptp(right) == 0 and len(rows) == len(wanted):
-            self.slide += np.exp(right[0] / 2)  # one friction for all: no need to solve
+            self.slide += math.exp(right[0] / 2)  # one friction for all: no need to solve
         elif rows:
             logs = np.linalg.lstsq(np.array(rows), np.array(right), rcond=None)[0]
             rubs = np.any(rows, axis=0)  # what meets nothing with friction has none
-            self.slide = np.where(rubs, np.exp(np.round(logs, 12)), 0.0)
+            self.slide = np.where(rubs, [math.exp(x) for x in np.round(logs, 12)], 0.0)
         self.spin, self.roll = (self._turning(wanted, k) for k in (1, 2))
         self.differences = []
         for i, j, (slide, spin, roll) in wanted:

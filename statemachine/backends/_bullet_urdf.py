@@ -19,6 +19,7 @@ import numpy as np
 
 from ..records import Array, JointType
 from ..rotations import matrix_from_quat
+from . import _dense as dense
 
 _BOX, _SPHERE = int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_SPHERE)
 _CAPSULE, _CYLINDER = int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER)
@@ -168,7 +169,7 @@ def _link(raw: mujoco.MjModel, body: int, dialect: Dialect, names: Names) -> Ite
     mass, inertia = float(raw.body_mass[body]), np.diag(raw.body_inertia[body])
     if joints:
         extra, around = _padding(raw, joints[-1], dialect)
-        mass, inertia = mass + extra, inertia + frame.T @ around @ frame
+        mass, inertia = mass + extra, inertia + dense.product(dense.product(frame.T, around), frame)
     yield f"  <link name={quoteattr(names.links[body])}>"
     yield "    <inertial>"
     yield f"      {_origin(raw.body_ipos[body] - anchor, frame)}"
@@ -206,8 +207,8 @@ def _geom(
         mesh = int(raw.geom_dataid[geom])
         # MuJoCo moved the mesh to its centre and axes; the file has it where it was.
         # Rounded, so that a look that was never moved is at 0 0 0 and not at 1e-17.
-        mat = np.round(mat @ matrix_from_quat(raw.mesh_quat[mesh]).T, 12)
-        pos = np.round(pos - mat @ raw.mesh_pos[mesh], 12)
+        mat = np.round(dense.product(mat, matrix_from_quat(raw.mesh_quat[mesh]).T), 12)
+        pos = np.round(pos - dense.times(mat, raw.mesh_pos[mesh]), 12)
         scale = _numbers(raw.mesh_scale[mesh])
         file = quoteattr(_mesh_file(raw, mesh, dialect.folder))
         solids.append((pos, f'<mesh filename={file} scale="{scale}"/>'))
@@ -241,7 +242,7 @@ def _joints(
         where, name = _origin(place, turn), names.fixed[body]
         yield from _joint(name, "fixed", parent, names.links[body], where, [])
         return
-    place = place + turn @ raw.jnt_pos[joints[0]]
+    place = place + dense.times(turn, raw.jnt_pos[joints[0]])
     for joint in joints:
         child = names.links[body]
         if joint != joints[-1]:

@@ -19,6 +19,7 @@ from ..records import Array
 from ..rotations import matrix_from_quat, xyzw_from_wxyz
 from ..silence import silence
 from . import _bullet_urdf as urdf
+from . import _dense as dense
 from ._bullet_client import Quat, as_file, connect, disconnect, pb, times, turned
 from ._bullet_plan import Plan, floats
 from ._bullet_surfaces import Solid
@@ -274,9 +275,9 @@ class World:
     def _put_free(self, tree: Tree, qpos: Array, qvel: Array) -> None:
         body, qpos, qvel = tree.body, qpos[tree.qpos], qvel[tree.qvel]
         centre, axes = self._frames[body]
-        quat = qpos[3:] / np.linalg.norm(qpos[3:])
+        quat = qpos[3:] / math.hypot(*qpos[3:])
         turn = matrix_from_quat(quat)
-        arm, spin = turn @ centre, turn @ qvel[3:]
+        arm, spin = dense.times(turn, np.array(centre)), dense.times(turn, qvel[3:])
         pose = times(xyzw_from_wxyz(quat).tolist(), axes)
         where, speed = qpos[:3] + arm, qvel[:3] + np.cross(spin, arm)
         self._last[body] = pose

@@ -5,6 +5,8 @@ from __future__ import annotations
 import copy
 import hashlib
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import mujoco
@@ -14,7 +16,6 @@ from ..errors import BadInputError, ModelError
 from ..model import Model
 from ..records import Array, Keyframe
 from ._mjb import check_binary
-from ._mjcf_numbers import problems
 
 _DISABLE = mujoco.mjtDisableBit
 _SWITCHES = {  # option of `replace` -> the flag that turns it off
@@ -30,26 +31,80 @@ _HINDRANCES = {  # option -> flags of a file that would leave it without effect
     "limits": (_DISABLE.mjDSBL_CONSTRAINT,),
 }
 
+_FREE_USE = {"numeric_data"} | {name for name in dir(mujoco.MjModel) if name.endswith("_user")}
+_NEVER_NEGATIVE = {"dof_armature", "dof_frictionloss"}
+
+
+@contextmanager
+def heard() -> Iterator[list[str]]:
+    """What MuJoCo warns of meanwhile; else it goes into a log file and to the terminal."""
+    texts: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(texts.append)  # in C: no Ctrl-C has to cross MuJoCo
+    try:
+        yield texts
+    finally:
+        mujoco.set_mju_user_warning(before)
+        # What has a time is of a simulation in another thread, whose own counters tell.
+        texts[:] = [text for text in texts if " Time = " not in text]
+
 
 def compile_file(path: str | os.PathLike[str]) -> mujoco.MjModel:
     """Compile an MJCF, URDF or MJB file.
 
     Raises:
-        ModelError: MuJoCo cannot compile the file, or what it holds makes no simulation; with
-            the reason.
+        ModelError: MuJoCo cannot compile the file, with its reason; or it compiles one
+            with a number that no step can be taken with.
     """
     text = os.fspath(path)
-    binary = text.lower().endswith(".mjb")
-    if binary:
+    if text.lower().endswith(".mjb"):
         check_binary(text)
     try:
-        raw = (mujoco.MjModel.from_binary_path if binary else mujoco.MjModel.from_xml_path)(text)
+        if text.lower().endswith(".mjb"):
+            raw = mujoco.MjModel.from_binary_path(text)
+        else:
+            raw = mujoco.MjModel.from_xml_path(text)
     except (ValueError, MemoryError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split()) or "out of memory"
         raise ModelError(f"MuJoCo cannot read {text}: {reason}") from error
-    for problem in problems(raw):
-        raise ModelError(f"{text}: {problem}")
+    for problem in _problems(raw):
+        raise ModelError(f"{text} has a number that nothing can be computed with: {problem}")
     return raw
+
+
+def _problems(raw: mujoco.MjModel) -> Iterator[str]:
+    """What of a compiled model is no number, or has a sign that it cannot have."""
+    if not raw.opt.timestep > 0:
+        yield f"timestep is {raw.opt.timestep:g}, and must be above 0"
+    for name in dir(raw.opt):
+        value = getattr(raw.opt, name)
+        if not name.startswith("_") and not np.isfinite(value).all():
+            yield f"{name} of the options is {value}"
+    for name in sorted(dir(raw), key=lambda name: name[-1:] == "0"):  # what follows, last
+        array = getattr(raw, name) if not name.startswith("_") and name not in _FREE_USE else None
+        if not isinstance(array, np.ndarray) or array.dtype.kind != "f":
+            continue
+        # Only a range may be without an end.
+        wrong = np.isnan(array) if "range" in name else ~np.isfinite(array)
+        for row in np.argwhere(wrong)[:1]:
+            kind = "NaN" if np.isnan(array[tuple(row)]) else "infinite"
+            yield f"{name}{_owner(raw, name, row)} is {kind}"
+        if name in _NEVER_NEGATIVE:
+            for row in np.argwhere(array < 0)[:1]:
+                yield f"{name}{_owner(raw, name, row)} is negative"
+
+
+def _owner(raw: mujoco.MjModel, name: str, row: Array) -> str:
+    """Whose number it is, for a message."""
+    kind, index = name.split("_", maxsplit=1)[0], int(row[0])
+    if kind == "dof":
+        kind, index = "jnt", int(raw.dof_jntid[index])
+    kind = {"jnt": "joint", "cam": "camera", "mat": "material"}.get(kind, kind)
+    try:
+        label = getattr(raw, kind)(index).name
+    except (AttributeError, IndexError, KeyError):
+        return ""
+    return f" of {kind} {label or f'number {index}'}"
 
 
 def edited(raw: mujoco.MjModel, options: dict[str, Any]) -> mujoco.MjModel:

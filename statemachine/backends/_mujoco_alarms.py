@@ -13,8 +13,7 @@ import threading
 import warnings
 import weakref
 from collections import deque
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -33,7 +32,6 @@ _FATAL = {
 }
 _AUTORESET = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
 _BAD = re.compile(r"value in (\w+) at \w+ (\d+).*Time = ([-+.\deE]+\d)")
-_OF_A_RUN = re.compile(r"Time = [-+.\deE]+\d\.$")
 
 Handler = Callable[[str], object]
 
@@ -73,28 +71,11 @@ def listen() -> bool:
 
 def listen_for(raw: mujoco.MjData) -> None:
     """Listen for as long as an MjData lives."""
-    _begin()
-    weakref.finalize(raw, _end)
-
-
-@contextmanager
-def heard() -> Iterator[list[str]]:
-    """Listen meanwhile; at the end the list has the texts that belong to no simulation."""
-    _begin()
-    texts: list[str] = []
-    try:
-        before = set(map(id, _TEXTS))
-        yield texts
-        texts += [t for t in list(_TEXTS) if id(t) not in before and not _OF_A_RUN.search(t)]
-    finally:
-        _end()
-
-
-def _begin() -> None:
     global _users  # noqa: PLW0603
     with _LOCK:
         _users += 1
         listen()
+    weakref.finalize(raw, _end)
 
 
 def _end() -> None:

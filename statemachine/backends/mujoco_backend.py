@@ -29,8 +29,8 @@ from ..records import (
     Contacts,
     State,
 )
-from ._mjcf import compile_file, edited, facts, step_length, with_fingerprint
-from ._mujoco_alarms import AlarmError, Alarms, heard, pass_on
+from ._mjcf import compile_file, edited, facts, heard, step_length, with_fingerprint
+from ._mujoco_alarms import AlarmError, Alarms, pass_on
 
 _DISABLE = mujoco.mjtDisableBit
 # Not RK4: after its step the derived values are neither of the state before nor after.
@@ -60,6 +60,9 @@ _COMPONENTS = {
 }
 _NATIVE = Behaviour("native", "the engine's own")
 _NOTES = {
+    "position servo": Behaviour(
+        "native", "the engine's own; an infinite ctrl is clamped to its range, or refused"
+    ),
     "forces by part": Behaviour("native", "rows of the constraint solver, by their type"),
     "exact restore": Behaviour("native", "mjSTATE_INTEGRATION, warm start included"),
     "no automatic reset": Behaviour("native", "the engine's flag mjDSBL_AUTORESET"),

@@ -26,14 +26,14 @@ from ._bullet_plan import Plan
 from ._bullet_scope import check, ignored
 from ._bullet_shared import Shared
 from ._bullet_world import ENGINE_TIMESTEP, World
-from ._mjcf import compile_file, edited, facts, step_length, with_fingerprint
+from ._mjcf import compile_file, edited, facts, heard, step_length, with_fingerprint
 
 _EMULATED = {
     "stale after a write": "by copies of the adapter; the engine's own values follow a write",
     "stale after a step": "poses of the state before are computed when they are read",
     "zeros when fresh": "by the adapter; the engine has poses from the first moment",
     "position servo": "the adapter solves the model's servo and sends torques; the engine's own "
-    "way is POSITION_CONTROL",
+    "way is POSITION_CONTROL; an infinite ctrl is clamped to its range, or refused",
     "armature": "the engine has none: the adapter reckons with it, and gives the engine's links a "
     "part of it as inertia",
     "joint damping": "by the adapter, as the file's integrator treats it (RK4 as Euler); the "
@@ -57,7 +57,9 @@ _RESTORE = (
 _TOLD = ("qfrc_bias", "qfrc_actuator")  # of the forces, under defaults="engine"
 _AS_IT_COMES = {
     "position servo": Behaviour(
-        "native", "POSITION_CONTROL; with actuation off its motors hold every joint still"
+        "native",
+        "POSITION_CONTROL; with actuation off its motors hold every joint still; an infinite ctrl "
+        "is refused",
     ),
     "armature": Behaviour("unsupported", "the engine has none"),
     "joint damping": Behaviour("native", "that of the URDF, explicit, and 0.04 on every body"),
@@ -100,7 +102,10 @@ def load(
         ModelError: It cannot be compiled, or PyBullet cannot read what was written.
         UnsupportedError: It has something that PyBullet has no counterpart for.
     """
-    raw = compile_file(path)
+    with heard() as texts:
+        raw = compile_file(path)
+    for text in texts:
+        warnings.warn(f"MuJoCo, which compiles {path}: {text}", EngineWarning, stacklevel=3)
     if defaults == "engine":
         raw.opt.gravity[:] = 0
         raw.opt.timestep = ENGINE_TIMESTEP
@@ -210,13 +215,19 @@ class PybulletData(Data):
         self._machine.forward()
 
     def _reset(self, key: int | None) -> None:
-        machine, model = self._machine, self._home
+        model = self._home
         if key is None:
             qpos0 = model._shared.raw.qpos0
-            machine.restart(0.0, qpos0, np.zeros(model.nv), np.zeros(model.nu))
+            self._restart(0.0, qpos0, np.zeros(model.nv), np.zeros(model.nu))
         else:
             frame = model.keyframes[key]
-            machine.restart(frame.time, frame.qpos, frame.qvel, frame.ctrl)
+            self._restart(frame.time, frame.qpos, frame.qvel, frame.ctrl)
+
+    def _restart(self, *state: Any) -> None:
+        self._machine.check_writable(*INPUTS)
+        # What interrupts it leaves it half done; the verb ends this when it is whole.
+        self._give_up("reset or set_state was interrupted")
+        self._machine.restart(*state)
 
     def _get_state(self) -> State:
         now = self._machine.present
@@ -234,7 +245,7 @@ class PybulletData(Data):
         self._home._check_quaternions(parts[1])
         observed = self._machine.parted(*parts[4:]) if parts[4:] else None
         qpos, qvel, ctrl = parts[1:4]
-        self._machine.restart(float(parts[0][0]), qpos, qvel, ctrl, observed)
+        self._restart(float(parts[0][0]), qpos, qvel, ctrl, observed)
 
     def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
         return self._layout

@@ -12,6 +12,7 @@ from ..errors import BadInputError, ModelFileError, UnknownNameError
 from ._common import complain
 
 _RENDERERS = ("auto", "mujoco", "pybullet")
+_OF_FILM = {"fps": 30.0, "slow": 1.0, "size": (640, 480), "renderer": "auto"}
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -29,17 +30,17 @@ def add(parser: argparse.ArgumentParser) -> None:
 def add_film(group: Any) -> None:
     """How a film is made."""
     group.add_argument(
-        "--fps", type=float, default=30.0, metavar="N", help="of the film (default 30)"
+        "--fps", type=float, default=None, metavar="N", help="of the film (default 30)"
     )
     group.add_argument(
-        "--slow", type=float, default=1.0, metavar="N", help="of the film: N times slower"
+        "--slow", type=float, default=None, metavar="N", help="of the film: N times slower"
     )
     group.add_argument(
-        "--size", type=_size, default=(640, 480), metavar="WxH", help="of the film (640x480)"
+        "--size", type=_size, default=None, metavar="WxH", help="of the film (640x480)"
     )
     group.add_argument(
         "--renderer",
-        default="auto",
+        default=None,
         choices=_RENDERERS,
         help="of the film; auto: mujoco, and where it has no OpenGL pybullet's software",
     )
@@ -55,6 +56,19 @@ class Pictures:
     slow: float
     size: tuple[int, int]
     renderer: Any = None
+
+
+def complete(options: argparse.Namespace) -> None:
+    """What was not said of a film is as usual; what was said needs a film.
+
+    Raises:
+        BadInputError: An option of a film is given, and none is made.
+    """
+    for name, usual in _OF_FILM.items():
+        if getattr(options, name, None) is None:
+            setattr(options, name, usual)
+        elif options.film is None:
+            raise BadInputError(f"--{name} goes with --film")
 
 
 def checked(options: argparse.Namespace) -> Pictures:

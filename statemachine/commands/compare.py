@@ -119,6 +119,7 @@ def request_of(options: argparse.Namespace) -> Any:
 def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
     _compare_html.check(options)
+    pictures.complete(options)
     if options.models:
         if options.why or options.quantity:
             raise BadInputError(

@@ -6,6 +6,7 @@ import argparse
 from dataclasses import replace
 from typing import Any
 
+from ..errors import BadInputError
 from ..lessons import LESSONS, STATIONS, Lesson
 from ._common import (
     PROGRAM,
@@ -33,9 +34,9 @@ def add(commands: Any) -> None:
         dest="start",
         type=by_number,
         choices=[lesson.name for lesson in STATIONS],
-        default=STATIONS[0].name,
+        default=None,
         metavar="STATION",
-        help="where to begin, if not at the first",
+        help="of the whole path: where to begin, if not at the first",
     )
     path.set_defaults(run=run_path)
     named = path.add_subparsers(metavar="name")
@@ -130,6 +131,11 @@ def overview(_options: argparse.Namespace) -> int:
 def run(options: argparse.Namespace) -> int:
     """One station, on one backend or all."""
     lesson: Lesson = options.lesson
+    if options.start is not None:
+        raise BadInputError(
+            f"--from begins the whole path, and {lesson.name} is one lesson of it: type "
+            f"{PROGRAM} lesson --from {options.start}, or {PROGRAM} lesson {lesson.name}"
+        )
     values = {option.key: getattr(options, option.key) for option in lesson.options}
     page, results = _compute(options, lesson, options.model, values)
     names = list(LESSONS)
@@ -152,7 +158,8 @@ def run_path(options: argparse.Namespace) -> int:
     from ..report.quiz import Stopped, go_on
 
     ask, code, everything = _asking(options), 0, {}
-    first = [lesson.name for lesson in STATIONS].index(options.start)
+    names = [lesson.name for lesson in STATIONS]
+    first = names.index(options.start) if options.start else 0
     for number, lesson in enumerate(STATIONS[first:], start=first + 1):
         try:
             if ask and number > first + 1:

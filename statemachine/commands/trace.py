@@ -246,10 +246,9 @@ def run_pictures(options: argparse.Namespace) -> int:
 
     name = options.picture
     usual = f"{Path(options.file).stem}.{'svg' if name == 'plot' else 'webp'}"
-    if name == "plot":
-        options.fps = options.slow = options.size = None
     options.plot = options.film = None
     setattr(options, name, options.output or usual)
+    pictures.complete(options)
     trace = read(options.file)
     pictures.write(pictures.checked(options), options, trace)
     return 0

@@ -28,6 +28,7 @@ UNITS: dict[str, str] = {
     "contact": "s",
     "force": "N",
 }
+NORMAL = ", normal force"  # after a pair of bodies: the sum over its contacts
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +89,7 @@ def series(one: Trace, two: Trace, tip: str | None = None) -> list[Series]:
             force.get(pair, np.zeros(len(trace)))[rows]
             for force, trace, rows in zip(forces, (one, two), (common.one, common.two), strict=True)
         ]
-        found.append(_scalar(f"{pair}, force", "force", common, values[0], values[1]))
+        found.append(_scalar(f"{pair}{NORMAL}", "force", common, values[0], values[1]))
     return found
 
 
@@ -115,6 +116,36 @@ def normal_forces(trace: Trace) -> dict[str, Array]:
         name = " – ".join(labels[body] for body in bodies)
         found.setdefault(name, np.zeros(len(trace)))[row] += force
     return found
+
+
+def total_forces(trace: Trace) -> dict[str, Array]:
+    """Length of the sum of the contact forces (n,) [N] between each pair of bodies.
+
+    Friction and all, added as vectors in world axes: neither at least nor at most the sum of
+    the normal forces.
+    """
+    sums: dict[str, Array] = {}
+    if "contact_row" not in trace:
+        return {}
+    header, labels = trace.header, trace.header.body_labels
+    for row, geoms, force in zip(
+        trace["contact_row"].tolist(),
+        trace["contact_geom"].tolist(),
+        world_forces(trace),
+        strict=True,
+    ):
+        name = " – ".join(labels[body] for body in sorted(header.geom_bodyid[g] for g in geoms))
+        sums.setdefault(name, np.zeros((len(trace), 3)))[row] += force
+    return {name: np.linalg.norm(total, axis=1) for name, total in sums.items()}
+
+
+def world_forces(trace: Trace) -> Array:
+    """Force (c, 3) [N] of each contact in world axes, on the body with the larger id."""
+    # Rows of a contact frame are its axes; the force along them is that of geom 0 on geom 1.
+    axes = trace["contact_frame"].reshape(-1, 3, 3)
+    forces = np.einsum("nij,ni->nj", axes, trace["contact_force"])
+    bodies = np.array(trace.header.geom_bodyid)[trace["contact_geom"].reshape(-1, 2)]
+    return np.where((bodies[:, 0] > bodies[:, 1])[:, None], -forces, forces)
 
 
 def tell(one: Trace, two: Trace, column: str) -> bool:

@@ -151,6 +151,7 @@ def check_infinite_ctrl_is_refused_or_clamped(lab: Lab) -> None:
     except BadInputError:
         return
     require_equal(data.qpos, at_end.qpos, "qpos under an infinite ctrl")
+    require(np.isposinf(data.ctrl[1]), "the array does not keep what was written")
 
 
 def _refuses_or_is_unchanged(lab: Lab, data: Any, name: str, value: float) -> None:

@@ -33,8 +33,8 @@ def run(model: Model, progress: Progress = silent) -> Answers:
     return Answers(
         forward=forward.run(model, seconds=0.1, progress=parts[0]),
         state=state.run(model),
-        replay=replay.run(model, progress=parts[1]),
-        gravity=gravity.run(model, seconds=10.0, longer=0.0, progress=parts[2]),
+        replay=replay.run(model, steps=150, progress=parts[1]),
+        gravity=gravity.run(model, seconds=4.0, longer=0.0, progress=parts[2]),
         objects=objects.run(model, worlds=3, progress=parts[3]),
         pace=pace.run(model, seconds=0.2, progress=parts[4]),
         provenance=provenance(model),

@@ -142,14 +142,14 @@ LESSONS = {
             "so101/scene",
             (
                 Option("--realtime", False, "wait for the clock", bool),
-                Option("--seconds", 4.0, "simulated time with --realtime", float),
+                Option("--seconds", None, "simulated time with --realtime (default 4)", float),
             ),
         ),
         Lesson(
             "speed",
             "What does one second of your machine buy?",
             "so101/scene_box",
-            (Option("--steps", 20_000, "steps of each run", int),),
+            (Option("--steps", 4000, "steps of each run", int),),
         ),
         Lesson("questions", "Check yourself: six questions.", "so101/scene_box", station=False),
     )

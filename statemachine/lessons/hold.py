@@ -174,15 +174,17 @@ def _end(result: hold.Hold) -> str:
         f"first at {result.first_contact:.3f} s: {', '.join(result.touched)}; at the end: "
         f"{', '.join(result.touching) or 'nothing'}"
     )
+    gaps = np.abs(result.qpos[-1] - result.goal)
+    text += f". The joint farthest from its goal is then {_farthest(result, gaps)}"
     if result.without_contacts is not None:
-        gap = np.abs(result.without_contacts - result.goal)
-        worst = int(np.argmax(gap))
-        joint = int(np.argmax(np.abs(result.qpos[-1] - result.goal)))
-        text += (
-            f". The worst joint is {_at(result, result.error[-1], joint)} from its goal then; "
-            f"with contacts left out it would be {_at(result, gap[worst], worst)}"
-        )
+        free = np.abs(result.without_contacts - result.goal)
+        text += f"; with contacts left out it would be {_farthest(result, free)}"
     return text + "."
+
+
+def _farthest(result: hold.Hold, gaps: Array) -> str:
+    joint = int(np.argmax(gaps))
+    return f"{result.joints[joint]}, by {_at(result, gaps[joint], joint)}"
 
 
 def _row(results: Mapping[str, hold.Hold], time: float) -> tuple[str, ...]:

@@ -37,23 +37,22 @@ def run(model: Any, options: Mapping[str, Any], progress: Any) -> replay.Replay:
 
 def code(options: Mapping[str, Any], load: str) -> str:
     """Two runs from the keyframe, compared."""
-    write = "data.ctrl[:2] += np.array((0.4, -0.2))[: model.nu]  # pan and lift"
+    write, said = "data.ctrl[:2] += np.array((0.4, -0.2))[: model.nu]", "  # pan and lift"
     if options["ctrl"]:
-        write = f"data.ctrl[:] = {[float(x) for x in options['ctrl']]}"
+        write, said = f"data.ctrl[:] = {[float(x) for x in options['ctrl']]}", ""
     steps = options["steps"]
     body = {
-        None: [write, f"sm.step(model, data, {steps})"],
-        "extra-step": [write, f"sm.step(model, data, {steps} + broken)"],
+        None: [write + said, f"sm.step(model, data, {steps})"],
+        "extra-step": [write + said, f"sm.step(model, data, {steps} + broken)"],
         "late-ctrl": [
-            "if broken:",
-            "    sm.step(model, data)  # the command comes one step late",
-            write,
-            f"sm.step(model, data, {steps} - broken)",
+            f"for k in range({steps}):",
+            "    if k == broken:  # the command comes one step late",
+            f"        {write}",
+            "    sm.step(model, data)",
         ],
     }[options["break"]]
     lines = "\n".join(f"    {line}" for line in body)
-    argument, second = ("", "") if options["break"] is None else ("broken", "True")
-    first = "False" if second else ""
+    argument, first, second = ("broken", "0", "1") if options["break"] else ("", "", "")
     return f"""\
 import numpy as np
 import statemachine as sm

@@ -5,19 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..errors import BadInputError
 from ..experiments import pace
 from ..page import Page, Question, Table, Text, Verdict
 from ._words import count, duration, page_of, typed, where
 from .session import Session
 
 _BEFORE = "A simulation, a pause of the program, and the time on the simulator's own clock."
-_BRIEF = 0.5  # simulated seconds; with --realtime as many as were asked for
+_BRIEF, _WATCHED = 0.5, 4.0  # simulated seconds, without and with --realtime
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> pace.Pace:
     """Without waiting, and paced."""
-    seconds = options["seconds"] if options["realtime"] else min(_BRIEF, options["seconds"])
-    return pace.run(model, seconds=seconds, progress=progress)
+    return pace.run(model, seconds=_seconds(options), progress=progress)
+
+
+def _seconds(options: Mapping[str, Any]) -> float:
+    if options["seconds"] is None:
+        return _WATCHED if options["realtime"] else _BRIEF
+    if not options["realtime"]:
+        raise BadInputError("--seconds goes with --realtime")
+    return options["seconds"]
 
 
 def code(options: Mapping[str, Any], load: str) -> str:
@@ -41,7 +49,7 @@ import statemachine as sm
 model = {load}
 data = sm.make_data(model)
 began = time.perf_counter()
-for _ in range(round({options["seconds"]:g} / model.timestep)):
+for _ in range(round({_seconds(options):g} / model.timestep)):
     sm.step(model, data)
     ahead = data.time - (time.perf_counter() - began)
     time.sleep(max(0, ahead))  # the waiting is yours

@@ -14,7 +14,7 @@ import numpy as np
 
 def dumps(value: Any) -> str:
     """Strict JSON of a result: no NaN (null instead), arrays as lists, SI units."""
-    return json.dumps(plain(value), indent=2, allow_nan=False, ensure_ascii=False)
+    return json.dumps(plain(value), indent=2, allow_nan=False)
 
 
 def plain(value: Any) -> Any:

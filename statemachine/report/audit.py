@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from ..audit import Audit, Audited
+from ..audit.falls import BOXES, FALL, STEPS
 from ..audit.findings import EACH_OTHER, Finding, worst
 from ..audit.restore import FORGETS, NO_CONTACTS, NOT_RESTORED, RESTORE, WITHOUT
 from ..page import Block, Page, Table, Text, Verdict
@@ -178,12 +179,25 @@ def _promises(one: Audited) -> list[Block]:
             title=f"{one.name}: what should change nothing",
             words=frozenset({0, 1, 2, 3}),
         ),
+        *_fallen(one),
         *(Verdict(_broken(one, of), False) for of in broken if of),
         Verdict(
             f"{one.name}: of {len(promises)} promises {kept} are kept at every save point at "
             "which they were tried",
             kept == len(promises),
         ),
+    ]
+
+
+def _fallen(one: Audited) -> list[Text]:
+    drops = dict.fromkeys(each.point for each in one.findings if each.point.startswith(FALL))
+    if not drops:
+        return []
+    return [
+        Text(
+            f"Among the runs with a call before each step are {len(drops)} of another model: "
+            f"{BOXES} boxes fall onto each other, {STEPS} steps each. Contacts come and go there."
+        )
     ]
 
 

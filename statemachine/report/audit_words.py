@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from ..audit import Audited
 from ..audit.conclusions import Conclusion, Missing
 from ..audit.findings import Gap, worst
+from ..audit.look import LOOK
 from ..audit.repeat import AGAIN
 
 _SAME = "same"
@@ -52,6 +53,16 @@ def sentences(one: Audited) -> list[str]:
             f"{one.name}: all restores of one state have one future, though not that of the "
             f"run: {listed(agree)}."
         )
+    for case in dict.fromkeys(each.case for each in one.findings if each.experiment == LOOK):
+        off = [e for e in one.findings if (e.experiment, e.case) == (LOOK, case)]
+        differs = [each for each in off if not each.gap.exact and not each.promised]
+        if differs:
+            most = worst([each.gap for each in differs])
+            said.append(
+                f"{one.name}: {case} before each step changes what follows, at "
+                f"{listed([each.point for each in differs])}: a body or joint by up to "
+                f"{number(most.length * 1e3)} mm and {number(math.degrees(most.angle))}°."
+            )
     again = [each for each in one.findings if each.experiment == AGAIN]
     if not of.suffice and again and all(each.gap.exact for each in again):
         said.append(

@@ -72,6 +72,12 @@ def _answers(ran: Mapping[str, Statement]) -> Iterator[Block]:
 
 
 def _unheard(statement: Statement) -> str:
+    if statement.due:
+        written = f" Changed: {', '.join(statement.changed)}." if statement.changed else ""
+        return (
+            f"No call yet.{written} All that is derived of {' and '.join(statement.due)} now "
+            "belongs to this moment: it is computed when it is read."
+        )
     if statement.changed:
         return f"No call. Changed: {', '.join(statement.changed)}, and nothing else."
     return "No call. Nothing changed."

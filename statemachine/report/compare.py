@@ -7,7 +7,7 @@ from typing import Any
 
 from ..compare import Agreement, Comparison, Contact, Touch, Witness
 from ..page import Page, Table, Text, Verdict
-from .figures_of import figure, quantity, short_time
+from .figures_of import pressed, quantity, short_time
 
 # Of the promises that a backend may emulate, those that move the arm.
 _PHYSICS = ("position servo", "armature", "joint damping", "dry friction", "joint limits")
@@ -128,7 +128,7 @@ _PLURAL = {
     "body rotation": "rotation of free bodies",
     "energy": "energy",
     "contact": "first touches",
-    "force": "contact forces",
+    "force": "normal forces",
 }
 
 
@@ -167,7 +167,7 @@ def _end(contact: Contact, backend: str) -> str:
     if contact.last is None:
         return f"on {backend} they never touch"
     if contact.ends:
-        return f"on {backend} in touch at the end, pressed with {figure(contact.force)} N"
+        return f"on {backend} in touch at the end, {pressed(contact.force, contact.total)}"
     return f"on {backend} last in touch at {short_time(contact.last)}"
 
 

@@ -10,7 +10,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 
-from ..engines import ENGINES, engine_version
+from ..engines import ENGINES, engine_version, wheel_here
 from ..page import Page, Table, Text, Verdict
 from ..rendering.probe import PATIENCE, offscreen_opengl, opengl_remedy
 
@@ -82,7 +82,6 @@ def _python() -> Finding:
 
 def _engine(name: str) -> Finding:
     optional = name != "mujoco"
-    engine = ENGINES[name]
     code = f"from statemachine.engines import require; require({name!r})"
     # In a subprocess: a broken engine may take its process down, or print at will.
     try:
@@ -94,8 +93,9 @@ def _engine(name: str) -> Finding:
         return Finding(name, True, found, optional=optional)
     reason = (done.stderr.strip().splitlines() or [f"import ended with code {done.returncode}"])[-1]
     reason = reason.removeprefix("statemachine.errors.MissingEngineError: ")
-    told = any(word in reason for word in ("pip install", "apt-get", "unset it"))
-    step = "" if told else f"pip install --force-reinstall {engine.distribution}"
+    told = any(word in reason for word in ("pip install", "no wheel", "apt-get", "unset it"))
+    wheel = wheel_here(ENGINES[name])
+    step = "" if told or not wheel else f"pip install --force-reinstall {wheel.requirement}"
     return Finding(name, False, reason, step, optional)
 
 

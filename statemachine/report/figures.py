@@ -6,11 +6,15 @@ import io
 from collections.abc import Callable
 from typing import Any, cast
 
+import numpy as np
+
 from ..errors import MissingEngineError
 from ..page import Picture, Pipeline, Slots, Traces
+from .log_axis import LogAxis
 
 _COLOURS = ("#1f5fa8", "#c2571a", "#2f8f4e", "#8a4fa0", "#b03a48", "#6b6b6b", "#3aa6a6")
-_INK, _PAPER = "#222222", "#ffffff"
+_INK, _PAPER, _BELOW = "#222222", "#ffffff", "#f0f0f0"  # the last: behind the level of zero
+_POWERS = 8  # that a log axis names, at most
 
 
 def svg(picture: Picture) -> str:
@@ -41,14 +45,20 @@ def _traces(axes: Any, picture: Traces) -> None:
     parts = {name: name.rpartition(": ")[::2] for name in picture.curves}
     engines = list(dict.fromkeys(engine for engine, _ in parts.values()))
     things = list(dict.fromkeys(thing for _, thing in parts.values()))
+    log = None
+    if picture.log:
+        log = LogAxis.around(np.concatenate([np.asarray(y) for _, y in picture.curves.values()]))
     for name, (x, y) in picture.curves.items():
         engine, thing = parts[name]
         style = ("-", "--", ":", "-.")[engines.index(engine) % 4]
         colour = _COLOURS[things.index(thing) % len(_COLOURS)]
-        shown = [(a, b) for a, b in zip(x, y, strict=True) if b > 0 or not picture.log]
-        axes.plot(*zip(*shown, strict=True), style, color=colour, label=name)
-    if picture.log:
-        axes.set_yscale("log")
+        axes.plot(x, log.places(np.asarray(y)) if log else y, style, color=colour, label=name)
+    if log is not None:
+        axes.set_ylim(log.bottom, log.high)
+        ticks, labels = zip(*log.ticks(_POWERS), strict=True)
+        axes.set_yticks(ticks, labels)
+        if log.edge is not None:
+            axes.axhspan(log.bottom, log.edge, color=_BELOW, linewidth=0, zorder=0)
     axes.set_xlabel(picture.across)
     axes.set_ylabel(picture.up)
     axes.grid(alpha=0.3)

@@ -22,6 +22,11 @@ def scale_of(kind: str) -> tuple[float, str]:
     return {"energy": (1.0, " J"), "contact": (1000.0, " ms"), "force": (1.0, " N")}[kind]
 
 
+def pressed(normal: float, total: float) -> str:
+    """With what two bodies press: the sum of the normal forces, and the whole force [N]."""
+    return f"pressed with {figure(normal)} N (with friction {figure(total)} N)"
+
+
 def figure(value: float) -> str:
     """A number with three significant digits; tiny ones with their power of ten."""
     if value == 0:

@@ -13,6 +13,7 @@ from ..records import Array
 from ..rendering import Timing
 from ..rendering.compose import GHOST
 from .figures_of import figure
+from .log_axis import LogAxis
 
 _INK, _PALE, _PAPER, _RULE = (34, 34, 34), (176, 176, 182), (255, 255, 255), (222, 222, 226)
 _VIOLET = tuple(round(255 * part) for part in GHOST)
@@ -20,11 +21,12 @@ _ORANGE = (230, 159, 0)
 _SHARPER = 2  # lines are drawn so many times as large: edges are smooth then
 STRIP = 0.18  # of the film's height
 _DECADES = 4  # that a strip shows
+_BELOW = (240, 240, 242)  # behind the level of zero
 
 
 @dataclass(frozen=True, eq=False)
 class Strip:
-    """A curve over time, drawn on a log axis.
+    """A curve over time, drawn on a log axis with a level for zero.
 
     Attributes:
         name: Of what.
@@ -137,7 +139,7 @@ class Overlay:
         # The last moment that was compared: what is shown is not guessed between two.
         row = max(0, int(np.searchsorted(strip.time, time + 1e-9, side="right")) - 1)
         value = float(strip.values[row])
-        y = top + self._y(value)
+        y = top + self._y(self._places[row])
         dot = 0.22 * self._text
         draw.ellipse((x - dot, y - dot, x + dot, y + dot), fill=_VIOLET)
         unit = strip.unit if strip.unit == "°" else f" {strip.unit}"
@@ -151,22 +153,17 @@ class Overlay:
     def _scale(self) -> None:
         """The decades that the strip shows."""
         assert self._strip is not None
-        positive = self._strip.values[self._strip.values > 0]
-        marks = [*positive.tolist(), *([self._strip.tolerance] if self._strip.tolerance else [])]
-        most, least = (max(marks), min(marks)) if marks else (1.0, 0.1)
-        self._ceiling = math.ceil(math.log10(most) + 0.05)
-        self._floor = max(math.floor(math.log10(least)), self._ceiling - _DECADES)
+        tolerance = self._strip.tolerance
+        self._log = LogAxis.around(self._strip.values, [tolerance] if tolerance else [], _DECADES)
+        self._places = self._log.places(self._strip.values).tolist()
 
     def _x(self, time: float) -> float:
         span = max(self._timing.seconds, 1e-12)
         return self._left + (self._right - self._left) * min(1.0, time / span)
 
-    def _y(self, value: float) -> float:
-        power = math.log10(value) if value > 0 else self._floor
-        share = (min(max(power, self._floor), self._ceiling) - self._floor) / (
-            self._ceiling - self._floor
-        )
-        return self._bottom - (self._bottom - self._top) * share
+    def _y(self, place: float) -> float:
+        low, high = self._log.bottom, self._log.high
+        return self._bottom - (self._bottom - self._top) * (place - low) / (high - low)
 
     def _drawn(self, colour: tuple[int, ...]) -> Any:
         """The strip with its curve in a colour."""
@@ -176,28 +173,35 @@ class Overlay:
         by, width = _SHARPER, self._size[0]
         image = Image.new("RGB", (by * width, by * self._low), _PAPER)
         draw = ImageDraw.Draw(image)
-        for power in range(self._floor, self._ceiling + 1):
-            y = by * self._y(10.0**power)
+        if self._log.edge is not None:
+            box = (self._left, self._y(self._log.edge), self._right, self._bottom)
+            draw.rectangle([by * each for each in box], fill=_BELOW)
+        for place, _ in self._log.ticks(_DECADES + 1):
+            y = by * self._y(place)
             draw.line((by * self._left, y, by * self._right, y), fill=_RULE, width=by)
         if self._strip.tolerance:
-            y = by * self._y(self._strip.tolerance)
+            y = by * self._y(math.log10(self._strip.tolerance))
             step = 5 * by
             for x in range(round(by * self._left), round(by * self._right), 2 * step):
                 draw.line((x, y, x + step, y), fill=_INK, width=by)
         points = [
-            (by * self._x(t), by * self._y(v))
-            for t, v in zip(self._strip.time.tolist(), self._strip.values.tolist(), strict=True)
+            (by * self._x(t), by * self._y(place))
+            for t, place in zip(self._strip.time.tolist(), self._places, strict=True)
         ]
         draw.line(points, fill=colour, width=2 * by, joint="curve")
         image = image.resize((width, self._low), Image.Resampling.LANCZOS)
         draw = ImageDraw.Draw(image)
         # Not every decade has room for its figure.
-        apart = (self._bottom - self._top) / (self._ceiling - self._floor)
-        every = max(1, math.ceil(1.1 * self._fine / apart))
-        for power in range(self._ceiling, self._floor - 1, -every):
-            y = self._y(10.0**power)
-            text = f"{10.0**power:g}"
-            draw.text((self._left - 4, y), text, font=self._small, fill=_INK, anchor="rm")
+        room = self._y(self._log.low) - self._top
+        for place, text in self._log.ticks(max(1, int(room / (1.1 * self._fine)))):
+            y = self._y(place)
+            draw.text(
+                (self._left - 4, y),
+                text.replace("−", "-"),
+                font=self._small,
+                fill=_INK,
+                anchor="rm",
+            )
         return image
 
 

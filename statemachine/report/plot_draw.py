@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from .log_axis import LogAxis
 from .plot_panels import Figure, Panel
 
 # A colour-blind-safe pair, pale and broad under dark and dashed: told apart in grey too.
@@ -25,6 +25,8 @@ _ROW = 3.4  # of the touches
 _SMALL, _TINY = 5.6, 5.2
 _SAMPLE, _LETTER = 9.5, 1.25  # of a label: the line before it, and one letter
 _DECADES = 6  # at most, of a difference
+_POWERS = 2  # that its axis names, at most
+_BELOW = "#ececec"  # behind the level of zero
 
 
 def draw(figure: Figure) -> Any:
@@ -181,37 +183,23 @@ def _value_axis(axes: Any, panel: Panel) -> None:
 
 def _apart(axes: Any, panel: Panel) -> None:
     """Differences on a log axis, the tolerance, and filled what is beyond it."""
-    from matplotlib.ticker import FixedLocator, FuncFormatter
-
     assert panel.apart is not None
     time, values = panel.apart
-    marks = values[(values > 0) & np.isfinite(values)].tolist() + (
-        [panel.tolerance] if panel.tolerance else []
-    )
-    most, least = (max(marks), min(marks)) if marks else (1.0, 1.0)
-    top = math.ceil(math.log10(most) + 0.1)
-    bottom = max(math.floor(math.log10(least)), top - _DECADES)
-    bottom = min(bottom, top - 2)
-    axes.set_yscale("log")
-    axes.set_ylim(10.0**bottom, 10.0**top)
-    floor = np.maximum(values, 10.0**bottom)
-    axes.plot(time, floor, color=_APART, linewidth=0.7)
+    log = LogAxis.around(values, [panel.tolerance] if panel.tolerance else [], _DECADES)
+    axes.set_ylim(log.bottom, log.high)
+    places = log.places(values)
+    axes.plot(time, places, color=_APART, linewidth=0.7)
+    if log.edge is not None:
+        axes.axhspan(log.bottom, log.edge, color=_BELOW, linewidth=0, zorder=0)
     if panel.tolerance:
-        axes.axhline(panel.tolerance, color=_INK, linewidth=0.6, linestyle=(0, (1, 1.5)))
+        limit = float(np.log10(panel.tolerance))
+        axes.axhline(limit, color=_INK, linewidth=0.6, linestyle=(0, (1, 1.5)))
         axes.fill_between(
-            time, panel.tolerance, floor, where=floor > panel.tolerance, color=_APART, alpha=0.35,
-            linewidth=0,
+            time, limit, places, where=places > limit, color=_APART, alpha=0.35, linewidth=0,
         )  # fmt: skip
-    every = max(1, round((top - bottom) / 2))
-    powers = range(top, bottom - 1, -every)
-    axes.yaxis.set_major_locator(FixedLocator([10.0**power for power in powers]))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _decade(value)))
-    axes.yaxis.set_minor_locator(FixedLocator([]))
-
-
-def _decade(value: float) -> str:
-    power = round(math.log10(value))
-    return f"{value:g}" if -2 <= power <= 3 else f"1e{power}".replace("e-", "e−")
+    ticks, labels = zip(*log.ticks(_POWERS), strict=True)
+    axes.set_yticks(ticks, labels)
+    axes.get_yticklabels()[-1].set_verticalalignment("top")  # above it is another panel's label
 
 
 def _time_axis(axes: Any, figure: Figure) -> None:

@@ -89,8 +89,9 @@ def of_comparison(one: Trace, two: Trace, comparison: Comparison, tip: str | Non
     parted = [agreement for agreement in comparison.agreements if agreement.since is not None]
     first = min((agreement.since or 0.0 for agreement in parted), default=None)
     notes = [
-        "Upper: both sides. Lower: how far apart, on a log axis; the dotted line is the "
-        "tolerance, and what is beyond it is filled. Beside the verdict: the largest difference."
+        "Upper: both sides. Lower: how far apart, on a log axis, and below it in grey what is "
+        "exactly 0; the dotted line is the tolerance, and what is beyond it is filled. Beside "
+        "the verdict: the largest difference."
     ]
     if first is not None:
         names = [agreement.name for agreement in parted if agreement.since == first]

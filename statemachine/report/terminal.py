@@ -12,8 +12,8 @@ from ..page import LETTERS, Block, Code, Page, Printed, Question, Table, Text, V
 if TYPE_CHECKING:
     from rich.console import Console
 
-# Spellings for a terminal that has no Unicode; what is not here becomes a question mark.
-_ASCII = str.maketrans(
+# Spellings for where there is no Unicode; what is not here becomes a question mark.
+ASCII = str.maketrans(
     {
         "−": "-",
         "–": "-",
@@ -25,6 +25,10 @@ _ASCII = str.maketrans(
         "\u0307": "'",
         "…": "...",
         "²": "^2",
+        "³": "^3",
+        "÷": "/",
+        "≈": "~",
+        "─": "-",
         "✓": "yes",
         "✗": "NO",
         "→": "->",
@@ -70,6 +74,17 @@ def show(page: Page, footer: str = "", ask: Callable[[Question], int | None] | N
         print(flush=True)
 
 
+def spelled(error: UnicodeError) -> tuple[str, int]:
+    """Error handler of a stream: what its encoding lacks, in ASCII.
+
+    A page has it replaced before its tables are laid out; this is for every other line.
+    """
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    lacking = error.object[error.start : error.end].translate(ASCII)
+    return lacking.encode("ascii", "replace").decode(), error.end
+
+
 def _judged(question: Question, choice: int) -> Verdict:
     """What became of a prediction."""
     if choice == question.right:
@@ -82,6 +97,8 @@ def _write(blocks: Sequence[Block], heading: Page | None = None, footer: str = "
     from rich.console import Console
 
     console = Console(highlight=False, emoji=False)
+    if console.legacy_windows:  # it would show the codes of colours as text
+        console = Console(highlight=False, emoji=False, color_system=None)
     piped = not console.is_terminal
     console.width = _WIDTH_PIPED if piped else min(console.width, _WIDTH_MOST)
     with console.capture() as captured:
@@ -96,11 +113,11 @@ def _write(blocks: Sequence[Block], heading: Page | None = None, footer: str = "
 def _print(console: Console, blocks: Sequence[Block], heading: Page | None, footer: str) -> None:
     from rich.markup import escape as escaped
 
-    plain = _plain()
+    plain = console.legacy_windows or console.options.ascii_only
 
     def escape(text: str) -> str:
         text = _CONTROL.sub("?", text)
-        return escaped(text.translate(_ASCII) if plain else text)
+        return escaped(text.translate(ASCII) if plain else text)
 
     good, bad = ("yes", "NO ") if plain else ("✓", "✗")
     if heading:
@@ -149,11 +166,6 @@ def together(by_engine: Mapping[str, str]) -> list[tuple[list[str], str]]:
     for name, text in by_engine.items():
         groups.setdefault(text, []).append(name)
     return [(names, text) for text, names in groups.items()]
-
-
-def _plain() -> bool:
-    """Whether standard output cannot take more than ASCII."""
-    return (sys.stdout.encoding or "utf-8").lower().replace("-", "") != "utf8"
 
 
 def _grid(block: Table, plain: bool, escape: Callable[[str], str], width: int) -> object:

@@ -21,7 +21,8 @@ class Gap:
     """One way in which a derived array is not what it would be now.
 
     Attributes:
-        size: The worst of its entries [unit]; None where an entry is no rotation at all.
+        size: The worst of its entries [unit], of a vector its length; None where an entry is
+            no rotation at all.
         unit: "m", "rad", "m/s²", "rad/s²", "N", "N·m"; of contacts also "appears" and "vanishes",
             whose sizes are how many there are now and were not, and the other way round.
         where: The body, site, joint or pair of geoms with the worst entry; "" if unnamed.
@@ -76,7 +77,7 @@ def gaps(model: Model, name: str, held: Array | Contacts, now: Array | Contacts)
         return (_worst(np.linalg.norm(now - held, axis=1), "m", owners),)
     if name in ("xquat", "site_xmat"):
         return (_rotated(name, held, now, owners),)
-    return tuple(_by_unit(model, name, np.abs(now - held)))
+    return tuple(_by_unit(model, name, now - held))
 
 
 def same(held: Array | Contacts, now: Array | Contacts) -> bool:
@@ -101,26 +102,31 @@ def _rotated(name: str, held: Array, now: Array, owners: Sequence[str]) -> Gap:
     return _worst(angle_between(one, two), "rad", owners)
 
 
-def _by_unit(model: Model, name: str, sizes: Array) -> Iterator[Gap]:
-    """The worst slide and the worst hinge of what has one entry for each degree of freedom."""
-    owners, linear = dofs(model)
+def _by_unit(model: Model, name: str, change: Array) -> Iterator[Gap]:
+    """The worst joint in metres and in radians, of what has an entry for each degree of freedom.
+
+    The three entries of a free or a ball joint that belong together are one vector.
+    """
+    vectors = _vectors(model)
+    sizes = np.hypot.reduceat(np.abs(change), [start for _, _, start in vectors])
+    owners = [owner for owner, _, _ in vectors]
+    linear = np.array([each for _, each, _ in vectors])
     units = ("m/s²", "rad/s²") if name == "qacc" else ("N", "N·m")
     for unit, chosen in zip(units, (linear, ~linear), strict=True):
         if sizes[chosen].any():
             yield _worst(np.where(chosen, sizes, -1.0), unit, owners)
 
 
-def dofs(model: Model) -> tuple[list[str], np.ndarray]:
-    """The joint of each degree of freedom, and (nv,) whether it is one in metres."""
-    owners, linear = [], []
-    for joint, kind in zip(model.joint_names, model.jnt_type.tolist(), strict=True):
-        count = JointType(kind).nv
-        owners += [joint] * count
+def _vectors(model: Model) -> list[tuple[str, bool, int]]:
+    """Of what belongs together among the degrees of freedom: its joint, in metres or not, start."""
+    found = []
+    joints = zip(model.joint_names, model.jnt_type.tolist(), model.jnt_dofadr.tolist(), strict=True)
+    for name, kind, start in joints:
         if kind == JointType.FREE:
-            linear += [True] * 3 + [False] * 3
+            found += [(name, True, start), (name, False, start + 3)]
         else:
-            linear += [kind == JointType.SLIDE] * count
-    return owners, np.array(linear, dtype=bool)
+            found.append((name, kind == JointType.SLIDE, start))
+    return found
 
 
 def _between_contacts(model: Model, held: Contacts, now: Contacts) -> Iterator[Gap]:

@@ -120,7 +120,7 @@ def table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
         for line in textwrap.wrap("; ".join(parts), room, break_long_words=False) or [""]:
             lines.append(start + line.replace(_TIGHT, " "))
             start = " " * indent
-    lines.insert(1, "─" * max(map(len, lines)))
+    lines.insert(1, "-" * max(map(len, lines)))
     return lines
 
 

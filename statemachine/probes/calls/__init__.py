@@ -42,6 +42,8 @@ class Statement:
             no variable leads to are left out; arrays of a model beyond 64 kB (meshes,
             pictures) are compared at the statement's ends only, and so end up here.
         printed: What it printed.
+        due: Each Data of which all that is derived now belongs to another moment, and is
+            computed when it is read.
     """
 
     source: str
@@ -49,6 +51,7 @@ class Statement:
     calls: tuple[Call, ...]
     changed: tuple[str, ...]
     printed: str
+    due: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -109,8 +112,8 @@ def record(code: str, engine: str) -> Recording:
                     run(namespace)
             except StateMachineError as refusal:
                 error = " ".join(str(refusal).split())
-            calls, changed = recorder.end(namespace)
-            done.append(Statement(source, line, calls, changed, out.getvalue()))
+            calls, changed, due = recorder.end(namespace)
+            done.append(Statement(source, line, calls, changed, out.getvalue(), due))
             if error is not None:
                 break
     for name, value in namespace.items():

@@ -121,6 +121,7 @@ class _Arrays(Subject):
     def __init__(self, machine: Machine, label: str) -> None:
         super().__init__("a Data", label)
         self._machine = weakref.ref(machine)  # a Data ends when the code lets go of it
+        self._moment = machine._moment
 
     @property
     def gone(self) -> bool:
@@ -142,6 +143,13 @@ class _Arrays(Subject):
     def differing(self, before: Look, now: Look) -> list[str]:
         # What was never read is what a fresh Data says: zeros.
         return [name for name, new in now.items() if before.get(name, bytes(len(new))) != new]
+
+    def due(self) -> bool:
+        machine = self._machine()
+        if machine is None or machine._moment is self._moment:
+            return False
+        self._moment = machine._moment
+        return not machine._derived
 
     def entry(self, field: str, before: bytes, after: bytes) -> str:
         return entries(field, before, after, 8) if field in INPUTS else field

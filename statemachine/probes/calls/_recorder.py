@@ -73,6 +73,10 @@ class Subject(ABC):
         """The fields of both looks that differ."""
         return [field for field, value in now.items() if before.get(field, value) != value]
 
+    def due(self) -> bool:
+        """Whether, since it was last asked, all that is derived became something to compute."""
+        return False
+
     def entry(self, field: str, before: bytes, after: bytes) -> str:
         """A field, or which entries of it differ."""
         return field
@@ -164,13 +168,18 @@ class Recorder:
         self._tallies, self._written = {}, {}
         self._listening = True
 
-    def end(self, namespace: Mapping[str, Any]) -> tuple[tuple[Call, ...], tuple[str, ...]]:
-        """A statement has run: its calls, and what changed outside them."""
+    def end(
+        self, namespace: Mapping[str, Any]
+    ) -> tuple[tuple[Call, ...], tuple[str, ...], tuple[str, ...]]:
+        """A statement has run: its calls, what changed outside them, whose values are due."""
         self._listening = False
+        due: list[str] = []
         for watch in self._watches:
             watch.name(namespace)
             for subject in watch.living():
                 self._note_writes(subject, thoroughly=True)
+                if subject.due():
+                    due.append(subject.title)
         merged: dict[tuple[str, str, str], tuple[int, dict[str, None]]] = {}
         for (engine, function, on), tally in self._tallies.items():
             key = engine, function, on.title if on else ""
@@ -187,7 +196,7 @@ class Recorder:
             for (subject, field), entries in self._written.items()
             if subject.named
         )
-        return calls, changed
+        return calls, changed, tuple(due)
 
     def _call(
         self, watch: Watch, function: str, bare: Callable[..., Any], args: Any, kwargs: Any

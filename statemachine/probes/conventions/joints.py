@@ -142,7 +142,7 @@ def pinocchio() -> Findings:
     pin = require("pinocchio")
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "tree.xml"  # of an MJCF it takes files only
-        file.write_text(MJCF)
+        file.write_text(MJCF, encoding="utf-8")
         models = {"URDF": pin.buildModelFromXML(URDF), "MJCF": pin.buildModelFromMJCF(str(file))}
     found: Findings = ()
     for of, model in models.items():

@@ -105,7 +105,7 @@ def _call(module: Any, concept: str) -> Call:
     said = ""
     with tempfile.TemporaryDirectory() as folder, silence():
         file = Path(folder) / module.FILE[0]
-        file.write_text(module.FILE[1])
+        file.write_text(module.FILE[1], encoding="utf-8")
         names["file"] = str(file)
         try:
             for each in CONCEPTS[: CONCEPTS.index(concept) + 1]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...compare import Series, series
+from ...compare.series import NORMAL
 from ...records import Array, Ints, JointType
 from ...traces import Trace
 from .scene import slerp
@@ -88,7 +89,7 @@ def own_series(one: Trace, two: Trace, tip: str | None) -> dict[str, tuple[Serie
     sides = [{curve.name: curve for curve in series(trace, trace, tip)} for trace in (one, two)]
     found = {}
     for name in dict.fromkeys([*sides[0], *sides[1]]):
-        turned = " – ".join(reversed(name.removesuffix(", force").split(" – "))) + ", force"
+        turned = " – ".join(reversed(name.removesuffix(NORMAL).split(" – "))) + NORMAL
         pair = [side.get(name) or side.get(turned) for side in sides]
         known = pair[0] or pair[1]
         if known is not None and known.kind == "force":  # a side that never touches presses nothing

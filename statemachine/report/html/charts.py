@@ -12,6 +12,7 @@ import numpy as np
 from ...compare import Agreement, Series
 from ...records import Array, Ints
 from ..figures_of import figure, quantity, scale_of, short_time
+from ..log_axis import LogAxis
 from .finding import name_of
 from .markup import Html, joined, tag
 
@@ -20,6 +21,7 @@ _HIGH = 50.0  # times the tolerance: a difference that reaches more has a log ax
 _DECADES = 1e-2  # of the tolerance: where a log axis begins
 _APART = 13.0  # percent of a chart's height between two names at its end
 _ROUNDING = 1e-6  # of a tolerance
+_POWERS = 5  # that a log axis names, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,11 +48,12 @@ def difference_chart(curve: Series, found: Agreement, points: int = 600) -> Html
     band = found.tolerance * scale
     values = curve.difference * scale
     if logarithmic(found):
-        low = math.log10(_DECADES * band)
-        values = np.log10(np.maximum(values, 10.0**low))
+        axis = LogAxis(
+            math.log10(_DECADES * band), math.log10(top) + 0.1, bool((values == 0).any())
+        )
         return _plot(
-            curve.time, [Curve(values, "apart")], (low, math.log10(top) + 0.1),
-            said, band=math.log10(band), points=points, powers=True,
+            curve.time, [Curve(axis.places(values), "apart")], (axis.bottom, axis.high),
+            said, band=math.log10(band), points=points, log=axis,
         )  # fmt: skip
     return _plot(curve.time, [Curve(values, "apart")], (0.0, top), said, band=band, points=points)
 
@@ -152,7 +155,7 @@ def _plot(
     said: str,
     band: float | None = None,
     points: int = 600,
-    powers: bool = False,
+    log: LogAxis | None = None,
 ) -> Html:
     """Curves in a box of 1000 × 100 that is stretched to its place; ticks are text beside it."""
     until = float(time[-1]) or 1.0
@@ -163,13 +166,21 @@ def _plot(
         marks.append(tag("rect", x=0, y=f"{y:.2f}", width=1000, height=f"{100 - y:.2f}",
                          class_="band"))  # fmt: skip
         marks.append(tag("line", x1=0, x2=1000, y1=f"{y:.2f}", y2=f"{y:.2f}", class_="edge"))
-    ticks = _powers(low, high) if powers else ticks_of(low, high)
-    if len(ticks) < 2:
-        ticks = ticks_of(low, high, 8)
+    if log is None:
+        levels = ticks_of(low, high)
+        if len(levels) < 2:
+            levels = ticks_of(low, high, 8)
+        digits = _digits(levels)
+        ticks = [(tick, f"{tick:.{digits}f}") for tick in levels]
+    else:
+        ticks = log.ticks(_POWERS)
+        if log.edge is not None:
+            y = _up(log.edge, low, high)
+            marks.append(tag("path", d=f"M0 {y:.2f}H1000V100H0Z", class_="zero"))
     marks += [
         tag("line", x1=0, x2=1000, y1=f"{_up(t, low, high):.2f}", y2=f"{_up(t, low, high):.2f}",
             class_="grid")
-        for t in ticks
+        for t, _ in ticks
     ]  # fmt: skip
     marks += [
         tag(
@@ -180,12 +191,10 @@ def _plot(
         for each in sorted(curves, key=lambda each: each.look)
     ]
     svg = tag("svg", *marks, viewBox="0 0 1000 100", preserveAspectRatio="none", focusable="false")
-    digits = _digits(ticks)
     labels = [
-        tag("span", f"{10.0**tick:g}" if powers else f"{tick:.{digits}f}", class_="ytick",
-            style=f"top:{_up(tick, low, high):.2f}%")
-        for tick in ticks
-    ]  # fmt: skip
+        tag("span", text, class_="ytick", style=f"top:{_up(tick, low, high):.2f}%")
+        for tick, text in ticks
+    ]
     ending = [curve for curve in curves if curve.label]
     places = spread([_up(float(curve.y[-1]), low, high) for curve in ending])
     ends = [
@@ -200,12 +209,6 @@ def _plot(
         role="img",
         aria_label=said,
     )
-
-
-def _powers(low: float, high: float) -> list[float]:
-    """Powers of ten within a range of exponents, every other if they are many."""
-    found = [float(k) for k in range(math.ceil(low - 1e-9), math.floor(high + 1e-9) + 1)]
-    return found[:: -(-len(found) // 5)]
 
 
 def spread(places: Sequence[float], apart: float = _APART) -> list[float]:

@@ -18,7 +18,7 @@ def curves_section(
     own: Mapping[str, tuple[Series, Series]],
     labels: tuple[str, str],
     points: int,
-    energy_by: str = "",
+    feet: Mapping[str, str],
 ) -> Html:
     """A row of charts for each quantity, those that differ first.
 
@@ -28,7 +28,7 @@ def curves_section(
         own: Of each side at its own rows, by name.
         labels: What the sides are called.
         points: At most, of a curve.
-        energy_by: What is said beside the energy: by what it was computed.
+        feet: What is said under the charts of a quantity, by its name.
     """
     by_name = {found.name: found for found in comparison.agreements}
     shown: dict[str, list[tuple[float, Html]]] = {"differs": [], "settles": [], "agrees": []}
@@ -49,7 +49,7 @@ def curves_section(
                 tag("figure", tag("figcaption", f"both sides, {unit}"), chart) if chart else None,
                 class_="charts",
             ),
-            tag("p", energy_by, class_="foot") if curve.kind == "energy" and energy_by else None,
+            tag("p", feet[curve.name], class_="foot") if curve.name in feet else None,
             tag("details", tag("summary", f"The figures of {name_of(curve.name)}"),
                 data_table(curve, found, labels), class_="data"),
             class_="quantity-row",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
@@ -13,8 +13,10 @@ import numpy as np
 
 from ... import __version__
 from ...compare import Comparison, Series, Witness, default_tip, series
+from ...compare.series import NORMAL, same_pairs, total_forces
 from ...page import Page, Verdict
 from ...traces import Trace
+from ..figures_of import figure
 from . import sections
 from .between import own_series, shown_series
 from .budget import Budget
@@ -150,7 +152,12 @@ def _report(
             "curves",
             "How far apart, over time",
             curves_section(
-                comparison, drawn, own, labels, budget.points(len(drawn)), _energy_by(one, two)
+                comparison,
+                drawn,
+                own,
+                labels,
+                budget.points(len(drawn)),
+                _feet(own, one, two, labels),
             ),
         ),
         _section(
@@ -240,6 +247,25 @@ def _head(
         *(tag("p", kept(line)) for line in never),
         tag("div", command, *(tag("p", kept(line)) for line in words), class_="words"),
     )  # fmt: skip
+
+
+def _feet(
+    own: Mapping[str, tuple[Series, Series]], one: Trace, two: Trace, labels: tuple[str, str]
+) -> dict[str, str]:
+    """Under the charts of the energy by what it was computed; of a force its other figure."""
+    found = {"energy": _energy_by(one, two)}
+    totals = [total_forces(one)]
+    totals.append(same_pairs(totals[0], total_forces(two)))
+    for name, sides in own.items():
+        if name.endswith(NORMAL):
+            pair = name.removesuffix(NORMAL)
+            whole = [total[pair].max() if pair in total else 0.0 for total in totals]
+            found[name] = "Drawn is the sum of the normal forces. " + " ".join(
+                f"On {label} it is at most {figure(float(side.one.max()))} N; the whole force, "
+                f"friction added as vectors, is at most {figure(float(most))} N."
+                for label, side, most in zip(labels, sides, whole, strict=True)
+            )
+    return found
 
 
 def _energy_by(one: Trace, two: Trace) -> str:

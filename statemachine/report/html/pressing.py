@@ -9,6 +9,7 @@ import numpy as np
 
 from ...compare import Comparison
 from ...compare.agreement import SETTLED
+from ...compare.series import world_forces
 from ...traces import Trace
 from ..figures_of import figure, short_time
 from .timeline import touching
@@ -20,6 +21,7 @@ class Pressing:
 
     Attributes:
         force: By "gripper on floor", the mean normal force over the end [N]; those that press.
+        total: The same of the length of the whole force, friction and all.
         last: When anything last touches [s]; None if nothing ever does.
         lasts: Whether something touches at the last row.
         deepest: The deepest overlap [m]; deep_at: when [s]; deep: of what.
@@ -31,6 +33,7 @@ class Pressing:
     deepest: float
     deep_at: float
     deep: str
+    total: dict[str, float]
 
 
 def pressing(trace: Trace, until: float) -> Pressing | None:
@@ -41,7 +44,7 @@ def pressing(trace: Trace, until: float) -> Pressing | None:
     inside = elapsed[trace["contact_row"]] <= until + 1e-9
     rows = trace["contact_row"][inside]
     if not len(rows):
-        return Pressing({}, None, False, 0.0, 0.0, "")
+        return Pressing({}, None, False, 0.0, 0.0, "", {})
     names = touching(trace)
     pairs = np.array([names[tuple(geoms)] for geoms in trace["contact_geom"][inside].tolist()])
     normal = trace["contact_force"][inside][:, 0]
@@ -52,6 +55,12 @@ def pressing(trace: Trace, until: float) -> Pressing | None:
         for pair in dict.fromkeys(pairs[late].tolist())
     }
     force = {pair: value for pair, value in force.items() if value > 0}
+    pushes = world_forces(trace)[inside]
+    total = {}
+    for pair in force:
+        sums, chosen = np.zeros((len(trace), 3)), late & (pairs == pair)
+        np.add.at(sums, rows[chosen], pushes[chosen])
+        total[pair] = float(np.linalg.norm(sums[end], axis=1).mean())
     distance = np.nan_to_num(trace["contact_dist"][inside])
     worst = int(np.argmin(distance))
     return Pressing(
@@ -61,6 +70,7 @@ def pressing(trace: Trace, until: float) -> Pressing | None:
         deepest=max(0.0, -float(distance[worst])),
         deep_at=float(elapsed[rows[worst]]),
         deep=str(pairs[worst]),
+        total=total,
     )
 
 
@@ -99,7 +109,8 @@ def _end(side: Pressing, label: str) -> str:
     if not side.force:
         return f"on {label} what touches presses with no force"
     listed = [
-        f"{'and ' if k else ''}{pair.replace(' on ', ' presses on ', 1)} with {figure(value)} N"
+        f"{'and ' if k else ''}{pair.replace(' on ', ' presses on ', 1)} with {figure(value)} N "
+        f"(with friction {figure(side.total[pair])} N)"
         for k, (pair, value) in enumerate(list(side.force.items())[:3])
     ]
     return f"on {label} {' '.join(listed)}"

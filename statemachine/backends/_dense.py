@@ -1,0 +1,52 @@
+"""Small dense algebra that gives the same bits on every processor of a kind.
+
+NumPy's products and solutions go through a BLAS that chooses its kernels by the
+processor, and their last bits differ. MuJoCo's functions were compiled once, for all.
+They are also as quick, at these sizes.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from ..records import Array
+
+_TINY = 1e-15  # smallest pivot
+
+
+def times(matrix: Array, vector: Array) -> Array:
+    """The product (n,) of a matrix (n, m) and a vector (m,)."""
+    product = np.empty(len(matrix))
+    mujoco.mju_mulMatVec(product, matrix, vector)
+    return product
+
+
+def product(left: Array, right: Array) -> Array:
+    """The product (n, k) of matrices (n, m) and (m, k)."""
+    found = np.empty((len(left), right.shape[1]))
+    mujoco.mju_mulMatMat(found, left, right)
+    return found
+
+
+def dot(left: Array, right: Array) -> float:
+    """The product of two vectors (n,)."""
+    return mujoco.mju_dot(left, right)
+
+
+def factored(matrix: Array) -> Array:
+    """Cholesky's factor of a positive definite matrix (n, n), which it takes the place of."""
+    mujoco.mju_cholFactor(matrix, _TINY)
+    return matrix
+
+
+def solved(factor: Array, right: Array) -> Array:
+    """The solution (n,) for a right-hand side (n,)."""
+    found = np.empty(len(right))
+    mujoco.mju_cholSolve(found, factor, right)
+    return found
+
+
+def inverse(factor: Array) -> Array:
+    """The inverse (n, n) of the matrix that was factored."""
+    return np.array([solved(factor, column) for column in np.eye(len(factor))])

@@ -1,0 +1,196 @@
+"""What C code prints is caught; what anybody else prints is not."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from statemachine.silence import silence
+
+from .conftest import ROOT, need_engine
+
+pytestmark = pytest.mark.skipif(
+    sys.platform not in ("linux", "darwin"), reason="C's streams can be exchanged in its library"
+)
+
+
+def _print(line: bytes) -> None:
+    ctypes.CDLL(None).puts(line)
+
+
+def test_what_c_prints_is_caught() -> None:
+    libc = ctypes.CDLL(None)
+    with silence() as lines:
+        libc.puts(b"one")
+        libc.perror(b"two")
+        assert lines == []
+    assert lines[0] == "one"
+    assert lines[1].startswith("two: ")
+    with silence() as lines:
+        libc.puts(b"three")
+    assert lines == ["three"]
+
+
+def test_what_is_caught_within_is_told_within() -> None:
+    with silence() as outer:
+        _print(b"one")
+        with silence() as inner:
+            _print(b"two")
+        _print(b"three")
+    assert (outer, inner) == (["one", "three"], ["two"])
+
+
+def test_after_an_error_the_streams_are_back(capfd: pytest.CaptureFixture[str]) -> None:
+    caught = []
+
+    def fail() -> None:
+        with silence() as lines:
+            caught.append(lines)
+            _print(b"caught")
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert caught == [["caught"]]
+    _print(b"seen")
+    ctypes.CDLL(None).fflush(None)
+    assert capfd.readouterr() == ("seen\n", "")
+
+
+def test_what_another_thread_prints_is_not_caught(capfd: pytest.CaptureFixture[str]) -> None:
+    begun, printed = threading.Event(), threading.Event()
+
+    def work() -> None:
+        begun.wait(10)
+        os.write(1, b"one\n")
+        print("two", file=sys.__stderr__, flush=True)
+        printed.set()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    with silence() as lines:
+        begun.set()
+        assert printed.wait(10)
+    thread.join()
+    assert lines == []
+    assert capfd.readouterr() == ("one\n", "two\n")
+
+
+def test_nothing_is_lost_while_worlds_are_made() -> None:
+    """A thread prints a thousand numbered lines while the engine loads and is quiet."""
+    need_engine("pybullet")
+    code = """
+import os, threading, time
+import statemachine as sm
+
+model = sm.load("so101/scene", backend="pybullet")
+
+def work():
+    for k in range(1000):
+        os.write(1, b"%d\\n" % k)
+        time.sleep(0.0005)
+
+printing = threading.Thread(target=work)
+printing.start()
+made = 0
+while printing.is_alive() or made < 3:
+    sm.make_data(model).close()
+    made += 1
+"""
+    done = _python(code)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.split() == [str(k) for k in range(1000)]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+def test_a_fork_meanwhile_does_not_hang() -> None:
+    """The child has neither the other thread's lock nor its streams."""
+    code = """
+import ctypes, os, threading
+from statemachine.silence import silence
+
+begun, ended = threading.Event(), threading.Event()
+
+def work():
+    with silence():
+        begun.set()
+        ended.wait(20)
+
+thread = threading.Thread(target=work)
+thread.start()
+begun.wait(10)
+child = os.fork()
+if not child:
+    libc = ctypes.CDLL(None)
+    with silence() as lines:
+        libc.puts(b"caught")
+    libc.puts(b"seen")
+    libc.fflush(None)
+    os._exit(lines != ["caught"])
+_, status = os.waitpid(child, 0)
+ended.set()
+thread.join()
+assert status == 0, status
+"""
+    done = _python(code)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "seen\n", "")
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+def test_a_fork_while_a_world_is_used_does_not_hang() -> None:
+    """The worlds that the Data of one Model share are behind a lock, too."""
+    need_engine("pybullet")
+    code = """
+import os, threading
+import statemachine as sm
+
+model = sm.load("so101/scene", backend="pybullet")
+data = sm.make_data(model)
+begun, ended = threading.Event(), threading.Event()
+
+def work():
+    with model._shared.lock:
+        begun.set()
+        ended.wait(20)
+
+thread = threading.Thread(target=work)
+thread.start()
+begun.wait(10)
+child = os.fork()
+if not child:
+    sm.forward(model, data)
+    os._exit(not data.qacc.any() or not data.xpos.any())
+_, status = os.waitpid(child, 0)
+ended.set()
+thread.join()
+assert status == 0, status
+"""
+    done = _python(code)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def _python(code: str) -> subprocess.CompletedProcess[str]:
+    started = time.monotonic()
+    child = subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        start_new_session=True,
+    )
+    try:
+        out, said = child.communicate(timeout=60)
+    except subprocess.TimeoutExpired:
+        pytest.fail(f"it hangs after {time.monotonic() - started:.0f} s")
+    finally:
+        if child.poll() is None:
+            os.killpg(child.pid, 9)
+            child.communicate()
+    return subprocess.CompletedProcess([], child.returncode, out, said)

@@ -1,0 +1,133 @@
+"""A Data belongs to one thread at a time: the second is refused, and disturbs nothing."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine import errors
+
+from .conftest import need_engine
+
+BUSY: type[Exception] | None = getattr(errors, "BusyDataError", None)
+unguarded = pytest.mark.xfail(BUSY is None, strict=True, reason="nothing guards a Data yet")
+
+Use = Callable[[sm.Model, sm.Data], object]
+USES: dict[str, Use] = {
+    "step": lambda model, data: sm.step(model, data),
+    "bulk": lambda model, data: sm.step(model, data, 20),
+    "forward": lambda model, data: sm.forward(model, data),
+    "reset": lambda model, data: sm.reset(model, data),
+    "get_state": lambda model, data: sm.get_state(model, data),
+    "set_state": lambda model, data: sm.set_state(model, data, sm.get_state(model, data)),
+    "close": lambda _, data: data.close(),
+    "with": lambda _, data: data.__exit__(),
+    "contacts": lambda _, data: data.contacts,
+    "xpos": lambda _, data: data.xpos,
+    "site_xmat": lambda _, data: data.site_xmat,
+    "qacc": lambda _, data: data.qacc,
+    "qfrc_bias": lambda _, data: data.qfrc_bias,
+    "qfrc_contact": lambda _, data: data.qfrc_contact,
+}
+
+
+@pytest.fixture(params=["mujoco", "pybullet"])
+def model(request: pytest.FixtureRequest) -> sm.Model:
+    need_engine(request.param)
+    return sm.load("so101/scene_box", backend=request.param)
+
+
+def _meanwhile(data: sm.Data, use: Callable[[], object]) -> list[Exception | None]:
+    """Let another thread use something in the middle of the next step; what it raised."""
+    right, raised = data._advance, []
+
+    def work() -> None:
+        try:
+            use()
+        except Exception as error:
+            raised.append(error)
+        else:
+            raised.append(None)
+
+    def advance(*nstep: int) -> None:
+        object.__setattr__(data, "_advance", right)
+        right(*nstep)
+        thread = threading.Thread(target=work)
+        thread.start()
+        thread.join()
+
+    object.__setattr__(data, "_advance", advance)
+    return raised
+
+
+@unguarded
+@pytest.mark.parametrize("name", USES)
+def test_a_second_thread_is_refused_while_one_steps(model: sm.Model, name: str) -> None:
+    with sm.make_data(model) as data, sm.make_data(model) as alone:
+        for each in (data, alone):
+            sm.reset(model, each, keyframe=0)
+            sm.step(model, each, 20)
+        raised = _meanwhile(data, lambda: USES[name](model, data))
+        for each in (data, alone):
+            sm.step(model, each, 3)
+        (error,) = raised
+        assert BUSY is not None
+        assert isinstance(error, BUSY)
+        assert np.array_equal(data.qacc, alone.qacc)
+        assert sm.get_state(model, data) == sm.get_state(model, alone)
+        USES[name](model, data)  # afterwards nothing is held any more
+
+
+def test_another_data_is_not_refused(model: sm.Model) -> None:
+    """The Model, and what its Data share behind it, may be used by all threads."""
+    with sm.make_data(model) as data, sm.make_data(model) as other:
+
+        def use() -> None:
+            sm.step(model, other, 5)
+            sm.forward(model, other)
+            assert other.qacc.any()
+            with sm.make_data(model) as third:
+                sm.step(model, third)
+
+        raised = _meanwhile(data, use)
+        sm.step(model, data)
+        assert raised == [None]
+
+
+@unguarded
+def test_nothing_of_two_threads_is_lost(model: sm.Model) -> None:
+    """Both step one Data as fast as they can: each step counts, or is refused."""
+    if BUSY is None and model.backend == "mujoco":
+        pytest.xfail("it would end the process")
+    taken: list[int] = []
+
+    def work(data: sm.Data) -> None:
+        count = 0
+        for _ in range(150):
+            try:
+                sm.step(model, data, 2)
+            except Exception as error:
+                if BUSY is None or not isinstance(error, BUSY):
+                    raise
+            else:
+                count += 1
+        taken.append(count)
+
+    with sm.make_data(model) as data, sm.make_data(model) as alone:
+        _together(work, data)
+        for _ in range(sum(taken)):
+            sm.step(model, alone, 2)
+        assert sm.get_state(model, data) == sm.get_state(model, alone)
+
+
+def _together(work: Callable[..., Any], *args: object) -> None:
+    threads = [threading.Thread(target=work, args=args) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
