@@ -8,9 +8,9 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from .errors import BadInputError, unknown_name
+from .errors import BadInputError, shown, unknown_name
 from .records import Array
 
 # MuJoCo calls a coordinate beyond this "huge" and the simulation unstable (mjMAXVAL).
@@ -23,9 +23,9 @@ def as_count(value: Any, name: str) -> int:
     """`value` as a whole number of at least 1, or BadInputError."""
     number = whole_number(value)
     if number is None or number < 1:
-        raise BadInputError(f"{name} must be a whole number of at least 1; got {value!r}")
+        raise BadInputError(f"{name} must be a whole number of at least 1; got {shown(value)}")
     if number >= 2**31:  # engines count in a C int
-        raise BadInputError(f"{name} must be below {2**31}; got {value!r}")
+        raise BadInputError(f"{name} must be below {2**31}; got {shown(value)}")
     return number
 
 
@@ -42,7 +42,7 @@ def whole_number(value: Any) -> int | None:
 def as_switch(value: Any, name: str) -> bool:
     """`value` as a bool, or BadInputError."""
     if not isinstance(value, (bool, np.bool_)):
-        raise BadInputError(f"{name} must be True or False; got {value!r}")
+        raise BadInputError(f"{name} must be True or False; got {shown(value)}")
     return bool(value)
 
 
@@ -53,17 +53,23 @@ def as_scalar(value: ArrayLike, name: str) -> float:
 
 def as_vector(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
     """`value` as finite float64 of exactly this shape, in a new array, or BadInputError."""
-    try:
-        array = np.asarray(value)
-    except (TypeError, ValueError) as error:  # a ragged list
-        raise BadInputError(f"{name} must be numbers of shape {shape}") from error
-    if array.dtype.kind not in "fiu":
-        raise BadInputError(f"{name} must be real numbers; got {array.dtype}")
+    array = as_numbers(value, name)
     if array.shape != shape:
         wanted = f"{shape[0]} numbers, shape {shape}" if shape else "one number"
         raise BadInputError(f"{name} wants {wanted}; got shape {array.shape}")
     array = array.astype(np.float64)
     check_entries(array, name)
+    return array
+
+
+def as_numbers(value: ArrayLike, name: str) -> NDArray[Any]:
+    """`value` as an array of real numbers of whatever shape, or BadInputError."""
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError, OverflowError) as error:  # a ragged list
+        raise BadInputError(f"{name} must be real numbers, in a regular array") from error
+    if array.dtype.kind not in "fiu":
+        raise BadInputError(f"{name} must be real numbers; got {array.dtype}")
     return array
 
 

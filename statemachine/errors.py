@@ -62,6 +62,10 @@ class ClosedDataError(StateMachineError, RuntimeError):
     """A Data was used after `close`."""
 
 
+class BusyDataError(StateMachineError, RuntimeError):
+    """A Data was used while another thread was using it."""
+
+
 class DivergedError(StateMachineError, ArithmeticError):
     """A coordinate stopped being finite while the engine stepped."""
 
@@ -103,12 +107,18 @@ class EngineWarning(UserWarning):
     """A warning that an engine gave, brought up into Python."""
 
 
+def shown(value: object) -> str:
+    """What somebody gave, on one line of a message."""
+    text = " ".join("".join(c if c.isprintable() else " " for c in repr(value)).split())
+    return text if len(text) <= 200 else f"{text[:197]}..."
+
+
 def unknown_name(kind: str, name: object, known: Iterable[str]) -> UnknownNameError:
     """The error for a mistyped name: what is known, and the nearest spelling."""
     names = tuple(known)
     listed = ", ".join(names) if names else "none"
-    message = f"no {kind} named {name!r}; known: {listed}"
-    close = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
+    message = f"no {kind} named {shown(name)}; known: {listed}"
+    close = difflib.get_close_matches(name if isinstance(name, str) else "", names, 1, 0.5)
     if close:
         message += f". Did you mean {close[0]!r}?"
     return UnknownNameError(message, kind=kind, name=name, known=names)

@@ -20,12 +20,12 @@ from .checks import as_scalar, as_vector
 from .errors import ClosedDataError, DivergedError, ReadOnlyError
 from .model import OPTIONS, Model
 from .records import INPUTS, Array, Contacts, State, read_only
+from .turns import Turn, alone
 
 __all__ = ["OPTIONS", "Data", "Model"]
 
-_NOBODY = object()  # not None, which a caller might hand over as a Model
 # By name, so that type checkers take the inputs for the descriptors below.
-_SLOTS = ("_home", "_model", "_trouble", "_alarms", "_advance", *INPUTS)
+_SLOTS = ("_home", "_turn", "_trouble", "_advance", "_warned", "_told", *INPUTS)
 
 if TYPE_CHECKING:
 
@@ -61,17 +61,21 @@ class Data(ABC):
     step, or to that of the last `forward`; a write to an input changes none of it.
     On a fresh or reset Data it is zero. The equation of motion that it satisfies:
     M·qacc + qfrc_bias = qfrc_actuator + qfrc_passive + qfrc_constraint.
+
+    A Data belongs to one thread at a time; several Data of one Model may run in several
+    threads. A verb or a derived attribute refuses a Data that another thread is using just
+    then (BusyDataError). Reading and writing the arrays of the inputs, and all that is
+    done to `raw`, is not guarded: there a lock of the caller's has to keep threads apart.
     """
 
-    # `_model` is the owner while the Data is usable and nobody while it refuses, so
-    # that a verb needs one comparison; `_home` is the owner for good.
     __slots__ = _SLOTS
 
-    _home: Model
-    _model: object
-    _trouble: str
-    _alarms: list[Any]  # truthy when the engine has something to say
+    _home: Model  # the owner
+    _turn: Turn
+    _trouble: str  # why the Data refuses; "" if it does not
     _advance: Callable[..., None]  # the engine's own step: (nstep=1)
+    _warned: Any  # differs from `_told` when the engine has something to say
+    _told: Any
     if TYPE_CHECKING:
         qpos = _Input()
         qvel = _Input()
@@ -88,8 +92,8 @@ class Data(ABC):
         self,
         model: Model,
         advance: Callable[..., None],
-        alarms: list[Any],
         inputs: Mapping[str, Array],
+        warnings: tuple[Any, Any] = (None, None),
     ) -> None:
         """Fill the slots; a backend's own `__init__` calls this.
 
@@ -97,11 +101,15 @@ class Data(ABC):
             model: The Model that makes this Data.
             advance: The engine's own step, called with a number of steps or, for
                 one, with nothing.
-            alarms: A list; whatever is in it after a step makes the verb call `_attend`.
             inputs: The arrays qpos, qvel and ctrl, the same for the whole life.
+            warnings: Two things of the engine's; when they differ after a step, the verb
+                calls `_attend`.
         """
-        for name, value in (("_home", model), ("_advance", advance), ("_alarms", alarms)):
-            object.__setattr__(self, name, value)
+        object.__setattr__(self, "_home", model)
+        object.__setattr__(self, "_advance", advance)
+        object.__setattr__(self, "_turn", Turn(model))
+        object.__setattr__(self, "_warned", warnings[0])
+        object.__setattr__(self, "_told", warnings[1])
         for name in INPUTS:
             object.__setattr__(self, name, inputs[name])
         self._recover()
@@ -114,73 +122,72 @@ class Data(ABC):
     @property
     def xpos(self) -> Array:
         """(nbody, 3) body origins in world axes [m]."""
-        return self._derive("xpos")
+        return alone(self, self._derive, "xpos")
 
     @property
     def xquat(self) -> Array:
         """(nbody, 4) body orientations, wxyz."""
-        return self._derive("xquat")
+        return alone(self, self._derive, "xquat")
 
     @property
     def site_xpos(self) -> Array:
         """(nsite, 3) site positions in world axes [m]."""
-        return self._derive("site_xpos")
+        return alone(self, self._derive, "site_xpos")
 
     @property
     def site_xmat(self) -> Array:
         """(nsite, 9) site rotation matrices, row by row."""
-        return self._derive("site_xmat")
+        return alone(self, self._derive, "site_xmat")
 
     @property
     def contacts(self) -> Contacts:
         """The contacts; see `Contacts`."""
-        self._refuse_if_troubled()
-        return self._find_contacts()
+        return alone(self, self._find_contacts)
 
     @property
     def qacc(self) -> Array:
         """(nv,) accelerations [rad/s² or m/s²]."""
-        return self._derive("qacc")
+        return alone(self, self._derive, "qacc")
 
     @property
     def qfrc_bias(self) -> Array:
         """(nv,) gravity, centrifugal and Coriolis [N·m or N]; on the left-hand side."""
-        return self._derive("qfrc_bias")
+        return alone(self, self._derive, "qfrc_bias")
 
     @property
     def qfrc_actuator(self) -> Array:
         """(nv,) what the actuators exert [N·m or N]."""
-        return self._derive("qfrc_actuator")
+        return alone(self, self._derive, "qfrc_actuator")
 
     @property
     def qfrc_passive(self) -> Array:
         """(nv,) springs and viscous damping [N·m or N]."""
-        return self._derive("qfrc_passive")
+        return alone(self, self._derive, "qfrc_passive")
 
     @property
     def qfrc_constraint(self) -> Array:
         """(nv,) contact, dry friction and limits together [N·m or N]."""
-        return self._derive("qfrc_constraint")
+        return alone(self, self._derive, "qfrc_constraint")
 
     @property
     def qfrc_contact(self) -> Array:
         """(nv,) the part of qfrc_constraint that contacts exert."""
-        return self._derive("qfrc_contact")
+        return alone(self, self._derive, "qfrc_contact")
 
     @property
     def qfrc_friction(self) -> Array:
         """(nv,) the part that dry friction in the joints exerts."""
-        return self._derive("qfrc_friction")
+        return alone(self, self._derive, "qfrc_friction")
 
     @property
     def qfrc_limit(self) -> Array:
         """(nv,) the part that joint limits exert."""
-        return self._derive("qfrc_limit")
+        return alone(self, self._derive, "qfrc_limit")
 
     @property
     def qfrc_equality(self) -> Array:
         """(nv,) the part that equality constraints exert."""
-        return self._derive("qfrc_equality")
+        return alone(self, self._derive, "qfrc_equality")
 
     @property
     def model(self) -> Model:
@@ -192,8 +199,10 @@ class Data(ABC):
 
         The last qpos, qvel and ctrl stay readable; every other use is an error.
         """
-        if self._trouble == "closed":
-            return
+        if self._trouble != "closed":
+            alone(self, self._shut, even_troubled=True)
+
+    def _shut(self) -> None:
         self._give_up("closed")
         for name in INPUTS:
             # The last values stay readable, apart from the engine's memory, which a view
@@ -201,7 +210,8 @@ class Data(ABC):
             view = getattr(self, name)
             object.__setattr__(self, name, read_only(view))
             view.setflags(write=False)
-        object.__setattr__(self, "_advance", None)
+        for name in ("_advance", "_warned", "_told"):
+            object.__setattr__(self, name, None)
         self._close()
 
     def __enter__(self) -> Data:
@@ -213,6 +223,7 @@ class Data(ABC):
     def __setattr__(self, name: str, value: Any) -> None:
         if name in INPUTS:
             self._refuse_if_troubled()
+            self._check_writable()
             target = getattr(self, name)
             checked = as_vector(value, target.shape, name)
             if name == "qpos":
@@ -246,24 +257,31 @@ class Data(ABC):
                 f"this Data is not usable any more ({self._trouble}): reset it, or set_state"
             )
 
+    def _check_writable(self) -> None:
+        """Raise ReadOnlyError where the caller made an input read-only."""
+        for name in INPUTS:
+            if not getattr(self, name).flags.writeable:
+                raise ReadOnlyError(
+                    f"{name} was made read-only, so that the engine has nowhere to write to: "
+                    f"call data.{name}.setflags(write=True)"
+                )
+
     def _give_up(self, why: str) -> None:
-        """Refuse everything but `reset` and `set_state` from now on."""
-        object.__setattr__(self, "_model", _NOBODY)
+        """Refuse everything but `reset` and `set_state`, once the verb that runs has ended."""
         object.__setattr__(self, "_trouble", why)
 
     def _recover(self) -> None:
-        object.__setattr__(self, "_model", self._home)
         object.__setattr__(self, "_trouble", "")
 
     def _attend(self) -> None:  # noqa: B027  (optional hook)
-        """Look into a non-empty `_alarms`; raise what concerns this Data."""
+        """Raise, or pass on, what the engine warned of since the last time."""
 
     def _failed(self, error: Exception) -> None:  # noqa: B027  (optional hook)
-        """Raise what `error`, out of `_advance`, means for this Data, if it means more."""
+        """Raise what `error`, out of the engine, means for this Data, if it means more."""
 
     @abstractmethod
     def _derive(self, name: str) -> Array:
-        """A read-only array of `records.DERIVED`; raises while the Data refuses."""
+        """A read-only array of `records.DERIVED`; not called while the Data refuses."""
 
     @abstractmethod
     def _find_contacts(self) -> Contacts: ...
@@ -278,7 +296,8 @@ class Data(ABC):
     def _get_state(self) -> State: ...
 
     @abstractmethod
-    def _set_state(self, state: State) -> None: ...
+    def _set_state(self, state: State) -> None:
+        """Take a State of the right layout; BadInputError only before anything changes."""
 
     @abstractmethod
     def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:

@@ -9,8 +9,17 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from .checks import TINY, as_count, as_scalar, as_switch, as_vector, index_of, whole_number
-from .errors import BadInputError, ReadOnlyError, UnsupportedError, unknown_name
+from .checks import (
+    TINY,
+    as_count,
+    as_numbers,
+    as_scalar,
+    as_switch,
+    as_vector,
+    index_of,
+    whole_number,
+)
+from .errors import BadInputError, ReadOnlyError, UnsupportedError, shown, unknown_name
 from .records import Array, Capabilities, Ints, JointType, Keyframe, read_only
 
 if TYPE_CHECKING:
@@ -234,7 +243,7 @@ class Model(ABC):
         if name == "substeps":
             return as_count(value, name)
         if name == "integrator":
-            if value not in self.capabilities.integrators:
+            if not isinstance(value, str) or value not in self.capabilities.integrators:
                 raise unknown_name("integrator", value, self.capabilities.integrators)
             return value
         if name == "timestep":
@@ -245,9 +254,10 @@ class Model(ABC):
         return self._per_dof(name, value)
 
     def _per_dof(self, name: str, value: Any) -> Array:
-        each = as_vector(value, (self.nv,) if np.ndim(value) else (), name)
+        numbers = as_numbers(value, name)
+        each = as_vector(numbers, (self.nv,) if numbers.ndim else (), name)
         if (each < 0).any():
-            raise BadInputError(f"{name} must not be negative; got {value!r}")
+            raise BadInputError(f"{name} must not be negative; got {shown(value)}")
         if each.ndim:
             return each
         # One number is meant for the joints of the robot, not for a free body.

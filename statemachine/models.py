@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from .errors import ModelFileError, unknown_name
+from .errors import ModelFileError, shown, unknown_name
 
 _PACKAGE = Path(__file__).resolve().parent
 SUFFIXES = (".xml", ".urdf", ".mjb")
@@ -44,8 +44,11 @@ def resolve(name: str | os.PathLike[str], menagerie: str | os.PathLike[str] | No
     Raises:
         ModelFileError: The path or the menagerie folder is not there.
         UnknownNameError: No model has this name.
+        TypeError: It is no text and no path.
     """
-    text = os.fspath(name)
+    text = os.fspath(name) if isinstance(name, os.PathLike) else name
+    if not isinstance(text, str):
+        raise TypeError(f"a model is given by its name or a path; got {shown(name)}")
     if "\0" in text or not text.strip():
         raise ModelFileError(f"{text!r} is neither the name of a model nor a path")
     if any("\ud800" <= character <= "\udfff" for character in os.fsdecode(text)):

@@ -54,7 +54,7 @@ class HiddenData(Data):
         object.__setattr__(self, "_world", model.inner._make_data())
         object.__setattr__(self, "_derived", {})
         inputs = {name: np.zeros(size) for name, size in sizes.items()}
-        super().__init__(model, self._run, [], inputs)
+        super().__init__(model, self._run, inputs)
         self._pull()
         self._keep()
 
@@ -99,9 +99,12 @@ class HiddenData(Data):
         self._home._check_quaternions(self.qpos)
         self._push()
         try:
-            self._world._advance(nstep)
-            if self._world._alarms:
+            try:
+                self._world._advance(nstep)
                 self._world._attend()
+            except Exception as error:
+                self._world._failed(error)
+                raise
         except DivergedError as error:
             self._give_up(str(error))
             raise

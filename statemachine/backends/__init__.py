@@ -94,7 +94,7 @@ def load(
         ModelError: The engine cannot read the file.
     """
     entry = _find(backend)
-    if defaults not in ("model", "engine"):
+    if not isinstance(defaults, str) or defaults not in ("model", "engine"):
         raise unknown_name("defaults", defaults, ("model", "engine"))
     path = resolve(model, menagerie)
     if entry.engine:
@@ -111,9 +111,10 @@ def load(
 
 
 def _find(name: str) -> Backend:
-    if name not in _BACKENDS:
+    known = isinstance(name, str) and name in _BACKENDS
+    if not known:
         _discover()
-    if name not in _BACKENDS:
+    if not isinstance(name, str) or name not in _BACKENDS:
         raise unknown_name("backend", name, _BACKENDS)
     return _BACKENDS[name]
 

@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import BadInputError, ModelError
 from ..model import Model
 from ..records import Array, Keyframe
+from ._mjb import check_binary
 
 _DISABLE = mujoco.mjtDisableBit
 _SWITCHES = {  # option of `replace` -> the flag that turns it off
@@ -44,6 +45,8 @@ def heard() -> Iterator[list[str]]:
         yield texts
     finally:
         mujoco.set_mju_user_warning(before)
+        # What has a time is of a simulation in another thread, whose own counters tell.
+        texts[:] = [text for text in texts if " Time = " not in text]
 
 
 def compile_file(path: str | os.PathLike[str]) -> mujoco.MjModel:
@@ -54,13 +57,15 @@ def compile_file(path: str | os.PathLike[str]) -> mujoco.MjModel:
             with a number that no step can be taken with.
     """
     text = os.fspath(path)
+    if text.lower().endswith(".mjb"):
+        check_binary(text)
     try:
         if text.lower().endswith(".mjb"):
             raw = mujoco.MjModel.from_binary_path(text)
         else:
             raw = mujoco.MjModel.from_xml_path(text)
-    except (ValueError, mujoco.FatalError) as error:
-        reason = " ".join(str(error).split())
+    except (ValueError, MemoryError, mujoco.FatalError) as error:
+        reason = " ".join(str(error).split()) or "out of memory"
         raise ModelError(f"MuJoCo cannot read {text}: {reason}") from error
     for problem in _problems(raw):
         raise ModelError(f"{text} has a number that nothing can be computed with: {problem}")
@@ -79,8 +84,11 @@ def _problems(raw: mujoco.MjModel) -> Iterator[str]:
         array = getattr(raw, name) if not name.startswith("_") and name not in _FREE_USE else None
         if not isinstance(array, np.ndarray) or array.dtype.kind != "f":
             continue
-        for row in np.argwhere(np.isnan(array))[:1]:
-            yield f"{name}{_owner(raw, name, row)} is NaN"
+        # Only a range may be without an end.
+        wrong = np.isnan(array) if "range" in name else ~np.isfinite(array)
+        for row in np.argwhere(wrong)[:1]:
+            kind = "NaN" if np.isnan(array[tuple(row)]) else "infinite"
+            yield f"{name}{_owner(raw, name, row)} is {kind}"
         if name in _NEVER_NEGATIVE:
             for row in np.argwhere(array < 0)[:1]:
                 yield f"{name}{_owner(raw, name, row)} is negative"

@@ -7,20 +7,16 @@ its own buffers, seen read-only.
 from __future__ import annotations
 
 import functools
-import math
 import os
-import re
-import threading
-import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal, NoReturn, cast
 
 import mujoco
 import numpy as np
 
-from ..checks import HUGE, TINY, check_finite
-from ..errors import BadInputError, DivergedError, EngineError, EngineWarning, ModelError
+from ..checks import TINY, check_finite
+from ..errors import BadInputError, DivergedError, EngineError
 from ..interface import OPTIONS, Data, Model
 from ..records import (
     BEHAVIOURS,
@@ -33,7 +29,8 @@ from ..records import (
     Contacts,
     State,
 )
-from ._mjcf import compile_file, edited, facts, step_length, with_fingerprint
+from ._mjcf import compile_file, edited, facts, heard, step_length, with_fingerprint
+from ._mujoco_alarms import AlarmError, Alarms, pass_on
 
 _DISABLE = mujoco.mjtDisableBit
 # Not RK4: after its step the derived values are neither of the state before nor after.
@@ -96,42 +93,6 @@ def _capabilities(raw: mujoco.MjModel) -> Capabilities:
     )
 
 
-# The text of every warning that MuJoCo gave and nobody has looked at yet. The handler is
-# the process's, so a Data trusts its own counters for what is its own. It is a function
-# in C: a Ctrl-C inside one in Python would have to cross MuJoCo, and end the process.
-_ALARMS: list[str] = []
-_HANDLER = _ALARMS.append
-_BAD = re.compile(r"value in (\w+) at \w+ (\d+).*Time = ([-+.\deE]+\d)")
-
-
-def _listen() -> None:
-    # Another library may have put its own handler in since; without ours, a
-    # divergence would pass in silence and write a log file.
-    if mujoco.get_mju_user_warning() is not _HANDLER:
-        mujoco.set_mju_user_warning(_HANDLER)
-
-
-def _drain() -> list[str]:
-    """What may be said now: nothing of a divergence that another thread still has to meet."""
-    alone = threading.active_count() == 1
-    taken = [text for text in list(_ALARMS) if alone or not _BAD.search(text)]
-    return [text for text in taken if _take(text)]
-
-
-def _take(text: str) -> bool:
-    """Take a text off the list; another thread may have been quicker."""
-    try:
-        _ALARMS.remove(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _pass_on(texts: list[str]) -> None:
-    for text in texts:
-        warnings.warn(f"MuJoCo: {text}", EngineWarning, stacklevel=4)
-
-
 def load(
     path: str | os.PathLike[str], defaults: Literal["model", "engine"] = "model"
 ) -> MujocoModel:
@@ -146,15 +107,11 @@ def load(
     Raises:
         ModelError: MuJoCo cannot compile the file; with its reason.
     """
-    _listen()
-    try:
+    with heard() as texts:
         raw = compile_file(path)
-    except ModelError:
-        _drain()
-        raise
     if defaults == "model":
         raw.opt.disableflags |= int(_DISABLE.mjDSBL_AUTORESET)
-    _pass_on(_drain())
+    pass_on(texts, stacklevel=4)
     return MujocoModel(raw, Path(path), substeps=1)
 
 
@@ -176,10 +133,16 @@ class MujocoModel(Model):
         )
 
     def _make_data(self) -> MujocoData:
-        return MujocoData(self)
+        try:
+            return MujocoData(self)
+        except (MemoryError, mujoco.FatalError) as error:
+            raise _gave_up(error) from error
 
     def _replace(self, options: dict[str, Any]) -> MujocoModel:
-        raw = edited(self.raw, options)
+        try:
+            raw = edited(self.raw, options)
+        except (MemoryError, mujoco.FatalError) as error:
+            raise _gave_up(error) from error
         if "integrator" in options:
             raw.opt.integrator = int(_INTEGRATORS[options["integrator"]])
         substeps = options.get("substeps", self.substeps)
@@ -190,23 +153,25 @@ class MujocoModel(Model):
 class MujocoData(Data):
     """An MjData. Inputs and derived arrays are views of its memory."""
 
-    __slots__ = ("_layout", "_raw", "_views")
+    __slots__ = ("_alarms", "_layout", "_raw", "_views")
 
     _raw: mujoco.MjData | None
+    _alarms: Alarms
     _views: dict[str, Array]
     _layout: tuple[str, tuple[tuple[str, int], ...]]
 
     def __init__(self, model: MujocoModel) -> None:
-        _listen()
         raw = mujoco.MjData(model.raw)
+        alarms = Alarms(model.raw, raw)
         # Views of their own, so that what raw shows stays writable.
         views = {name: getattr(raw, name).view() for name in (*POSES, "qacc", *FORCES)}
         for view in views.values():
             view.setflags(write=False)
-        for name, value in (("_raw", raw), ("_views", views), ("_layout", _layout(model))):
+        facts = {"_raw": raw, "_views": views, "_layout": _layout(model), "_alarms": alarms}
+        for name, value in facts.items():
             object.__setattr__(self, name, value)
-        inputs = {name: getattr(raw, name) for name in INPUTS}
-        super().__init__(model, _transition(model, raw), _ALARMS, inputs)
+        inputs = {name: getattr(raw, name).view() for name in INPUTS}
+        super().__init__(model, _transition(model, raw), inputs, (alarms.now, alarms.seen))
 
     @property
     def raw(self) -> mujoco.MjData:
@@ -233,8 +198,6 @@ class MujocoData(Data):
         )
 
     def _derive(self, name: str) -> Array:
-        if self._trouble:
-            self._refuse_if_troubled()
         view = self._views.get(name)
         return self._constraint_part(name) if view is None else view
 
@@ -249,13 +212,14 @@ class MujocoData(Data):
 
     def _recompute(self) -> None:
         mujoco.mj_forward(self._home.raw, self.raw)
+        self._attend()
 
     def _reset(self, key: int | None) -> None:
-        _listen()
         if key is None:
             mujoco.mj_resetData(self._home.raw, self.raw)
         else:
             mujoco.mj_resetDataKeyframe(self._home.raw, self.raw, key)
+        self._alarms.clear()
 
     def _get_state(self) -> State:
         fingerprint, layout = self._layout
@@ -267,13 +231,13 @@ class MujocoData(Data):
         return State("mujoco", mujoco.__version__, fingerprint, layout, vector.tobytes())
 
     def _set_state(self, state: State) -> None:
-        _listen()
         # A reset first: it clears the counters, without which a second divergence
         # would go unreported, and whatever else the last run left behind.
         mujoco.mj_resetData(self._home.raw, self.raw)
         mujoco.mj_setState(
             self._home.raw, self.raw, state.vector, int(mujoco.mjtState.mjSTATE_INTEGRATION)
         )
+        self._alarms.clear()
 
     def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
         return self._layout
@@ -282,77 +246,48 @@ class MujocoData(Data):
         self.raw.time = time
 
     def _close(self) -> None:
-        object.__setattr__(self, "_raw", None)
+        for name in ("_raw", "_alarms"):
+            object.__setattr__(self, name, None)
         self._views.clear()
 
     def _attend(self) -> None:
-        raised = {name for name in _FATAL if self.raw.warning[int(_FATAL[name])].number}
-        if not raised:
-            _pass_on(_drain())  # of another Data, or nothing that makes this one useless
-            return
-        quantity, index, time = self._first_bad(raised)
-        entry = quantity
-        if index >= 0:
-            entry += f"[{index}]{self._home._coordinate_name(quantity, index)}"
+        self._alarms.attend()
+
+    def _failed(self, error: Exception) -> None:
+        if isinstance(error, mujoco.FatalError):
+            gave_up = _gave_up(error)
+            self._give_up(str(gave_up))
+            raise gave_up from error
+        if isinstance(error, AlarmError):
+            self._raise(error.quantity, error.index, error.time)
+
+    def _raise(self, quantity: str, index: int, time: float) -> NoReturn:
+        """Give up, because of an entry that was no number at a time [s]."""
+        entry = f"{quantity}[{index}]{self._home._coordinate_name(quantity, index)}"
+        facts = {"quantity": quantity, "index": index, "time": time}
         if quantity == "ctrl":
             self._give_up(f"it was stepped with a bad {entry}")
             raise BadInputError(
                 f"{entry} was no number at time {time:g} s: MuJoCo stepped as if ctrl were zero. "
                 "This Data now takes only reset and set_state",
-                quantity=quantity,
-                index=index,
-                time=time,
-            )
+                **facts,
+            ) from None
         self._give_up(f"{entry} was not finite at time {time:g} s")
         raise DivergedError(
             f"{entry} became NaN, infinite or huge at time {time:g} s. "
             "This Data now takes only reset and set_state",
-            quantity=quantity,
-            index=index,
-            time=time,
-        )
-
-    def _first_bad(self, raised: set[str]) -> tuple[str, int, float]:
-        """Quantity, index and time of this Data's first alarm; all of its own are taken off."""
-        own = []
-        for name in raised:  # MuJoCo gives one text for each, the first time
-            matches = [m for text in list(_ALARMS) if (m := _BAD.search(text)) and m[1] == name]
-            if len(matches) > 1:  # one may be that of a Data in another thread
-                matches.sort(key=self._is_fine)
-            own += matches[:1]
-        order = list(_ALARMS)
-        own.sort(key=lambda m: order.index(m.string) if m.string in order else len(order))
-        for match in own:
-            _take(match.string)
-        if not own:
-            return sorted(raised)[0].lower(), -1, float(self.raw.time)
-        return own[0][1].lower(), int(own[0][2]), float(own[0][3])
-
-    def _is_fine(self, match: re.Match[str]) -> bool:
-        """Whether the entry that an alarm names is in order here."""
-        array = self.raw.qacc if match[1] == "QACC" else getattr(self, match[1].lower())
-        index = int(match[2])
-        return index >= len(array) or bool(abs(array[index]) <= HUGE)
-
-    def _failed(self, error: Exception) -> None:
-        if isinstance(error, mujoco.FatalError):
-            reason = " ".join(str(error).split())
-            self._give_up(f"MuJoCo gave up: {reason}")
-            raise EngineError(f"MuJoCo gave up: {reason}") from error
+            **facts,
+        ) from None
 
 
-_FATAL = {
-    "QPOS": mujoco.mjtWarning.mjWARN_BADQPOS,
-    "QVEL": mujoco.mjtWarning.mjWARN_BADQVEL,
-    "QACC": mujoco.mjtWarning.mjWARN_BADQACC,
-    "CTRL": mujoco.mjtWarning.mjWARN_BADCTRL,
-}
+def _gave_up(error: Exception) -> EngineError:
+    return EngineError(f"MuJoCo gave up: {' '.join(str(error).split()) or 'out of memory'}")
 
 
 def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:
     """The engine's step bound to its arguments; Python runs only where it must."""
-    bare = functools.partial(mujoco.mj_step, model.raw, raw)
-    substeps = model.substeps
+    mj_step, engine_model, substeps = mujoco.mj_step, model.raw, model.substeps
+    bare = functools.partial(mj_step, engine_model, raw)
 
     def finer(nstep: int = 1) -> None:
         if nstep * substeps >= 2**31:  # the engine counts in a C int
@@ -360,19 +295,17 @@ def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:
         bare(nstep * substeps)
 
     advance = bare if substeps == 1 else finer
-    quats = [
-        (memoryview(raw.qpos[start : start + 4]), joint, start)
-        for joint, start in model._quaternions
-    ]
-    if not quats:
+    qpos, low, high = memoryview(raw.qpos), -TINY, TINY
+    starts = [start for _, start in model._quaternions]
+    if not starts:
         return advance
 
     def checked(nstep: int = 1) -> None:
-        # MuJoCo takes a zero quaternion for the identity without a word. A sum is the
-        # cheapest look at four numbers; only one near zero is looked at again.
-        for quat, joint, start in quats:
-            if -TINY < sum(quat) < TINY and math.hypot(*quat) < TINY:
-                raise model._zero_quaternion(joint, start)
+        # MuJoCo takes a zero quaternion for the identity without a word. One whose first
+        # number is not zero is none, which is the cheapest look; others are looked at again.
+        for start in starts:
+            if low < qpos[start] < high:
+                model._check_quaternions(raw.qpos)
         advance(nstep)
 
     return checked

@@ -186,7 +186,7 @@ class PybulletData(Data):
         for name, value in (("_machine", machine), ("_layout", _layout(model))):
             object.__setattr__(self, name, value)
         inputs = {name: getattr(machine, name) for name in INPUTS}
-        super().__init__(model, machine.run, [], inputs)
+        super().__init__(model, machine.run, inputs)
 
     @property
     def raw(self) -> World:

@@ -1,0 +1,168 @@
+"""What MuJoCo warns of: which Data it concerns, what it says, and who else listens.
+
+MuJoCo counts the warnings of an MjData in the MjData itself. These counters decide: they
+are right in every thread, and whoever set the process's warning handler. The handler adds
+two things. Without one MuJoCo writes to the terminal and to a log file; and its texts name
+the first bad entry of a bulk step, where a counter knows the last.
+"""
+
+from __future__ import annotations
+
+import re
+import threading
+import warnings
+import weakref
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from ..checks import HUGE
+from ..errors import EngineWarning
+
+_KIND = mujoco.mjtWarning
+# What makes a Data useless, in the order in which a step looks for it.
+_FATAL = {
+    "qpos": int(_KIND.mjWARN_BADQPOS),
+    "qvel": int(_KIND.mjWARN_BADQVEL),
+    "ctrl": int(_KIND.mjWARN_BADCTRL),
+    "qacc": int(_KIND.mjWARN_BADQACC),
+}
+_AUTORESET = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+_BAD = re.compile(r"value in (\w+) at \w+ (\d+).*Time = ([-+.\deE]+\d)")
+
+Handler = Callable[[str], object]
+
+_TEXTS: deque[str] = deque(maxlen=256)
+# A function in C: a Ctrl-C inside one in Python would have to cross MuJoCo, which ends
+# the process. So it is chained, in Python, only to the handler of somebody else.
+_KEEP = _TEXTS.append
+_LOCK = threading.RLock()  # a finalizer may run within
+_chain: Handler = _KEEP
+_users = 0
+
+
+class _Both:
+    """A handler that keeps a text and passes it on to the handler that was there before."""
+
+    def __init__(self, other: Handler) -> None:
+        self.other = other
+
+    def __call__(self, text: str) -> None:
+        _KEEP(text)
+        self.other(text)
+
+
+def listen() -> bool:
+    """Put our handler in front of whatever handler there is; whether it was there already."""
+    global _chain  # noqa: PLW0603  (MuJoCo's handler is the process's, too)
+    with _LOCK:
+        other = mujoco.get_mju_user_warning()
+        known = other is _KEEP or isinstance(other, _Both)
+        if not known:
+            _chain = _KEEP if other is None else _Both(other)
+            mujoco.set_mju_user_warning(_chain)
+        else:
+            _chain = other
+        return known
+
+
+def listen_for(raw: mujoco.MjData) -> None:
+    """Listen for as long as an MjData lives."""
+    global _users  # noqa: PLW0603
+    with _LOCK:
+        _users += 1
+        listen()
+    weakref.finalize(raw, _end)
+
+
+def _end() -> None:
+    """Give the handler back after the last use, unless somebody else has set one since."""
+    global _users  # noqa: PLW0603
+    with _LOCK:
+        _users -= 1
+        if not _users and mujoco.get_mju_user_warning() is _chain:
+            mujoco.set_mju_user_warning(_chain.other if isinstance(_chain, _Both) else None)
+
+
+def pass_on(texts: list[str], stacklevel: int) -> None:
+    """Give texts of MuJoCo as Python's warnings."""
+    for text in texts:
+        warnings.warn(f"MuJoCo: {text}", EngineWarning, stacklevel=stacklevel)
+
+
+class AlarmError(Exception):
+    """MuJoCo found an entry that is no number: which was the first, and when [s]."""
+
+    def __init__(self, quantity: str, index: int, time: float) -> None:
+        super().__init__(quantity, index, time)
+        self.quantity, self.index, self.time = quantity, index, time
+
+
+class Alarms:
+    """The warning counters of one MjData.
+
+    Attributes:
+        now: The counters, as the memory of the engine has them.
+        seen: What they were when they were last looked at. They differ where MuJoCo has
+            warned since; to compare them is all that a step does about warnings.
+    """
+
+    def __init__(self, model: mujoco.MjModel, raw: mujoco.MjData) -> None:
+        listen_for(raw)
+        self._model, self._raw = model, raw
+        last = raw.warning.lastinfo  # (kinds,); in memory each is followed by its number
+        pairs = np.lib.stride_tricks.as_strided(last, (2 * len(last),), (last.itemsize,))
+        self._now, self._seen = pairs.reshape(-1, 2), np.zeros((len(last), 2), pairs.dtype)
+        # Eight bytes at once: Python compares two such views without making an object.
+        self.now = memoryview(pairs.view(np.uint64))
+        self.seen = memoryview(self._seen.reshape(-1).view(np.uint64))
+
+    def clear(self) -> None:
+        """The engine's counters were set to zero, by a reset."""
+        self._seen[:] = 0
+        listen()
+
+    def attend(self) -> None:
+        """Look at what MuJoCo warned of since the last time, and pass it on.
+
+        Raises:
+            AlarmError: It makes the Data useless.
+        """
+        trusted = listen()
+        counts = (self._now - self._seen)[:, 1]
+        self._seen[:] = self._now
+        fatal = {name: int(counts[kind]) for name, kind in _FATAL.items() if counts[kind] > 0}
+        if fatal:
+            raise self._first(fatal, trusted)
+        # MuJoCo says a thing only the first time after a reset, and so do we.
+        first = np.flatnonzero((counts > 0) & (counts == self._now[:, 1])).tolist()
+        texts = [mujoco.mju_warningText(kind, int(self._now[kind, 0])) for kind in first]
+        pass_on(texts, stacklevel=5)
+
+    def _first(self, fatal: dict[str, int], trusted: bool) -> AlarmError:
+        raw, opt = self._raw, self._model.opt
+        resets = not opt.disableflags & _AUTORESET
+        # Without a reset what is bad stays bad: each step since the first has counted.
+        steps = 1 if resets else max(fatal.values())
+        quantity = next(name for name in fatal if resets or fatal[name] == steps)
+        # Without the last digits, which are those of a long sum.
+        time = float(raw.time) if resets else round(raw.time - steps * opt.timestep, 9)
+        index = int(self._now[_FATAL[quantity], 0])
+        if trusted and (resets or steps > 1):
+            for text in reversed(list(_TEXTS)):
+                match = _BAD.search(text)
+                if not match or match[1].lower() != quantity:
+                    continue
+                if resets:
+                    return AlarmError(quantity, int(match[2]), float(match[3]))
+                if abs(float(match[3]) - time) < 1e-4 and self._is_bad(quantity, int(match[2])):
+                    return AlarmError(quantity, int(match[2]), time)
+        return AlarmError(quantity, index, time)
+
+    def _is_bad(self, quantity: str, index: int) -> bool:
+        """Whether an entry is bad here; a text of the same moment may be another thread's."""
+        array: Any = getattr(self._raw, quantity)
+        return index < len(array) and not abs(array[index]) <= HUGE

@@ -1,0 +1,247 @@
+"""Warnings of MuJoCo: whose they are, and who else listens to them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.backends import _mujoco_alarms
+from statemachine.errors import BadInputError, DivergedError, EngineWarning, StateMachineError
+
+from .conftest import ROOT
+
+SLIDE = (
+    "<mujoco><worldbody><body><joint type='slide'/><geom size='.1'/></body></worldbody></mujoco>"
+)
+BOXES = "".join(
+    f"<body pos='{0.05 * (k % 6)} {0.05 * (k // 6)} .05'><freejoint/>"
+    "<geom type='box' size='.06 .06 .06'/></body>"
+    for k in range(18)
+)
+
+
+@pytest.fixture(autouse=True)
+def _handler() -> Iterator[None]:
+    """No test leaves a handler behind."""
+    before = mujoco.get_mju_user_warning()
+    yield
+    mujoco.set_mju_user_warning(before)
+
+
+def _crowded(folder: Path) -> sm.Model:
+    """A model that has not enough memory for its contacts, of which MuJoCo warns."""
+    file = folder / "crowded.xml"
+    file.write_text(
+        "<mujoco><size memory='300K'/><worldbody><geom type='plane' size='5 5 1'/>"
+        f"{BOXES}</worldbody></mujoco>"
+    )
+    return sm.load(file)
+
+
+def _step_raw_to_nan() -> list[str]:
+    """A simulation that is none of ours, and diverges."""
+    model = mujoco.MjModel.from_xml_string(SLIDE)
+    data = mujoco.MjData(model)
+    data.qpos[0] = np.nan
+    mujoco.mj_step(model, data)
+    return [str(kind) for kind in data.warning.number]
+
+
+@pytest.mark.parametrize("handler", ["a function", "none"])
+@pytest.mark.parametrize("nstep", [1, 5])
+def test_a_divergence_is_noticed_whoever_set_the_handler(
+    handler: str, nstep: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # where MuJoCo writes its log if nobody listens
+    model = sm.load("so101/scene")
+    heard: list[str] = []
+    with sm.make_data(model) as data:
+        sm.step(model, data, 10)
+        mujoco.set_mju_user_warning(heard.append if handler == "a function" else None)
+        data.ctrl[2], before = np.nan, data.time
+        with pytest.raises(BadInputError, match="elbow_flex") as caught:
+            sm.step(model, data, nstep)
+        facts: Any = caught.value
+        assert (facts.quantity, facts.index) == ("ctrl", 2)
+        assert facts.time == pytest.approx(before)
+        assert len(heard) == (handler == "a function")
+        sm.reset(model, data)
+        data.qvel[1] = np.nan
+        with pytest.raises(DivergedError, match=r"qvel\[1\]"):
+            sm.step(model, data, nstep)
+        if heard:
+            assert len(heard) > 1  # it is in the chain now
+
+
+def test_the_handler_of_somebody_else_hears_all() -> None:
+    heard: list[str] = []
+    mujoco.set_mju_user_warning(heard.append)
+    model = sm.load("so101/scene")
+    with sm.make_data(model) as data, sm.make_data(model) as other:
+        _step_raw_to_nan()
+        assert len(heard) == 1
+        data.qpos[0] = np.nan
+        with pytest.raises(DivergedError):
+            sm.step(model, data)
+        assert any("QPOS" in text for text in heard[1:])
+        before = len(heard)
+        sm.step(model, other)
+        assert len(heard) == before
+
+
+def test_the_handler_comes_back_with_the_last_data() -> None:
+    """In a process of its own, where no other Data lives."""
+    code = """
+import mujoco, numpy as np, statemachine as sm
+heard = []
+theirs = heard.append
+for handler in (None, theirs):
+    mujoco.set_mju_user_warning(handler)
+    model = sm.load("so101/scene")
+    assert mujoco.get_mju_user_warning() is handler
+    first, second = sm.make_data(model), sm.make_data(model)
+    assert mujoco.get_mju_user_warning() is not handler
+    first.close()
+    assert mujoco.get_mju_user_warning() is not handler
+    del first, second
+    assert mujoco.get_mju_user_warning() is handler
+data = sm.make_data(model)
+mujoco.set_mju_user_warning(print)
+del data
+assert mujoco.get_mju_user_warning() is print
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_handlers_that_are_saved_and_restored_pile_up_nothing() -> None:
+    model = sm.load("so101/scene")
+    with sm.make_data(model) as data:
+        for _ in range(50):
+            old = mujoco.get_mju_user_warning()
+            mujoco.set_mju_user_warning(lambda text: None)
+            sm.reset(model, data)
+            mujoco.set_mju_user_warning(old)
+            sm.reset(model, data)
+        assert mujoco.get_mju_user_warning() is _mujoco_alarms._KEEP
+
+
+def test_a_warning_of_a_raw_simulation_does_not_come_out_of_our_step() -> None:
+    model = sm.load("so101/scene")
+    with sm.make_data(model) as data, warnings.catch_warnings():
+        warnings.simplefilter("error")
+        _step_raw_to_nan()
+        sm.step(model, data)
+        sm.forward(model, data)
+
+
+def test_what_is_kept_of_warnings_is_bounded() -> None:
+    model = sm.load("so101/scene")
+    done = threading.Event()
+    idle = threading.Thread(target=done.wait, args=(30,))
+    idle.start()
+    try:
+        with sm.make_data(model) as data:
+            for _ in range(600):
+                _step_raw_to_nan()
+            sm.step(model, data)
+            assert len(_mujoco_alarms._TEXTS) <= 256
+    finally:
+        done.set()
+        idle.join()
+
+
+def test_three_threads_that_diverge_at_once_each_hear_of_their_own() -> None:
+    model = sm.load("so101/scene_box")
+    wrong: list[str] = []
+    start = threading.Barrier(3)
+
+    def diverge(name: str) -> None:
+        start.wait()
+        for k in range(150):
+            with sm.make_data(model) as data:
+                sm.reset(model, data, 0)
+                sm.step(model, data)
+                getattr(data, name)[k % 6] = np.nan
+                try:
+                    sm.step(model, data, 2)
+                    wrong.append(f"{name} passed")
+                except (BadInputError, DivergedError) as error:
+                    facts: Any = error
+                    if (facts.quantity, facts.index) != (name, k % 6):
+                        wrong.append(f"{error} for {name}[{k % 6}]")
+
+    threads = [threading.Thread(target=diverge, args=(n,)) for n in ("qpos", "ctrl", "qvel")]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong, (len(wrong), wrong[:3])
+
+
+def test_other_warnings_belong_to_their_data_and_are_given_once(tmp_path: Path) -> None:
+    model, calm = _crowded(tmp_path), sm.load("so101/scene")
+    with sm.make_data(model) as data, sm.make_data(calm) as other:
+        with pytest.warns(EngineWarning, match="memory|full|buffer") as given:
+            sm.step(model, data, 2)
+        assert {warning.filename for warning in given} == {__file__}
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            sm.step(model, data)  # it was said
+            sm.step(calm, other)
+        sm.reset(model, data)
+        with pytest.warns(EngineWarning):
+            sm.step(model, data)
+        sm.reset(model, data)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            with pytest.raises(EngineWarning):
+                sm.step(model, data)
+            sm.get_state(model, data)  # a warning is no trouble
+
+
+def test_forward_warns_too(tmp_path: Path) -> None:
+    model = _crowded(tmp_path)
+    with sm.make_data(model) as data, pytest.warns(EngineWarning):
+        sm.forward(model, data)
+
+
+def test_a_data_that_raw_drove_to_nan_says_so_at_the_next_step() -> None:
+    model = sm.load("so101/scene")
+    with sm.make_data(model) as data:
+        data.qpos[4] = np.nan
+        mujoco.mj_step(model.raw, data.raw)
+        data.qpos[:], data.qvel[:] = 0, 0
+        with pytest.raises(StateMachineError):
+            sm.step(model, data)
+        sm.reset(model, data)
+        sm.step(model, data)
+
+
+def test_the_first_entry_inside_a_bulk_step_is_told_of_one_that_grows(tmp_path: Path) -> None:
+    file = tmp_path / "two.xml"
+    file.write_text(
+        "<mujoco><option gravity='0 0 0'/><worldbody>"
+        "<body><joint name='a' type='slide'/><geom size='.1' mass='1'/></body>"
+        "<body pos='9 0 0'><joint name='b' type='slide' axis='1 0 0'/><geom size='.1' mass='1'/>"
+        "</body></worldbody></mujoco>"
+    )
+    model = sm.load(file)
+    with sm.make_data(model) as data:
+        data.qvel[:] = 9e9, 9.5e9
+        with pytest.raises(DivergedError) as caught:
+            sm.step(model, data, 2000)
+    assert (caught.value.quantity, caught.value.index) == ("qpos", 1)
+    assert caught.value.time == pytest.approx(1e10 / 9.5e9, abs=0.003)

@@ -1,0 +1,305 @@
+"""A Data belongs to one thread at a time, and what interrupts a verb finds it whole."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.backends.mujoco_backend import MujocoData
+from statemachine.errors import (
+    BadInputError,
+    BusyDataError,
+    ClosedDataError,
+    DivergedError,
+    EngineError,
+    ReadOnlyError,
+)
+
+from .conftest import ROOT, registered
+
+Use = Callable[[sm.Model, sm.Data], Any]
+USES: dict[str, Use] = {
+    "step": sm.step,
+    "bulk": lambda model, data: sm.step(model, data, 3),
+    "forward": sm.forward,
+    "reset": sm.reset,
+    "get_state": sm.get_state,
+    "contacts": lambda _, data: data.contacts,
+    "xpos": lambda _, data: data.xpos,
+    "qfrc_contact": lambda _, data: data.qfrc_contact,
+    "close": lambda _, data: data.close(),
+}
+
+
+class Gate:
+    """Holds a step in the middle of the engine, in a thread of its own."""
+
+    def __init__(self, model: sm.Model, data: sm.Data) -> None:
+        self.entered, self.leave = threading.Event(), threading.Event()
+        advance = data._advance
+
+        def waiting(nstep: int = 1) -> None:
+            self.entered.set()
+            assert self.leave.wait(30)
+            advance(nstep)
+
+        object.__setattr__(data, "_advance", waiting)
+        self.thread = threading.Thread(target=sm.step, args=(model, data))
+
+    def __enter__(self) -> Gate:
+        self.thread.start()
+        assert self.entered.wait(30)
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.leave.set()
+        self.thread.join(30)
+
+
+@pytest.mark.parametrize("use", USES)
+def test_a_second_thread_is_refused(backend: str, use: str) -> None:
+    model = sm.load("so101/scene_box", backend=backend)
+    with sm.make_data(model) as data, sm.make_data(model) as other:
+        sm.step(model, data)
+        with Gate(model, data):
+            with pytest.raises(BusyDataError, match="one thread at a time"):
+                USES[use](model, data)
+            USES[use](model, other)  # another Data of the Model is free
+        assert data.time == pytest.approx(2 * model.timestep)
+        USES[use](model, data)
+
+
+def test_a_third_partys_backend_gets_it_too() -> None:
+    with registered("hidden", "tests.hidden_world:load") as name:
+        model = sm.load("so101", backend=name)
+        with sm.make_data(model) as data, Gate(model, data):
+            for use in USES.values():
+                with pytest.raises(BusyDataError):
+                    use(model, data)
+
+
+def test_a_data_that_refuses_is_held_by_one_thread_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = sm.load("so101")
+    right, caught = MujocoData._reset, []
+
+    def slow(self: MujocoData, key: int | None) -> None:
+        thread = threading.Thread(target=lambda: caught.append(_error(sm.reset, model, self)))
+        if not caught:
+            thread.start()
+            thread.join()
+        right(self, key)
+
+    with sm.make_data(model) as data:
+        data.qvel[0] = np.nan
+        with pytest.raises(DivergedError):
+            sm.step(model, data)
+        monkeypatch.setattr(MujocoData, "_reset", slow)
+        sm.reset(model, data)
+        assert [type(error) for error in caught] == [BusyDataError]
+        sm.step(model, data)
+
+
+def _error(call: Callable[..., Any], *args: Any) -> Exception | None:
+    try:
+        call(*args)
+    except Exception as error:
+        return error
+    return None
+
+
+def test_a_hook_may_use_what_its_own_data_offers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A backend's hook, a callback, a signal handler: the same thread is no second one."""
+    model = sm.load("so101")
+    seen: list[float] = []
+    with sm.make_data(model) as data:
+        advance = data._advance
+
+        def looking(nstep: int = 1) -> None:
+            advance(nstep)
+            seen.append(float(data.site_xpos[0, 0]) + sm.get_state(model, data).time)
+
+        object.__setattr__(data, "_advance", looking)
+        sm.step(model, data)
+    assert len(seen) == 1
+
+
+def test_two_data_in_two_threads_equal_serial() -> None:
+    model = sm.load("so101/scene_box")
+
+    def run(seed: int) -> list[bytes]:
+        generator, blobs = np.random.default_rng(seed), []
+        with sm.make_data(model) as data:
+            sm.reset(model, data, 0)
+            for k in range(300):
+                if k % 20 == 0:
+                    data.ctrl[:] = generator.uniform(-0.8, 0.8, model.nu)
+                sm.step(model, data, 1 + k % 3)
+                if k % 25 == 0:
+                    sm.forward(model, data)
+                    blobs += [sm.get_state(model, data).blob, data.qfrc_contact.tobytes()]
+        return blobs
+
+    serial, threaded = [run(seed) for seed in range(2)], [[], []]
+
+    def work(seed: int) -> None:
+        threaded[seed] = run(seed)
+
+    threads = [threading.Thread(target=work, args=(seed,)) for seed in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert threaded == serial
+
+
+@pytest.mark.parametrize("use", ["reset", "contacts", "forward", "get_state", "xpos", "close"])
+def test_threads_that_share_a_data_crash_nothing(use: str) -> None:
+    """In a process of its own: before Data were guarded, this ended with a signal."""
+    code = f"""
+import collections, threading, time, statemachine as sm
+from tests.test_turns import USES
+model = sm.load("so101/scene_box")
+data, end, ended = sm.make_data(model), time.time() + 1, collections.Counter()
+def loop(use):
+    while time.time() < end:
+        try:
+            use(model, data)
+        except sm.errors.StateMachineError as error:
+            ended[type(error).__name__] += 1
+threads = [threading.Thread(target=loop, args=(USES[n],)) for n in ("bulk", {use!r})]
+[thread.start() for thread in threads]
+[thread.join() for thread in threads]
+print(set(ended) <= {{"BusyDataError", "ClosedDataError"}}, ended)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert done.returncode == 0, done.stderr[-300:]
+    assert done.stdout.startswith("True"), done.stdout
+
+
+def _interrupted(call: Callable[[], object], at: int) -> bool:
+    """Whether `call` was interrupted at its n-th line within the library."""
+    left = at
+
+    def trace(frame: Any, event: str, _arg: object) -> Any:
+        nonlocal left
+        if "statemachine" not in frame.f_code.co_filename:
+            return None
+        left -= 1
+        if left == 0:
+            raise KeyboardInterrupt
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        call()
+    except KeyboardInterrupt:
+        return True
+    finally:
+        sys.settrace(before)
+    return False
+
+
+@pytest.mark.parametrize("verb", ["step", "reset", "set_state", "forward", "get_state"])
+def test_an_interrupted_verb_completes_or_undoes_or_refuses(verb: str) -> None:
+    model = sm.load("so101/scene_box")
+    with sm.make_data(model) as data, sm.make_data(model) as twin:
+        sm.reset(model, data, 0)
+        sm.step(model, data, 20)
+        base = sm.get_state(model, data)
+        sm.step(model, data, 20)
+        calls: dict[str, Use] = {
+            "step": sm.step,
+            "reset": lambda m, d: sm.reset(m, d, 0),
+            "set_state": lambda m, d: sm.set_state(m, d, base),
+            "forward": sm.forward,
+            "get_state": sm.get_state,
+        }
+        start = sm.get_state(model, data)
+        sm.set_state(model, twin, start)
+        calls[verb](model, twin)
+        allowed = {start.blob, sm.get_state(model, twin).blob}
+        at = 0
+        while _interrupted(lambda: calls[verb](model, data), at := at + 1):
+            if data._trouble:
+                assert "interrupted" in data._trouble
+                with pytest.raises(DivergedError, match="interrupted"):
+                    sm.step(model, data)
+            else:
+                assert sm.get_state(model, data).blob in allowed, at
+            sm.set_state(model, data, start)
+        assert at > 5
+
+
+def test_a_state_that_is_refused_leaves_the_data_as_it_was() -> None:
+    model = sm.load("so101")
+    with sm.make_data(model) as data:
+        sm.step(model, data, 3)
+        before = sm.get_state(model, data)
+
+        def refuse(self: MujocoData, state: sm.State) -> None:
+            raise BadInputError("no")
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(MujocoData, "_set_state", refuse)
+            with pytest.raises(BadInputError):
+                sm.set_state(model, data, before)
+        assert sm.get_state(model, data) == before
+
+
+def test_inputs_that_were_made_read_only_are_found_before_anything_moves(backend: str) -> None:
+    model = sm.load("so101/scene", backend=backend)
+    with sm.make_data(model) as data:
+        state = sm.get_state(model, data)
+        for name in ("qpos", "qvel", "ctrl"):
+            getattr(data, name).setflags(write=False)
+            for call in (
+                lambda: sm.reset(model, data),
+                lambda: sm.set_state(model, data, state),
+                lambda: setattr(data, "ctrl", np.zeros(model.nu)),
+            ):
+                with pytest.raises(ReadOnlyError, match=rf"{name}.*setflags"):
+                    call()
+            getattr(data, name).setflags(write=True)
+            assert sm.get_state(model, data) == state
+        sm.step(model, data)
+
+
+def test_an_engine_that_gives_up_in_forward_is_an_error_of_ours(tmp_path: Any) -> None:
+    boxes = "".join(
+        f"<body pos='{0.05 * (k % 6)} {0.05 * (k // 6)} .05'><freejoint/>"
+        "<geom type='box' size='.06 .06 .06'/></body>"
+        for k in range(30)
+    )
+    file = tmp_path / "small.xml"
+    file.write_text(
+        "<mujoco><size memory='100K'/><worldbody><geom type='plane' size='5 5 1'/>"
+        f"{boxes}</worldbody></mujoco>"
+    )
+    model = sm.load(file)
+    with sm.make_data(model) as data:
+        with pytest.raises(EngineError, match="gave up"):
+            sm.forward(model, data)
+        with pytest.raises(DivergedError, match="gave up"):
+            sm.forward(model, data)
+
+
+def test_a_closed_data_says_so_in_every_thread() -> None:
+    model = sm.load("so101")
+    data = sm.make_data(model)
+    data.close()
+    caught: list[Exception | None] = []
+    for use in (sm.step, sm.forward, sm.reset, sm.get_state):
+        thread = threading.Thread(target=lambda use=use: caught.append(_error(use, model, data)))
+        thread.start()
+        thread.join()
+    assert [type(error) for error in caught] == [ClosedDataError] * 4
