@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from statemachine.experiments.in_turns import Ratio, in_turns
 
@@ -11,7 +11,7 @@ _NULL = "the baseline again (null)"
 
 def interleaved(
     baseline: Callable[[], object],
-    contestants: dict[str, Callable[[], object]],
+    contestants: Mapping[str, Callable[[], object]],
     rounds: int,
     seed: int = 0,
 ) -> list[Ratio]:

@@ -117,8 +117,8 @@ class Alarms:
         pairs = np.lib.stride_tricks.as_strided(last, (2 * len(last),), (last.itemsize,))
         self._now, self._seen = pairs.reshape(-1, 2), np.zeros((len(last), 2), pairs.dtype)
         # Eight bytes at once: Python compares two such views without making an object.
-        self.now = memoryview(pairs.view(np.uint64))
-        self.seen = memoryview(self._seen.reshape(-1).view(np.uint64))
+        self.now = pairs.view(np.uint64).data
+        self.seen = self._seen.reshape(-1).view(np.uint64).data
 
     def clear(self) -> None:
         """The engine's counters were set to zero, by a reset."""
