@@ -251,7 +251,8 @@ class MujocoData(Data):
         self._views.clear()
 
     def _attend(self) -> None:
-        self._alarms.attend()
+        if self._warned != self._told:
+            self._alarms.attend()
 
     def _failed(self, error: Exception) -> None:
         if isinstance(error, mujoco.FatalError):
