@@ -129,7 +129,8 @@ def test_hold(cli: Cli) -> None:
     assert math.degrees(found["error"][-1]) < 1.5
     assert max(map(abs, found["without_contacts"])) > 0
     page = " ".join(cli("lesson", "hold").stdout.split())
-    assert "with contacts left out it would be 0.02°" in page
+    assert "wrist_flex, by 0.95°" in page
+    assert "with contacts left out it would be elbow_flex, by 0.02°" in page
 
 
 def test_hold_another_target(cli: Cli) -> None:

@@ -292,9 +292,9 @@ import os, signal, threading, statemachine as sm
 model = sm.load("so101")
 data = sm.make_data(model)
 data.qvel[0] = 9e9
-threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+threading.Timer(0.1, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
 try:
-    sm.step(model, data, 300_000)
+    sm.step(model, data, 20_000)
 except (KeyboardInterrupt, sm.errors.DivergedError) as error:
     print("caught", type(error).__name__)
 """

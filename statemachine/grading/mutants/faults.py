@@ -83,8 +83,8 @@ def advancing(instead: Instead) -> Fault:
     def fault(patch: Patcher) -> None:
         right = Data.__init__
 
-        def init(self: Data, model: Any, advance: Any, alarms: Any, inputs: Any) -> None:
-            right(self, model, lambda nstep=1: instead(self, advance, nstep), alarms, inputs)
+        def init(self: Data, model: Any, advance: Any, *rest: Any) -> None:
+            right(self, model, lambda nstep=1: instead(self, advance, nstep), *rest)
 
         patch.setattr(Data, "__init__", init)
 
