@@ -166,6 +166,7 @@ def test_pybullet_forgets_its_contacts(of_pybullet: audit.Audit) -> None:
 COMMON = {"again", "look", "two at once", "restore", "threads", "process"}
 
 
+@pytest.mark.slow
 def test_a_call_that_is_harmless_here_moves_falling_boxes(of_pybullet: audit.Audit) -> None:
     """By 0.6 mm to 13 cm, as was measured on the raw engine, where contacts come and go."""
     call, engine = "performCollisionDetection", of_pybullet.audited[0]
@@ -278,6 +279,7 @@ def test_where_a_run_diverges_it_is_not_saved(tmp_path: Path) -> None:
     assert "limp: the run diverges" in result.without
 
 
+@pytest.mark.slow
 def test_a_backend_without_a_driver_is_audited_through_the_interface() -> None:
     with registered("hidden", "tests.hidden_world:load") as name:
         result = audit.run(sm.load(SCENE, backend=name), steps=10)
@@ -569,6 +571,7 @@ def test_a_pool_of_the_engine_that_computes_otherwise(monkeypatch: pytest.Monkey
     assert broken(apart.pools(driver, runs[0])) == {("engine", "cold")}
 
 
+@pytest.mark.slow
 def test_another_process_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
     """This one does, always in the same way: only the other one can tell."""
     after("_set_state", leave_a_force)(monkeypatch)
@@ -664,6 +667,7 @@ def test_the_command_speaks_json(cli: Cli) -> None:
     assert row["gap"].keys() >= {"steps", "first", "angle", "length"}
 
 
+@pytest.mark.slow
 def test_a_broken_promise_is_exit_code_1(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -11,6 +11,8 @@ import pytest
 
 from .browser import browser
 
+pytestmark = pytest.mark.slow  # a browser or a renderer at work
+
 PAGE = """<!doctype html><meta charset="utf-8"><title>t</title><link rel="icon" href="data:,">
 <canvas id="c"></canvas><script>
 const gl = document.getElementById('c').getContext('webgl2');

@@ -148,6 +148,7 @@ def test_every_call_is_recorded(engine: str) -> None:
     assert sum(seen.values()) > 20
 
 
+@pytest.mark.slow
 def test_no_call_goes_round_the_recorder(engine: str) -> None:
     """What holds on to an engine's function from before would not be heard."""
     around: set[str] = set()

@@ -144,6 +144,7 @@ def _one(judgement: exercise.Judgement) -> str:
     return remark
 
 
+@pytest.mark.slow
 def test_what_never_returns_or_ends_the_process_is_reported(tmp_path: Path) -> None:
     found = _grade(
         tmp_path,
@@ -162,6 +163,7 @@ def test_what_never_returns_or_ends_the_process_is_reported(tmp_path: Path) -> N
     assert _one(found["replay"]).startswith("line 14: still running after 1 s")
 
 
+@pytest.mark.slow
 def test_what_waits_is_no_verdict_on_the_function(tmp_path: Path) -> None:
     file = tmp_path / "student.py"
     waits = "def {}(*_):\n    time.sleep(1e6)\n"

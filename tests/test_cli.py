@@ -43,6 +43,7 @@ def test_every_lesson_runs_and_reads_well_piped(cli: Cli, lesson: str, backend: 
     assert "nan" not in done.stdout.lower().split()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lesson", LESSONS)
 def test_every_lesson_speaks_json_with_its_provenance(cli: Cli, lesson: str, backend: str) -> None:
     found = _json(cli, "lesson", lesson, "--backend", backend, *QUICK.get(lesson, ()))
@@ -115,6 +116,7 @@ def test_gravity_prints_the_table_of_the_course(cli: Cli) -> None:
     assert "Damping and dry friction together hold 0.0089 N·m" in said
 
 
+@pytest.mark.slow
 def test_gravity_beyond_four_seconds_creeps(cli: Cli) -> None:
     found = _json(cli, "lesson", "gravity", "--seconds", "100")["mujoco"]["servos_off"]
     angles = dict(zip(found["time"], map(math.degrees, found["position"]), strict=True))
@@ -149,6 +151,7 @@ def test_replay(cli: Cli) -> None:
     assert found["travel"] > 0.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["extra-step", "late-ctrl"])
 def test_replay_broken(cli: Cli, way: str) -> None:
     found = _json(cli, "lesson", "replay", "--break", way)["mujoco"]
@@ -165,6 +168,7 @@ def test_speed(cli: Cli) -> None:
     assert found["bulk_factor"] == pytest.approx(found["simulated"] / found["bulk"])
 
 
+@pytest.mark.slow
 def test_lessons_on_the_public_scenes(cli: Cli, menagerie: Path) -> None:
     page = cli("lesson", "gravity", "--menagerie", str(menagerie)).stdout
     assert "robotstudio_so101/scene.xml" in page
@@ -516,6 +520,7 @@ def test_one_engine_that_refuses_a_model_leaves_the_other(cli: Cli, tmp_path: Pa
     assert "ball joint: joint b" in line
 
 
+@pytest.mark.slow
 def test_what_an_engine_warns_of_is_one_line_without_our_code(cli: Cli, tmp_path: Path) -> None:
     need_engine("pybullet")
     body = "<geom type='plane' size='1 1 1' friction='.1'/><body pos='0 0 1'><joint name='j'/>"

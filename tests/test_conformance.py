@@ -27,6 +27,7 @@ def test_backend_keeps(lab: conformance.Lab, check: str) -> None:
     conformance.CHECKS[check](lab)
 
 
+@pytest.mark.slow
 def test_run_reports_every_check(backend: str) -> None:
     outcomes = conformance.run(backend)
     assert [outcome.check for outcome in outcomes] == list(conformance.CHECKS)

@@ -51,6 +51,7 @@ def test_the_path_has_ten_stations_in_the_order_of_the_course() -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [lesson.name for lesson in STATIONS])
 def test_the_code_is_typed_run_and_questioned(name: str, backend: str) -> None:
     page, taken = _take(name, backend)
@@ -183,6 +184,7 @@ def test_what_cannot_be_told_apart_is_said_so() -> None:
     assert any("123 steps" in b.text for b in page.blocks if isinstance(b, Text))
 
 
+@pytest.mark.slow
 def test_six_questions_are_answered_by_runs(backend: str) -> None:
     page, _ = _take("questions", backend)
     asked = [block for block in page.blocks if isinstance(block, Question)]

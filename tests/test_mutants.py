@@ -145,6 +145,7 @@ def test_the_short_step_keeps_the_clock_right(
 # The judgement.
 
 
+@pytest.mark.slow
 def test_the_exercise_begins_with_survivors_and_an_idle_test() -> None:
     found = examine(EXERCISE, only=("xyzw", "degrees", "no-forward"))
     assert found.failures == ()
@@ -153,6 +154,7 @@ def test_the_exercise_begins_with_survivors_and_an_idle_test() -> None:
     assert (found.caught, found.holds) == (2, False)
 
 
+@pytest.mark.slow
 def test_a_test_that_asserts_nothing_catches_nothing(write: Write) -> None:
     found = examine(write("def test_nothing(): assert True"), only=("no-forward", "gravity-up"))
     assert (found.failures, found.caught, found.idle) == ((), 0, ("test_nothing",))
@@ -228,6 +230,7 @@ def test_tests_that_fail_on_the_healthy_arm_are_told(body: str, why: str, write:
     assert (found.trials, found.holds) == ((), False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -246,6 +249,7 @@ def test_a_file_that_is_no_test_file_is_refused(text: str, message: str, write: 
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_a_test_that_looks_for_the_fault_finds_none(write: Write) -> None:
     text = """import os, sys
 def test_a(request):
@@ -256,6 +260,7 @@ def test_a(request):
     assert (found.failures, found.caught) == ((), 0)
 
 
+@pytest.mark.slow
 def test_what_is_imported_does_not_tell_of_a_fault(write: Write) -> None:
     text = "import sys\nSEEN = set(sys.modules)\n"
     text += "def test_a(): assert 'statemachine.grading.mutants.faults' in SEEN\n"
@@ -263,6 +268,7 @@ def test_what_is_imported_does_not_tell_of_a_fault(write: Write) -> None:
     assert (found.failures, found.caught) == ((), 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", ["not json", '{"began": 5}', "[" * 100_000, '{"tests": [1]}'])
 def test_a_forged_record_is_refused(line: str, write: Write) -> None:
     text = "import sys\ndef test_a():\n    path = sys.argv[sys.argv.index('--record') + 1]\n"
@@ -279,6 +285,7 @@ def test_a_test_starts_no_process(write: Write) -> None:
     assert found.failures == (Failure("test_a", refused), Failure("test_b", "line 3: no"))
 
 
+@pytest.mark.slow
 def test_a_fault_that_cannot_be_put_in_is_not_caught(
     write: Write, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -288,6 +295,7 @@ def test_a_fault_that_cannot_be_put_in_is_not_caught(
         examine(path, only=["unheard-of"])
 
 
+@pytest.mark.slow
 def test_another_pytests_settings_do_not_disturb(
     write: Write, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -331,6 +339,7 @@ def test_the_page_keeps_to_its_columns(capsys: pytest.CaptureFixture[str]) -> No
     assert "test_b" in " ".join(lines)
 
 
+@pytest.mark.slow
 def test_the_command_says_what_survives(cli: Cli) -> None:
     only = ("--only", "xyzw", "--only", "degrees")
     done = cli("check", "--mutants", str(EXERCISE), *only)
@@ -340,6 +349,7 @@ def test_the_command_says_what_survives(cli: Cli) -> None:
     assert cli("check", "--mutants", str(EXERCISE), *only[2:]).returncode == 0
 
 
+@pytest.mark.slow
 def test_the_command_speaks_json(cli: Cli, write: Write) -> None:
     path = write("def test_it(): assert False, 'no'")
     done = cli("check", "--mutants", str(path), "--json")

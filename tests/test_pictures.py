@@ -31,6 +31,8 @@ from statemachine.traces import Trace, record, shipped, write
 from .conftest import ROOT, Cli, need_engine
 from .rendering import rendering_environment, silhouettes
 
+pytestmark = pytest.mark.slow  # a browser or a renderer at work
+
 SIZE = (320, 240)
 FIRST, SECOND = (0, -0.6, 1.2, 0.5, 0, 0.6), (0.9, -0.3, 0.4, -0.4, 0, 0.2)
 
@@ -372,7 +374,6 @@ def _without_opengl(tmp_path: Path) -> dict[str, str]:
     return {"LD_LIBRARY_PATH": str(folder), "__EGL_VENDOR_LIBRARY_DIRS": str(folder), "DISPLAY": ""}
 
 
-@pytest.mark.slow
 def test_without_opengl_pybullet_draws_and_it_is_said(cli: Cli, tmp_path: Path) -> None:
     need_engine("pybullet")
     image_of = pytest.importorskip("PIL.Image")
@@ -501,7 +502,6 @@ def test_compare_writes_what_it_is_asked_for(
     assert sorted(path.name for path in tmp_path.glob("a.*")) == ["a.svg", "a.webp"]
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="looks at processes in /proc")
 @pytest.mark.parametrize("name", ["a.webp", "a.mp4"])
 def test_ctrl_c_leaves_no_half_film_and_no_process(

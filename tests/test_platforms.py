@@ -227,6 +227,7 @@ def test_what_to_install_depends_on_the_machine(
             engine_version("pybullet")
 
 
+@pytest.mark.slow
 def test_two_distributions_at_once_are_an_error_that_says_what_to_type(
     cli: Cli, tmp_path: Path
 ) -> None:
@@ -277,6 +278,7 @@ def test_all_goes_on_with_the_engines_that_are_there(
     assert list(json.loads(told.stdout)) == ["mujoco"]
 
 
+@pytest.mark.slow
 def test_the_doctor_calls_it_optional(cli: Cli, without_pybullet: dict[str, str]) -> None:
     done = cli("doctor", "--json", **without_pybullet)
     assert done.returncode == 0
@@ -285,6 +287,7 @@ def test_the_doctor_calls_it_optional(cli: Cli, without_pybullet: dict[str, str]
     assert re.search("pip install|no wheel", finding["found"])
 
 
+@pytest.mark.slow
 def test_with_it_every_lesson_speaks_of_both(cli: Cli) -> None:
     need_engine("pybullet")
     for lesson in ("state", "forward", "hold", "gravity"):

@@ -49,6 +49,7 @@ def test_other_processes_continue_with_the_same_bits(backend: str) -> None:
     assert futures[0] == futures[1] == here
 
 
+@pytest.mark.slow
 def test_threads_continue_with_the_same_bits(backend: str) -> None:
     model, state = _mid_contact(backend)
 

@@ -230,6 +230,7 @@ def test_a_state_has_one_future_in_every_process() -> None:
     assert there == _from_pickles(*pickles, 300)
 
 
+@pytest.mark.slow
 def test_nothing_of_before_survives_a_reset() -> None:
     """Forty histories: with the box in the jaws, thrown about, watched or not."""
     model = load("so101/scene_box")

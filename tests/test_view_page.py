@@ -28,6 +28,8 @@ from .browser import Tab, browser, tabs
 from .conftest import REQUIRED, need_engine
 from .test_view import Viewer, _free_pair
 
+pytestmark = pytest.mark.slow  # a browser or a renderer at work
+
 # The client's own library speaks of its next version; nothing here calls it.
 KNOWN = ("THREE.Clock",)
 PATIENCE = 90.0  # seconds, on a machine that draws without a graphics card and does more
@@ -112,7 +114,6 @@ def _ctrl(session: Session) -> np.ndarray:
     return session.frame().ctrl
 
 
-@pytest.mark.slow
 def test_everything_is_on_the_page_and_nothing_is_asked_of_the_network(stage: Stage) -> None:
     stage.reset()
     for joint in sm.load("so101").actuator_names:
@@ -126,7 +127,6 @@ def test_everything_is_on_the_page_and_nothing_is_asked_of_the_network(stage: St
     stage.tab.nothing_wrong(*KNOWN)
 
 
-@pytest.mark.slow
 def test_a_slider_moves_the_command_and_the_arm(stage: Stage) -> None:
     session = stage.session
     stage.reset()
@@ -159,7 +159,6 @@ def test_a_slider_moves_the_command_and_the_arm(stage: Stage) -> None:
     stage.says("1.000 s")
 
 
-@pytest.mark.slow
 def test_run_pause_step_and_reset(stage: Stage) -> None:
     session = stage.session
     session.apply(SetCtrl(0, 0.5))
@@ -186,7 +185,6 @@ def test_run_pause_step_and_reset(stage: Stage) -> None:
     stage.tab.nothing_wrong(*KNOWN)
 
 
-@pytest.mark.slow
 def test_both_arms_are_seen_and_the_ghost_can_be_put_away(stage: Stage) -> None:
     """Where both agree the ghost is inside the arm; once it has fallen it is seen."""
     session = stage.session
@@ -208,7 +206,6 @@ def test_both_arms_are_seen_and_the_ghost_can_be_put_away(stage: Stage) -> None:
     stage.until(lambda: _colours(stage.tab)[1] < 100)
 
 
-@pytest.mark.slow
 def test_two_tabs_show_the_same(stage: Stage) -> None:
     session = stage.session
     stage.reset()
@@ -233,7 +230,6 @@ def test_two_tabs_show_the_same(stage: Stage) -> None:
     stage.says(f"{session.frame().time:.3f} s")  # the one that is left goes on
 
 
-@pytest.mark.slow
 def test_a_divergence_is_a_line_on_the_page_and_reset_recovers(stage: Stage) -> None:
     session = stage.session
     stage.reset()
@@ -253,7 +249,6 @@ def test_a_divergence_is_a_line_on_the_page_and_reset_recovers(stage: Stage) -> 
     stage.tab.nothing_wrong(*KNOWN)
 
 
-@pytest.mark.slow
 def test_the_command_shows_both_engines_to_a_browser(tmp_path: Path) -> None:
     """End to end: the process, the page, time that passes by itself, and Ctrl-C while watched."""
     need_engine("pybullet")
