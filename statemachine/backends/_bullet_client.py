@@ -50,12 +50,12 @@ def _room() -> int:
     try:
         import resource
 
-        with open("/proc/meminfo") as file:
+        with open("/proc/meminfo", encoding="ascii") as file:
             lines = dict(line.split(":", 1) for line in file)
         room = int(lines["MemAvailable"].split()[0]) << 10
         limit = resource.getrlimit(resource.RLIMIT_AS)[0]
         if limit != resource.RLIM_INFINITY:
-            with open("/proc/self/statm") as file:
+            with open("/proc/self/statm", encoding="ascii") as file:
                 room = min(room, limit - int(file.read().split()[0]) * resource.getpagesize())
     except (ImportError, OSError, KeyError):  # not Linux
         return 1 << 20

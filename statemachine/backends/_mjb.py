@@ -68,7 +68,7 @@ def use(path: str) -> None:
     from .. import verbs
     from .mujoco_backend import MujocoModel
 
-    with suppress(ImportError):  # not on Windows
+    if sys.platform != "win32":
         import resource
 
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

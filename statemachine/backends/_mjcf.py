@@ -31,7 +31,11 @@ _HINDRANCES = {  # option -> flags of a file that would leave it without effect
     "limits": (_DISABLE.mjDSBL_CONSTRAINT,),
 }
 
-_FREE_USE = {"numeric_data"} | {name for name in dir(mujoco.MjModel) if name.endswith("_user")}
+# What nothing is computed from, but a user's own code: and what only muscles are, which is
+# infinite for a motor with a huge gear.
+_FREE_USE = {"numeric_data", "actuator_acc0"} | {
+    name for name in dir(mujoco.MjModel) if name.endswith("_user")
+}
 _NEVER_NEGATIVE = {"dof_armature", "dof_frictionloss"}
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import glob
 import os
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -90,7 +91,7 @@ def _remove_abandoned(target: Path) -> None:
 
     A process that is still writing holds a lock on its part.
     """
-    if fcntl is None:
+    if fcntl is None or sys.platform == "win32":
         return
     pattern = glob.escape(f".{target.name}{_PART}") + "*" + glob.escape(target.suffix)
     for name in glob.glob(pattern, root_dir=target.parent):
