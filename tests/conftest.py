@@ -108,7 +108,7 @@ def cli(tmp_path: Path) -> Cli:
             [sys.executable, "-m", "statemachine", *arguments],
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=400,  # of a busy machine
             cwd=tmp_path,
             env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUTF8": "1", **environment},
             check=False,

@@ -83,7 +83,7 @@ def test_what_another_thread_prints_is_not_caught(capfd: pytest.CaptureFixture[s
 
 
 def test_nothing_is_lost_while_worlds_are_made() -> None:
-    """A thread prints a thousand numbered lines while the engine loads and is quiet."""
+    """A thread prints two hundred numbered lines while the engine loads and is quiet."""
     need_engine("pybullet")
     code = """
 import os, threading, time
@@ -92,7 +92,7 @@ import statemachine as sm
 model = sm.load("so101/scene", backend="pybullet")
 
 def work():
-    for k in range(1000):
+    for k in range(200):
         os.write(1, b"%d\\n" % k)
         time.sleep(0.0005)
 
@@ -105,7 +105,7 @@ while printing.is_alive() or made < 3:
 """
     done = _python(code)
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.split() == [str(k) for k in range(1000)]
+    assert done.stdout.split() == [str(k) for k in range(200)]
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")

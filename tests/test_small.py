@@ -1,13 +1,10 @@
-"""Errors, rotations, records, and the size of the core."""
+"""Errors, rotations, records, and what the core stands on."""
 
 from __future__ import annotations
 
 import ast
 import inspect
-import io
 import pickle
-import re
-import tokenize
 
 import numpy as np
 import pytest
@@ -25,8 +22,6 @@ CORE = (
     "errors.py", "rotations.py", "records.py", "checks.py", "engines.py", "models.py",
     "model.py", "interface.py", "verbs.py", "witness_file.py", "kinematics.py", "backends",
 )  # fmt: skip
-# What it takes to make an engine keep a contract that it does not know.
-EMULATION = re.compile(r"pybullet_backend|_bullet_")
 
 angles = st.floats(-3.0, 3.0)
 quats = st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(
@@ -106,36 +101,6 @@ def test_json_has_no_nan() -> None:
     assert dumps({"a": float("nan"), "b": np.array([1.0, np.inf])}) == dumps(
         {"a": None, "b": [1.0, None]}
     )
-
-
-def _code_lines(source: str) -> int:
-    """Lines that hold code: no blank lines, comments or docstrings."""
-    words: set[int] = set()
-    skipped = (
-        tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,
-        tokenize.ENDMARKER,
-    )  # fmt: skip
-    for token in tokenize.generate_tokens(io.StringIO(source).readline):
-        if token.type not in skipped:
-            words.update(range(token.start[0], token.end[0] + 1))
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(
-            node
-        ):
-            text = node.body[0]
-            words -= set(range(text.lineno, (text.end_lineno or text.lineno) + 1))
-    return len(words)
-
-
-def test_the_core_stays_thin() -> None:
-    """At most 1,600 lines of code; the emulation on PyBullet has a limit of its own."""
-    package = ROOT / "statemachine"
-    lines = {False: 0, True: 0}
-    for name in CORE:
-        for file in [package / name] if name.endswith(".py") else (package / name).glob("*.py"):
-            lines[bool(EMULATION.search(file.name))] += _code_lines(file.read_text())
-    assert lines[False] <= 1600
-    assert lines[True] <= 1850
 
 
 def test_the_core_does_not_import_what_stands_on_it() -> None:
