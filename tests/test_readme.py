@@ -39,6 +39,7 @@ def test_there_are_commands() -> None:
     assert set(SAYS_NO) <= set(COMMANDS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_command(cli: Cli, command: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
     words = shlex.split(command)[1:]
