@@ -218,16 +218,10 @@ class PybulletData(Data):
         model = self._home
         if key is None:
             qpos0 = model._shared.raw.qpos0
-            self._restart(0.0, qpos0, np.zeros(model.nv), np.zeros(model.nu))
+            self._machine.restart(0.0, qpos0, np.zeros(model.nv), np.zeros(model.nu))
         else:
             frame = model.keyframes[key]
-            self._restart(frame.time, frame.qpos, frame.qvel, frame.ctrl)
-
-    def _restart(self, *state: Any) -> None:
-        self._machine.check_writable(*INPUTS)
-        # What interrupts it leaves it half done; the verb ends this when it is whole.
-        self._give_up("reset or set_state was interrupted")
-        self._machine.restart(*state)
+            self._machine.restart(frame.time, frame.qpos, frame.qvel, frame.ctrl)
 
     def _get_state(self) -> State:
         now = self._machine.present
@@ -245,7 +239,7 @@ class PybulletData(Data):
         self._home._check_quaternions(parts[1])
         observed = self._machine.parted(*parts[4:]) if parts[4:] else None
         qpos, qvel, ctrl = parts[1:4]
-        self._restart(float(parts[0][0]), qpos, qvel, ctrl, observed)
+        self._machine.restart(float(parts[0][0]), qpos, qvel, ctrl, observed)
 
     def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
         return self._layout
