@@ -45,7 +45,7 @@ import time
 import numpy as np
 
 import statemachine as sm
-from statemachine.records import JointType  # noqa: F401  (for demo_state)
+from statemachine.interface import JointType  # noqa: F401  (for demo_state)
 
 # The command of demo_replay, one target angle for each of the six servos [rad].
 CTRL = [0.4, -0.8, 0.5, 1.6, 1.57, 0.28]

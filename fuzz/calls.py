@@ -17,7 +17,7 @@ import numpy as np
 
 import statemachine as sm
 from statemachine.errors import BusyDataError, StateMachineError
-from statemachine.records import DERIVED, INPUTS
+from statemachine.interface import DERIVED, INPUTS
 
 from ._tally import Tally
 

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from statemachine.engines import available
+from statemachine.installed import available
 
 from ._tally import Tally, run_bounded, turns
 

@@ -31,28 +31,28 @@ if TYPE_CHECKING:
     from .backends import load as load
     from .interface import Data as Data
     from .interface import Model as Model
+    from .interface import State as State
+    from .interface import forward as forward
+    from .interface import get_state as get_state
+    from .interface import make_data as make_data
+    from .interface import reset as reset
+    from .interface import set_state as set_state
+    from .interface import step as step
     from .kinematics import Kinematics as Kinematics
-    from .records import State as State
     from .staleness import freshness as freshness
     from .staleness import watch_freshness as watch_freshness
-    from .verbs import forward as forward
-    from .verbs import get_state as get_state
-    from .verbs import make_data as make_data
-    from .verbs import reset as reset
-    from .verbs import set_state as set_state
-    from .verbs import step as step
 
 _HOMES = {
     "load": "backends",
-    "make_data": "verbs",
-    "forward": "verbs",
-    "step": "verbs",
-    "reset": "verbs",
-    "get_state": "verbs",
-    "set_state": "verbs",
+    "make_data": "interface",
+    "forward": "interface",
+    "step": "interface",
+    "reset": "interface",
+    "get_state": "interface",
+    "set_state": "interface",
     "Model": "interface",
     "Data": "interface",
-    "State": "records",
+    "State": "interface",
     "Kinematics": "kinematics",
     "freshness": "staleness",
     "watch_freshness": "staleness",

@@ -16,8 +16,8 @@ from typing import Any, NoReturn
 from . import __version__
 from .commands import COMMANDS, lesson
 from .commands._common import BAD_INPUT, MISSING, NO_OUTPUT, PROGRAM, complain
-from .engines import raise_if_interrupted
 from .errors import EngineWarning, MissingEngineError, StateMachineError
+from .installed import raise_if_interrupted
 from .lessons import LESSONS
 from .report.terminal import spelled
 

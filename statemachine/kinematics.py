@@ -15,11 +15,11 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import as_vector, check_entries
-from .engines import require
 from .errors import BadInputError, ModelError, unknown_name
+from .installed import require
+from .interface import Array
+from .interface.checks import as_vector, check_entries
 from .models import resolve
-from .records import Array
 from .rotations import matrix_from_quat, xyzw_from_wxyz
 from .witness_file import read
 

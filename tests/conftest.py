@@ -14,8 +14,8 @@ import pytest
 
 from statemachine import backends
 from statemachine.backends import backend_engine, backend_names
-from statemachine.engines import ENGINES, require
 from statemachine.errors import MissingEngineError
+from statemachine.installed import ENGINES, require
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"

@@ -16,10 +16,9 @@ import numpy as np
 from statemachine.backends import mujoco_backend
 from statemachine.backends._mjcf import facts
 from statemachine.backends.mujoco_backend import MujocoModel
-from statemachine.checks import check_entries
 from statemachine.errors import DivergedError
-from statemachine.interface import Data, Model
-from statemachine.records import DERIVED, INPUTS, Contacts, State
+from statemachine.interface import DERIVED, INPUTS, Contacts, Data, Model, State
+from statemachine.interface.checks import check_entries
 
 
 class HiddenModel(Model):

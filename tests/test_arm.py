@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine.interface import JointType
 from statemachine.models import model_names, models_dir
-from statemachine.records import JointType
 
 ARM = models_dir() / "so101" / "so101.xml"
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")

@@ -30,8 +30,8 @@ from statemachine.audit.points import points
 from statemachine.backends import mujoco_backend
 from statemachine.backends.mujoco_backend import MujocoData
 from statemachine.cli import main
-from statemachine.engines import require
 from statemachine.errors import BadInputError
+from statemachine.installed import require
 from statemachine.report import audit as report
 
 from .conftest import Cli, need_engine, registered

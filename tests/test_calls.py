@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from statemachine import backends, engines
+from statemachine import backends, installed
 from statemachine.backends.mujoco_backend import MujocoData
 from statemachine.errors import BadInputError, UnknownNameError
 from statemachine.page import Page, Table
@@ -91,7 +91,7 @@ def run_plainly(code: str) -> str:
 def owners(engine: str) -> list[Any]:
     """Whatever has functions that are replaced."""
     found: list[Any] = [mujoco, mujoco.MjModel, mujoco.MjData, mujoco.MjSpec]
-    return found + ([engines.require("pybullet")] if engine == "pybullet" else [])
+    return found + ([installed.require("pybullet")] if engine == "pybullet" else [])
 
 
 def methods(owner: type) -> dict[int, str]:
@@ -400,7 +400,7 @@ def test_the_client_of_a_call_is_found_where_it_is_given() -> None:
     assert found("anything", (1, 2), {}) is None
     assert found("getJointStates", (1, [2], 9), {}) == 9
     assert found("getJointStates", (1, [2]), {}) == 0
-    pb: Any = engines.require("pybullet")
+    pb: Any = installed.require("pybullet")
     nowhere = pb.connect(pb.DIRECT)
     pb.disconnect(nowhere)
     for name, place in watched._BEFORE_CLIENT.items():
@@ -481,7 +481,7 @@ def test_a_hidden_write_beside_a_call_is_seen(monkeypatch: pytest.MonkeyPatch) -
 
 def test_a_getter_that_moves_the_world_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     need_engine("pybullet")
-    pb: Any = engines.require("pybullet")
+    pb: Any = installed.require("pybullet")
     right = pb.getJointStates
 
     def wrong(body: int, joints: Any, client: int) -> Any:

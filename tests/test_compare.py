@@ -27,9 +27,9 @@ from statemachine.compare import (
 )
 from statemachine.compare.series import normal_forces, total_forces
 from statemachine.compare.tolerances import COUNT
-from statemachine.engines import available
 from statemachine.errors import BadInputError, MissingEngineError, TraceError, UnknownNameError
 from statemachine.experiments.scenarios import SCENARIOS
+from statemachine.installed import available
 from statemachine.page import Text
 from statemachine.report import compare as report
 from statemachine.report import terminal

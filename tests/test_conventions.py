@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 from rich.cells import cell_len
 
-from statemachine.engines import ENGINES, require
 from statemachine.errors import BadInputError, MissingEngineError, UnknownNameError
+from statemachine.installed import ENGINES, require
 from statemachine.probes import phrasebook
 from statemachine.probes.conventions import (
     NO_ANSWER,

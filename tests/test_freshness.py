@@ -21,8 +21,7 @@ from statemachine.errors import (
     ForeignDataError,
     StaleReadError,
 )
-from statemachine.interface import Data, Model
-from statemachine.records import DERIVED, POSES
+from statemachine.interface import DERIVED, POSES, Data, Model
 from statemachine.report.as_json import plain
 from statemachine.rotations import matrix_from_quat
 from statemachine.staleness import look

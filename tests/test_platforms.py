@@ -18,9 +18,9 @@ from types import SimpleNamespace
 import pytest
 from packaging.requirements import Requirement
 
-from statemachine import engines
-from statemachine.engines import ENGINES, engine_version
+from statemachine import installed
 from statemachine.errors import MissingEngineError
+from statemachine.installed import ENGINES, engine_version
 
 from .conftest import ROOT, Cli, need_engine
 
@@ -182,7 +182,7 @@ def test_one_line_says_what_is_missing(cli: Cli, without_pybullet: dict[str, str
     assert done.returncode == 3
     assert not done.stdout
     (line,) = done.stderr.splitlines()
-    here = engines.wheel_here(ENGINES["pybullet"])
+    here = installed.wheel_here(ENGINES["pybullet"])
     assert (f"pip install {here.requirement} " if here else "no wheel for") in line
     assert "CPython 3.11 to 3.13" in line
 
@@ -195,11 +195,11 @@ def elsewhere(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, str, int], None
         raise importlib.metadata.PackageNotFoundError(name)
 
     def go(system: str, processor: str, minor: int) -> None:
-        monkeypatch.setattr(engines.sys, "platform", system)
+        monkeypatch.setattr(installed.sys, "platform", system)
         monkeypatch.setattr(machine, "machine", lambda: processor)
         monkeypatch.setattr(machine, "system", lambda: system)
         monkeypatch.setattr(
-            engines.sys, "version_info", SimpleNamespace(major=3, minor=minor, micro=0)
+            installed.sys, "version_info", SimpleNamespace(major=3, minor=minor, micro=0)
         )
         monkeypatch.setattr(importlib.metadata, "version", version)
 

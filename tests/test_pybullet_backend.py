@@ -28,7 +28,7 @@ from statemachine.errors import (
     UnknownNameError,
     UnsupportedError,
 )
-from statemachine.records import DERIVED
+from statemachine.interface import DERIVED
 from statemachine.rotations import matrix_from_quat
 
 from .conftest import ROOT, need_engine

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from statemachine import conformance
-from statemachine.records import POSES
+from statemachine.interface import POSES
 from statemachine.rotations import matrix_from_quat
 
 from . import test_pybullet_backend as ours

@@ -21,8 +21,7 @@ from statemachine.backends import _mjcf
 from statemachine.backends._mujoco_alarms import Alarms
 from statemachine.backends.mujoco_backend import MujocoData, MujocoModel
 from statemachine.grading.mutants import faults as mutants
-from statemachine.interface import Model
-from statemachine.records import DERIVED, State
+from statemachine.interface import DERIVED, Model, State
 
 from .conftest import registered
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import statemachine as sm
-from statemachine.engines import ENGINES, require
+from statemachine.installed import ENGINES, require
 
 from .conftest import REQUIRED, ROOT
 
@@ -29,7 +29,7 @@ HEAVY = ("mujoco", "pybullet", "pinocchio", "numpy", "rich", "matplotlib", "vise
         ("from statemachine.cli import main; main(['audit', '--help'])", set()),
         ("from statemachine.cli import main; main(['check', '--help'])", set()),
         ("from statemachine.cli import main; main(['view', '--help'])", set()),
-        ("import statemachine.interface, statemachine.verbs", {"numpy"}),
+        ("import statemachine.interface", {"numpy"}),
         ("import statemachine.staleness", {"numpy"}),
         ("import statemachine.backends, statemachine.conformance", {"numpy", "xml.etree"}),
         ("import statemachine.kinematics", {"numpy", "xml.etree"}),
@@ -157,11 +157,11 @@ def test_a_missing_or_broken_engine_is_one_line(
 
 def test_an_interrupt_is_no_engine_that_does_not_load(monkeypatch: pytest.MonkeyPatch) -> None:
     """A Ctrl-C in the start of a C extension comes out as an ImportError of it."""
-    from statemachine import engines
+    from statemachine import installed
 
     def interrupted(name: str) -> None:
         raise ImportError("initialization failed") from KeyboardInterrupt()
 
-    monkeypatch.setattr(engines.importlib, "import_module", interrupted)
+    monkeypatch.setattr(installed.importlib, "import_module", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        engines.require("mujoco")
+        installed.require("mujoco")

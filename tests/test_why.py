@@ -178,7 +178,7 @@ def test_what_cannot_be_set_on_two_is_set_on_one(arm: Model) -> None:
 
 def load_stubborn(path: str, defaults: str = "model") -> Model:
     """An engine that takes its armature from the file, which has another one."""
-    from statemachine.records import Capabilities
+    from statemachine.interface import Capabilities
 
     from .hidden_world import HiddenModel, load
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import yaml
 
-from statemachine.engines import ENGINES
+from statemachine.installed import ENGINES
 
 from .conftest import ROOT
 from .test_platforms import LINUX, LINUX_ARM, MAC, PROJECT, WINDOWS, asked

@@ -12,10 +12,10 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-from ..checks import as_count
 from ..errors import BadInputError, DivergedError
 from ..experiments._common import Progress, Provenance, provenance, silent
-from ..model import Model
+from ..interface import Model
+from ..interface.checks import as_count
 from . import apart, elsewhere, falls, look, repeat, restore
 from .conclusions import Conclusion, conclude
 from .drivers import Driver, Run, Seen, drivers

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from ..records import Array
+from ..interface import Array
 from .drivers import Driver, Run
 from .findings import Finding
 from .points import Point

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import EngineError
-from ..model import Model
-from ..records import Array, State
+from ..interface import Array, Model, State
 from .drivers import Driver, Run
 from .drivers.interface_driver import InterfaceDriver
 from .findings import Finding, gap

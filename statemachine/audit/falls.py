@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..backends import load
-from ..model import Model
+from ..interface import Model
 from . import look
 from .drivers import Driver
 from .findings import Finding

@@ -8,8 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..model import Model
-from ..records import Array, Ints, JointType
+from ..interface import Array, Ints, JointType, Model
 
 Layer = Literal["engine", "interface"]
 EACH_OTHER = "each other"  # the futures of several restores, instead of one and the reference

@@ -12,9 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import UnsupportedError
-from ..model import Model
-from ..records import Array, JointType, Keyframe
-from ..verbs import make_data
+from ..interface import Array, JointType, Keyframe, Model, make_data
 
 _SETTLE, _FALL, _WAY = 1.0, 0.8, 0.1  # seconds before a run is saved
 _LONGEST = 400  # steps before it, at most

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import combinations
 
-from ..records import Array
+from ..interface import Array
 from .drivers import Driver, Machine, Restore, Run, Save, Way
 from .findings import EACH_OTHER, Finding, gap, worst
 

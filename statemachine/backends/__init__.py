@@ -9,8 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Protocol, cast
 
-from ..engines import raise_if_interrupted, require
 from ..errors import BadInputError, MissingEngineError, unknown_name
+from ..installed import raise_if_interrupted, require
 from ..interface import Model
 from ..models import resolve
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from ..records import Array
+from ..interface import Array
 from . import _dense as dense
 from ._bullet_client import pb
 from ._bullet_law import Law, Solution

@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..engines import require
 from ..errors import EngineError
+from ..installed import require
 
 pb: Any = require("pybullet")
 

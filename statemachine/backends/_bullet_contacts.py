@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ..records import Array, Contacts
+from ..interface import Array, Contacts
 from ..rotations import matrix_from_quat
 from . import _dense as dense
 from ._bullet_world import World

@@ -29,7 +29,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ..records import Array
+from ..interface import Array
 from . import _dense as dense
 from ._bullet_client import pb
 from ._bullet_world import Tree

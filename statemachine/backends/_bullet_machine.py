@@ -15,9 +15,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ..checks import HUGE, check_entries
 from ..errors import BadInputError, DivergedError
-from ..records import DERIVED, POSES, Array, Contacts
+from ..interface import DERIVED, POSES, Array, Contacts
+from ..interface.checks import HUGE, check_entries
 from ..rotations import matrix_from_quat
 from . import _dense as dense
 from ._bullet_arm import Arm, Motors

@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ..records import Array
+from ..interface import Array
 from . import _bullet_urdf as urdf
 from ._bullet_surfaces import Surfaces
 

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from ..errors import UnsupportedError
-from ..records import JointType
+from ..interface import JointType
 from ._bullet_plan import Plan
 from ._bullet_surfaces import NO_CONTACT, PLANE
 from ._bullet_urdf import axes, tree

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import mujoco
 import numpy as np
 
-from ..records import POSES, Array
+from ..interface import POSES, Array
 from ..rotations import matrix_from_quat, times, wxyz_from_xyzw
 from . import _dense as dense
 from ._bullet_plan import Plan

@@ -14,7 +14,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ..records import Array
+from ..interface import Array
 
 PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
 NO_CONTACT = int(mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)

@@ -17,7 +17,7 @@ from xml.sax.saxutils import quoteattr
 import mujoco
 import numpy as np
 
-from ..records import Array, JointType
+from ..interface import Array, JointType
 from ..rotations import matrix_from_quat
 from . import _dense as dense
 

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from ..errors import ModelError
-from ..records import Array
+from ..interface import Array
 from ..rotations import matrix_from_quat, xyzw_from_wxyz
 from ..silence import silence
 from . import _bullet_urdf as urdf

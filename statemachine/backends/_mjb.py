@@ -17,7 +17,7 @@ from pathlib import Path
 import mujoco
 
 from ..errors import ModelError, StateMachineError
-from ..records import DERIVED
+from ..interface import DERIVED
 
 _SECONDS = 60.0
 _STEPS = 5
@@ -65,7 +65,7 @@ def check_binary(path: str) -> None:
 
 def use(path: str) -> None:
     """Do with a binary model what the verbs may do; what is not of this file may fail."""
-    from .. import verbs
+    from ..interface import verbs
     from .mujoco_backend import MujocoModel
 
     if sys.platform != "win32":

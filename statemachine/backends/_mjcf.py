@@ -13,8 +13,7 @@ import mujoco
 import numpy as np
 
 from ..errors import BadInputError, ModelError
-from ..model import Model
-from ..records import Array, Keyframe
+from ..interface import Array, Keyframe, Model
 from ._mjb import check_binary
 
 _DISABLE = mujoco.mjtDisableBit

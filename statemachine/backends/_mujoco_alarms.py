@@ -19,8 +19,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ..checks import HUGE
 from ..errors import EngineWarning
+from ..interface.checks import HUGE
 
 _KIND = mujoco.mjtWarning
 # What makes a Data useless, in the order in which a step looks for it.

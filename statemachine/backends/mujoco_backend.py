@@ -15,20 +15,22 @@ from typing import Any, Literal, NoReturn, cast
 import mujoco
 import numpy as np
 
-from ..checks import TINY, check_finite
 from ..errors import BadInputError, DivergedError, EngineError
-from ..interface import OPTIONS, Data, Model
-from ..records import (
+from ..interface import (
     BEHAVIOURS,
     FORCES,
     INPUTS,
+    OPTIONS,
     POSES,
     Array,
     Behaviour,
     Capabilities,
     Contacts,
+    Data,
+    Model,
     State,
 )
+from ..interface.checks import TINY, check_finite
 from ._mjcf import compile_file, edited, facts, heard, step_length, with_fingerprint
 from ._mujoco_alarms import AlarmError, Alarms, pass_on
 

@@ -14,11 +14,21 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..checks import check_entries
-from ..engines import engine_version
 from ..errors import DivergedError, EngineError, EngineWarning
-from ..interface import OPTIONS, Data, Model
-from ..records import BEHAVIOURS, INPUTS, Array, Behaviour, Capabilities, Contacts, State
+from ..installed import engine_version
+from ..interface import (
+    BEHAVIOURS,
+    INPUTS,
+    OPTIONS,
+    Array,
+    Behaviour,
+    Capabilities,
+    Contacts,
+    Data,
+    Model,
+    State,
+)
+from ..interface.checks import check_entries
 from . import _bullet_urdf as urdf
 from ._bullet_client import pb
 from ._bullet_machine import Machine, Mirror

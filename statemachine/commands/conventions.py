@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..engines import available, require
 from ..errors import BadInputError
+from ..installed import available, require
 from ._common import MISSING, PROGRAM, add_json, complain, show
 
 

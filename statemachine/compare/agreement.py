@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import TraceError
 from ..experiments._common import Provenance
-from ..records import Array
+from ..interface import Array
 from ..traces import Trace
 from .align import SAME, common_moments
 from .notes import notes_on

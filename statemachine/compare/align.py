@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import TraceError
-from ..records import Array, Ints
+from ..interface import Array, Ints
 from ..traces import Trace
 
 SAME = 1e-6  # of a timestep: two moments nearer than this are one

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..records import JointType
+from ..interface import JointType
 from ..traces import Header, Trace
 from .align import SAME, Common
 from .series import tell

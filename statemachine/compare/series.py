@@ -8,7 +8,7 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
-from ..records import Array, JointType, usual_site
+from ..interface import Array, JointType, usual_site
 from ..rotations import angle_between, matrix_from_quat
 from ..traces import Header, Trace
 from .align import Common, common_moments

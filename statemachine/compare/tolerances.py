@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import BadInputError, unknown_name
-from ..records import Array
+from ..interface import Array
 from ..traces import Trace
 from .series import UNITS, Series
 

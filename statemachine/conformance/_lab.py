@@ -11,9 +11,7 @@ import numpy as np
 
 from ..backends import load
 from ..errors import UnsupportedError
-from ..interface import Data, Model
-from ..records import DERIVED, Array
-from ..verbs import forward, get_state, make_data, reset, step
+from ..interface import DERIVED, Array, Data, Model, forward, get_state, make_data, reset, step
 
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..interface import POSES, JointType, forward, get_state, make_data, reset, set_state, step
 from ..kinematics import Kinematics
-from ..records import POSES, JointType
 from ..rotations import matrix_from_quat
-from ..verbs import forward, get_state, make_data, reset, set_state, step
 from ._lab import (
     TARGET,
     Lab,

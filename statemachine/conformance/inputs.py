@@ -17,8 +17,7 @@ from ..errors import (
     UnknownNameError,
     UnsupportedError,
 )
-from ..records import DERIVED, INPUTS
-from ..verbs import forward, get_state, make_data, reset, set_state, step
+from ..interface import DERIVED, INPUTS, forward, get_state, make_data, reset, set_state, step
 from ._lab import Lab, inputs_of, require, require_equal, require_raises
 
 

@@ -7,11 +7,9 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ..errors import UnsupportedError
-from ..interface import Model
+from ..interface import BEHAVIOURS, Array, Model, forward, make_data, step
 from ..models import resolve
-from ..records import BEHAVIOURS, Array
 from ..rotations import angle_between, matrix_from_quat
-from ..verbs import forward, make_data, step
 from ._lab import Lab, require, require_close
 
 _G = 9.81

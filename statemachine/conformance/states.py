@@ -8,7 +8,7 @@ import pickle
 import numpy as np
 
 from ..errors import BadInputError, ForeignStateError
-from ..verbs import forward, get_state, make_data, reset, set_state, step
+from ..interface import forward, get_state, make_data, reset, set_state, step
 from ._lab import (
     Lab,
     inputs_of,

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from .. import rotations
 from ..backends import load
-from ..engines import require
-from ..model import Model
+from ..installed import require
+from ..interface import Model
 from . import _shapes
 from ._shapes import Shape
 

@@ -15,9 +15,8 @@ import numpy as np
 
 from .. import __version__
 from ..errors import BadInputError, UnsupportedError
-from ..interface import Data, Model
+from ..interface import DERIVED, INPUTS, Array, Contacts, Data, JointType, Model
 from ..probes import conventions, probe
-from ..records import DERIVED, INPUTS, Array, Contacts, JointType
 
 Progress = Callable[[float], None]  # told the fraction that is done
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)  # a command to the arm [rad]

@@ -12,13 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import as_count
 from ..errors import BadInputError, UnknownNameError
-from ..interface import Model
+from ..interface import Array, JointType, Model, forward, make_data
+from ..interface.checks import as_count
 from ..kinematics import Kind, Kinematics, Pose
-from ..records import Array, JointType
 from ..rotations import angle_between, matrix_from_quat
-from ..verbs import forward, make_data
 from ._common import Progress, Provenance, carried_by, provenance, silent
 
 _MOST = 1_000_000

@@ -6,9 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..interface import Model
-from ..records import Array
-from ..verbs import forward, make_data
+from ..interface import Array, Model, forward, make_data
 from . import stages
 from ._common import Itself, Progress, Provenance, ask_itself, provenance, scalar_joint, silent
 

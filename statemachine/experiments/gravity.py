@@ -8,10 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import UnsupportedError
-from ..interface import Model
+from ..interface import Array, Model, forward, make_data, step
 from ..probes import Alone, probe
-from ..records import Array
-from ..verbs import forward, make_data, step
 from ._common import (
     Forces,
     Progress,

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import BadInputError, UnsupportedError
-from ..interface import Model
-from ..records import Array, Ints
-from ..verbs import forward, make_data, step
+from ..interface import Array, Ints, Model, forward, make_data, step
 from ._common import (
     TARGET,
     Progress,

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..backends import load
-from ..checks import as_count
 from ..errors import BadInputError
-from ..interface import Data, Model
-from ..verbs import make_data, step
+from ..interface import Data, Model, make_data, step
+from ..interface.checks import as_count
 from ._common import Progress, Provenance, provenance, silent
 
 _TIMES = 5  # repetitions; the median counts

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..interface import Model
-from ..verbs import make_data, step
+from ..interface import Model, make_data, step
 from ._common import Progress, Provenance, provenance, silent, steps_in
 
 _NAP = 0.2  # seconds in which nothing is called

@@ -9,12 +9,21 @@ from typing import Literal
 
 import numpy as np
 
-from ..checks import as_count
 from ..errors import BadInputError, UnsupportedError, unknown_name
-from ..interface import Data, Model
+from ..interface import (
+    Array,
+    Data,
+    Ints,
+    JointType,
+    Model,
+    get_state,
+    make_data,
+    reset,
+    set_state,
+    step,
+)
+from ..interface.checks import as_count
 from ..probes import WayBack, probe
-from ..records import Array, Ints, JointType
-from ..verbs import get_state, make_data, reset, set_state, step
 from ._common import Progress, Provenance, body_pairs, command, part_of, provenance, silent
 
 Break = Literal["extra-step", "late-ctrl"]

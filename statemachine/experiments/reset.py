@@ -7,9 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..interface import Data, Model
-from ..records import INPUTS, JointType
-from ..verbs import forward, make_data, reset, step
+from ..interface import INPUTS, Data, JointType, Model, forward, make_data, reset, step
 from ._common import (
     Progress,
     Provenance,

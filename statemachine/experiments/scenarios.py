@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInputError, unknown_name
-from ..interface import Data, Model
-from ..records import Array
+from ..interface import Array, Data, Model
 from ._common import TARGET
 
 Controller = Callable[[float, Data], Any]  # (time, data) -> ctrl, or None to leave it

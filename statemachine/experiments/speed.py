@@ -7,10 +7,9 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 
 from ..backends import load
-from ..checks import as_count
-from ..interface import Data, Model
+from ..interface import Data, Model, make_data, reset, step
+from ..interface.checks import as_count
 from ..probes import probe
-from ..verbs import make_data, reset, step
 from ._common import Progress, Provenance, provenance, silent
 from .in_turns import Ratio, in_turns
 

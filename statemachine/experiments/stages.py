@@ -6,9 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..interface import Data, Model
-from ..records import INPUTS, Array
-from ..verbs import forward, make_data, step
+from ..interface import INPUTS, Array, Data, Model, forward, make_data, step
 from ._common import (
     TARGET,
     Progress,

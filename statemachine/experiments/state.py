@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..interface import Model
+from ..interface import JointType, Model, make_data, reset
 from ..probes import Term, probe
-from ..records import JointType
-from ..verbs import make_data, reset
 from ._common import Provenance, provenance
 
 

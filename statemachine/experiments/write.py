@@ -7,9 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import StateMachineError
-from ..interface import Data, Model
-from ..records import DERIVED, INPUTS
-from ..verbs import forward, get_state, make_data, reset, set_state, step
+from ..interface import (
+    DERIVED,
+    INPUTS,
+    Data,
+    Model,
+    forward,
+    get_state,
+    make_data,
+    reset,
+    set_state,
+    step,
+)
 from ._common import Provenance, is_slide, provenance, read_derived, scalar_joint
 
 

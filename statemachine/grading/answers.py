@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..interface import Model
-from ..records import DERIVED, INPUTS
+from ..interface import DERIVED, INPUTS, Model
 from .watch import Inputs, Run, Watch
 
 _MOST = 10_000  # values that a list or a generator may have

@@ -23,8 +23,8 @@ from typing import Any
 
 from .. import __version__, errors
 from ..backends import backend_engine
-from ..engines import engine_version
 from ..errors import BadInputError, EngineError, StateMachineError
+from ..installed import engine_version
 from . import sandbox
 from .examine import judged
 from .judges import JUDGES, judge_of

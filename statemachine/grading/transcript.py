@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..records import Array
+from ..interface import Array
 from .answers import Answer, Thing
 from .watch import Inputs, Run
 

@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ..engines import require
-from ..interface import Data, Model
-from ..records import Array
+from ..installed import require
+from ..interface import Array, Data, Model
 
 # Raw functions of MuJoCo that advance time, and those that only recompute.
 _STEPS = ("mj_step", "mj_step2")

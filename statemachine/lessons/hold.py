@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..experiments import hold
+from ..interface import Array
 from ..page import Page, Question, Table, Text, Traces
-from ..records import Array
 from ._words import angle_or_length, differences, page_of, position, typed, where
 from .session import Session
 

@@ -22,8 +22,7 @@ from ..backends._bullet_surfaces import Surfaces
 from ..backends._bullet_world import World
 from ..backends.pybullet_backend import PybulletData, PybulletModel
 from ..errors import EngineError
-from ..interface import Model
-from ..records import State
+from ..interface import Model, State
 
 # What a fresh body has: a single-precision literal in the engine.
 BODY_DAMPING = float(np.float32(0.04))

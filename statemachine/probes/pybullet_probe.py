@@ -17,8 +17,7 @@ from ..backends._bullet_client import pb
 from ..backends._bullet_plan import Plan
 from ..backends._bullet_world import ENGINE_TIMESTEP, Tree, World
 from ..backends.pybullet_backend import PybulletModel
-from ..interface import Model
-from ..records import Array
+from ..interface import Array, Model
 from . import Alone, Term, WayBack
 
 # Before a state is taken, while the jaws still touch what they hold; and after it.

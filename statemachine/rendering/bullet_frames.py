@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ..backends import load
 from ..drawing import Part, drawing_of
-from ..engines import require
-from ..records import Array
+from ..installed import require
+from ..interface import Array
 from ..rotations import xyzw_from_wxyz
 from ..silence import silence
 from .camera import Camera

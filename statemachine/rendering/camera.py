@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..records import Array
+from ..interface import Array
 
 FOVY = 30.0  # [°] a long lens: near and far parts of an arm are drawn alike in size
 _MARGIN = 0.90  # of half the picture that what is framed may take

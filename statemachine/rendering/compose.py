@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..records import Array
+from ..interface import Array
 
 Pixels = NDArray[np.uint8]
 GHOST = (0.42, 0.18, 0.62)  # violet: apart from orange to every eye, and dark without colour

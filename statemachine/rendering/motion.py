@@ -10,11 +10,9 @@ import numpy as np
 from ..backends import load
 from ..drawing import drawing_of
 from ..errors import TraceError
-from ..model import Model
-from ..records import Array, Ints
+from ..interface import Array, Ints, Model, forward, make_data
 from ..rotations import matrix_from_quat
 from ..traces import Trace
-from ..verbs import forward, make_data
 
 
 @dataclass(frozen=True, eq=False)

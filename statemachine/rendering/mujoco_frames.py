@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..backends import load
-from ..engines import require
-from ..records import Array
+from ..installed import require
+from ..interface import Array
 from ..rotations import matrix_from_quat
 from .camera import Camera
 from .compose import GHOST, Shot

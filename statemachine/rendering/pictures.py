@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInputError, EngineError
-from ..model import Model
-from ..records import Array
+from ..interface import Array, Model
 from ..traces import Trace
 from .camera import Camera, framed
 from .compose import Pixels

@@ -9,8 +9,8 @@ import subprocess
 import sys
 from dataclasses import dataclass
 
-from ..engines import require
 from ..errors import MissingEngineError, unknown_name
+from ..installed import require
 
 RENDERERS = ("mujoco", "pybullet")
 PATIENCE = 60  # seconds for a probe; a software renderer starts slowly

@@ -10,7 +10,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 
-from ..engines import ENGINES, engine_version, wheel_here
+from ..installed import ENGINES, engine_version, wheel_here
 from ..page import Page, Table, Text, Verdict
 from ..rendering.probe import PATIENCE, offscreen_opengl, opengl_remedy
 
@@ -82,7 +82,7 @@ def _python() -> Finding:
 
 def _engine(name: str) -> Finding:
     optional = name != "mujoco"
-    code = f"from statemachine.engines import require; require({name!r})"
+    code = f"from statemachine.installed import require; require({name!r})"
     # In a subprocess: a broken engine may take its process down, or print at will.
     try:
         done = _run(code)

@@ -10,7 +10,7 @@ from typing import Any
 from ..compare import Comparison, Series, series
 from ..errors import BadInputError, MissingEngineError
 from ..experiments._common import Progress, silent
-from ..model import Model
+from ..interface import Model
 from ..rendering import Renderer, Timing, frames, renderer_here, timing_of
 from ..rendering.pictures import check_size
 from ..traces import Trace

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..records import Array
+from ..interface import Array
 from ..rendering import Timing
 from ..rendering.compose import GHOST
 from .figures_of import figure

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..records import Array
+from ..interface import Array
 
 _FEWEST = 2  # decades
 _HEAD = 0.05  # decades that are free above the largest value, at least

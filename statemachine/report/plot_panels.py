@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..compare import Agreement, Comparison, Series, default_tip, series
 from ..compare.tolerances import COUNT
-from ..records import Array, JointType
+from ..interface import Array, JointType
 from ..traces import Header, Trace
 from .figures_of import quantity, scale_of, short_time
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from ..backends import backend_names, load
 from ..compare import Request, compare, series, sides_of, touches, witness
 from ..compare.why import attribute
-from ..engines import available
 from ..errors import MissingEngineError
 from ..experiments.scenarios import scenario
+from ..installed import available
 from ..lessons import LESSONS
 from ..lessons.session import page_of_lesson, take
 from ..page import Page, Picture, Traces, Verdict

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..interface import Model
-from ..records import Array, Contacts, JointType
+from ..interface import Array, Contacts, JointType, Model
 from ..rotations import angle_between, matrix_from_quat
 
 # What is shown of a size in SI: factor and unit.

@@ -11,10 +11,22 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from ..errors import UnsupportedError
-from ..interface import Data, Model
-from ..records import DERIVED, INPUTS, POSES, Array, Contacts, JointType, State
+from ..interface import (
+    DERIVED,
+    INPUTS,
+    POSES,
+    Array,
+    Contacts,
+    Data,
+    JointType,
+    Model,
+    State,
+    forward,
+    get_state,
+    make_data,
+    set_state,
+)
 from ..rotations import times
-from ..verbs import forward, get_state, make_data, set_state
 from .gaps import Gap, gaps, same
 from .result import Freshness, Row
 

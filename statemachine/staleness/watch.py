@@ -16,9 +16,7 @@ from typing import Any, cast
 import numpy as np
 
 from ..errors import BadInputError, StaleReadError
-from ..interface import Data, Model
-from ..records import INPUTS, Array, Contacts, State
-from ..verbs import get_state
+from ..interface import INPUTS, Array, Contacts, Data, Model, State, get_state
 from .gaps import Gap, told
 from .look import DEPEND, Moment, Readings, Scratch, find, readings, row, stale_row
 from .result import Row, StaleRead, table

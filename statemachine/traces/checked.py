@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..checks import HUGE
 from ..errors import TraceError
-from ..model import OPTIONS
-from ..records import JointType
+from ..interface import OPTIONS, JointType
+from ..interface.checks import HUGE
 
 if TYPE_CHECKING:
     from .trace import Header

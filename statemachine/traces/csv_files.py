@@ -11,7 +11,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from ..records import JointType
+from ..interface import JointType
 from .trace import COLUMNS, Header, Trace
 from .whole import beside, fill_file
 

@@ -7,11 +7,9 @@ from typing import Any, Literal
 import numpy as np
 
 from ..backends import load
-from ..engines import require
 from ..errors import MissingEngineError, StateMachineError
-from ..interface import Model
-from ..records import Array
-from ..verbs import make_data
+from ..installed import require
+from ..interface import Array, Model, make_data
 
 
 def energies(

@@ -15,9 +15,7 @@ import numpy as np
 from ..errors import BadInputError, DivergedError, EngineError, TraceError
 from ..experiments._common import Progress, part_of, provenance, silent, steps_in
 from ..experiments.scenarios import Controller, Scenario
-from ..interface import Data, Model
-from ..records import Array, State
-from ..verbs import make_data, reset, set_state, step
+from ..interface import Array, Data, Model, State, make_data, reset, set_state, step
 from .derived import derived
 from .energy import energies
 from .trace import Header, Trace

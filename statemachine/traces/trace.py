@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import HUGE, index_of
 from ..errors import TraceError
 from ..experiments._common import Provenance
-from ..records import Array
+from ..interface import Array
+from ..interface.checks import HUGE, index_of
 from .checked import LARGEST, check_header, check_places
 
 SCHEMA = 1

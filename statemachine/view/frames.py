@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import Model
-from ..records import Array, JointType, usual_site
+from ..interface import Array, JointType, Model, usual_site
 
 _TURN = math.pi / 180  # radians in a degree
 

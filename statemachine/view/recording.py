@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import BadInputError, TraceError
-from ..records import Array, usual_site
+from ..interface import Array, usual_site
 from ..traces import Header, Trace
 from .frames import (
     Command,

@@ -8,8 +8,7 @@ from types import TracebackType
 import numpy as np
 
 from ..errors import BadInputError, StateMachineError
-from ..interface import Data, Model
-from ..verbs import forward, make_data, reset, step
+from ..interface import Data, Model, forward, make_data, reset, step
 from .frames import (
     Command,
     Frame,

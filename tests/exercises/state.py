@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import statemachine as sm
-from statemachine.records import JointType
+from statemachine.interface import JointType
 
 from . import right, wrong
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import cast
 
-from ...model import Model
+from ...interface import Model
 from ._driver import ONLY, Driver, Hiding, Look, Machine, Restore, Run, Save, Seen, Way
 from .interface_driver import InterfaceDriver
 

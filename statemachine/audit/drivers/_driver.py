@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import DivergedError
-from ...model import Model
-from ...records import Array
+from ...interface import Array, Model
 from ..findings import Finding, Gap, Layer, Layout, gap, worst
 from ..points import Point
 

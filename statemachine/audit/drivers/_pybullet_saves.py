@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...interface import Data
-from ...records import Array
+from ...interface import Array, Data
 from ...silence import silence
 from ._driver import Restore
 

@@ -9,10 +9,20 @@ from functools import cached_property
 import numpy as np
 
 from ...errors import UnsupportedError
-from ...interface import Data
-from ...model import Model
-from ...records import DERIVED, INPUTS, Array, State
-from ...verbs import forward, get_state, make_data, reset, set_state, step
+from ...interface import (
+    DERIVED,
+    INPUTS,
+    Array,
+    Data,
+    Model,
+    State,
+    forward,
+    get_state,
+    make_data,
+    reset,
+    set_state,
+    step,
+)
 from ..findings import Layout, layout_of
 from ..points import Point
 from ._driver import Driver, Look, Restore, Seen, Way

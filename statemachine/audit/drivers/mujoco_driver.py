@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ...engines import require
-from ...model import Model
-from ...records import Array
+from ...installed import require
+from ...interface import Array, Model
 from ..findings import Layout, layout_of
 from ..points import Point
 from ._driver import ONLY, Driver, Look, Restore, Seen, Way

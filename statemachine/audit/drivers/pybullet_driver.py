@@ -14,10 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ...engines import require
-from ...model import Model
-from ...records import Array, JointType
-from ...verbs import make_data
+from ...installed import require
+from ...interface import Array, JointType, Model, make_data
 from ..findings import Layout
 from ..points import Point
 from . import _pybullet_saves as saves

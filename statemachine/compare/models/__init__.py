@@ -22,10 +22,10 @@ import numpy as np
 
 from ... import __version__
 from ...backends import backend_engine, backend_names, load
-from ...engines import require
 from ...errors import ModelError, UnsupportedError
+from ...installed import require
+from ...interface import make_data
 from ...models import resolve
-from ...verbs import make_data
 from . import _meshless, from_bullet, from_mjcf, from_urdf
 from .description import Robot
 from .diff import Found, diff

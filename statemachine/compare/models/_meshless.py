@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...engines import require
+from ...installed import require
 from ...rotations import matrix_from_quat
 from . import from_mjcf
 from .description import Placement, Robot, Shape

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...records import Array
+from ...interface import Array
 from .description import Actuator, Range
 
 _HINGE = 3  # mjtJoint

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...records import Array
+from ...interface import Array
 from ...rotations import angle_between
 from .description import Joint
 from .ledger import Ledger

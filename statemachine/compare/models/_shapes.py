@@ -10,7 +10,7 @@ from itertools import permutations
 
 import numpy as np
 
-from ...records import Array
+from ...interface import Array
 from .description import Placement, Shape
 from .ledger import Ledger
 from .match import Pair

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...records import Array
+from ...interface import Array
 from .description import Inertial, Placement
 from .ledger import Ledger
 from .match import Pair

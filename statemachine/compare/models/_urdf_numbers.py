@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from ...errors import ModelError
-from ...records import Array
+from ...interface import Array
 from .description import HERE, Placement
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...records import Array
+from ...interface import Array
 from ...rotations import angle_between
 
 Range = tuple[float, float]

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ...engines import engine_version, require
 from ...errors import EngineError, ModelError
+from ...installed import engine_version, require
 from ...rotations import matrix_from_quat, wxyz_from_xyzw
 from ...silence import silence
 from . import from_urdf

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ...engines import require
-from ...records import Array
+from ...installed import require
+from ...interface import Array
 from ...rotations import matrix_from_quat
 from . import _mjcf_drives as drives
 from .description import (

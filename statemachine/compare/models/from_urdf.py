@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ...errors import ModelError
-from ...records import Array
+from ...interface import Array
 from ._urdf_numbers import number, numbers, origin
 from .description import HERE, Inertial, Joint, Link, Placement, Robot, Shape
 from .meshes import read_mesh, volume_of

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import unknown_name
-from ...records import Array
+from ...interface import Array
 from .description import HERE, Placement, Robot
 from .tree import Group, Tree
 

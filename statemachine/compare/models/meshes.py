@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...records import Array
+from ...interface import Array
 from .description import Shape
 
 _LARGEST = 256 * 2**20  # bytes

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...records import Array
+from ...interface import Array
 from .description import HERE, Inertial, Joint, Link, Placement, Robot, Shape
 from .meshes import with_capsules
 

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import BadInputError, DivergedError, TraceError
-from ...interface import Model
-from ...records import Array, Ints, JointType, usual_site
+from ...interface import Array, Ints, JointType, Model, forward, make_data, usual_site
 from ...traces import Trace
-from ...verbs import forward, make_data
 from ..align import common_moments
 
 _SAME = 1e-6  # of a timestep: two moments nearer than this are one

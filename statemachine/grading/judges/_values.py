@@ -7,8 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ...interface import Model
-from ...records import Array
+from ...interface import Array, Model
 from ..answers import kind
 from ..calls import FaultError
 

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...interface import Data, Model
-from ...records import Array
-from ...verbs import forward, make_data
+from ...interface import Array, Data, Model, forward, make_data
 from ..answers import Answer
 from ..calls import Remark
 from ..watch import Inputs

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...records import Array, Ints
-from ...verbs import make_data, step
+from ...interface import Array, Ints, make_data, step
 from ..answers import Answer
 from ..calls import Remark
 from ..worlds import ELSEWHERE, Scenes, World

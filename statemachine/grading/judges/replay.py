@@ -6,9 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...interface import Model
-from ...records import Array
-from ...verbs import make_data, reset
+from ...interface import Array, Model, make_data, reset
 from ..answers import Answer, kind
 from ..calls import Remark
 from ..watch import Nudge, Run

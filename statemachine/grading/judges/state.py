@@ -8,9 +8,7 @@ from itertools import pairwise
 from numbers import Real
 from typing import Any
 
-from ...interface import Model
-from ...records import JointType
-from ...verbs import make_data, reset
+from ...interface import JointType, Model, make_data, reset
 from ..answers import Answer, kind
 from ..calls import FaultError, Remark
 from ..worlds import ELSEWHERE, Scenes, World

@@ -17,10 +17,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ...engines import require
 from ...errors import MissingEngineError
-from ...interface import Data
-from ...records import INPUTS, Array, JointType, read_only
+from ...installed import require
+from ...interface import INPUTS, Array, Data, JointType, read_only
 from ...rotations import matrix_from_quat, xyzw_from_wxyz
 from . import BACKENDS
 

@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from ...backends import backend_names
-from ...engines import engine_version, require
 from ...errors import BadInputError, EngineError, MissingEngineError, ModelFileError, unknown_name
+from ...installed import engine_version, require
 from .. import sandbox
 from ..recording import content
 from ..unwinding import unwinding

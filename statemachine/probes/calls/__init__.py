@@ -16,8 +16,8 @@ from contextlib import redirect_stdout
 from dataclasses import dataclass
 from typing import Any
 
-from ...engines import engine_version, require
 from ...errors import BadInputError, StateMachineError, unknown_name
+from ...installed import engine_version, require
 from ...interface import Model
 from ._recorder import CLOSED, NEW, Call, Recorder, Watch
 

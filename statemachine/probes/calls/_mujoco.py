@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ...engines import require
-from ...interface import Data, Model
-from ...records import DERIVED, INPUTS
+from ...installed import require
+from ...interface import DERIVED, INPUTS, Data, Model
 from ._names import named
 from ._recorder import FUNCTIONS, Look, Subject, Watch, entries
 

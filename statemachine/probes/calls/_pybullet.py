@@ -14,8 +14,8 @@ from typing import Any
 
 from ...backends._bullet_machine import Machine
 from ...backends.pybullet_backend import PybulletData, PybulletModel
-from ...engines import require
-from ...records import DERIVED, INPUTS
+from ...installed import require
+from ...interface import DERIVED, INPUTS
 from ._names import named
 from ._recorder import FUNCTIONS, Look, Subject, Watch, entries
 

@@ -13,8 +13,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...engines import engine_version, require
 from ...errors import unknown_name
+from ...installed import engine_version, require
 
 # In the order in which a newcomer meets them; each is a module of this package.
 QUESTIONS = (

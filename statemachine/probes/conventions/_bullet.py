@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from ...engines import require
+from ...installed import require
 from ...silence import silence
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...records import Array
+from ...interface import Array
 from ._bullet import load, world
 from ._mujoco_scene import BOX, PILE, TILT
 from ._pendulum import URDF

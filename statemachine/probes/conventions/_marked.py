@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...records import Array
+from ...interface import Array
 
 MARKS = np.array([(0.0, 0, 0), (1, 0, 0), (0, 1, 0)])
 CENTRE = np.array([0.3, -0.2, 0.1])  # of mass, in the body's frame [m]

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ...engines import require
-from ...records import Array
+from ...installed import require
+from ...interface import Array
 
 BOX = 0.1  # half an edge [m]
 # Where the boxes begin, one over the other [m], and how the lowest is turned (w, x, y, z).

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...engines import require
+from ...installed import require
 from . import UNDECIDED, Figure, Finding, Findings, Question
 from ._bullet import load, world
 from ._pendulum import GRAVITY, MJCF, RATE, TORQUE, URDF, limp

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ...engines import require
+from ...installed import require
 from . import UNDECIDED, Figure, Finding, Findings, Question
 from ._bullet import load, world
 from ._lacking import lacking

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...engines import require
+from ...installed import require
 from . import Figure, Finding, Findings, Question
 from ._bullet import load, world
 from ._lacking import lacking

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from functools import partial
 
-from ...engines import require
+from ...installed import require
 from . import Figure, Finding, Findings, Question, closest
 from ._bullet import world
 from ._lacking import lacking

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ...records import Array
+from ...interface import Array
 from . import Figure, Finding, Findings, Question
 from . import _bullet_scene as bullet
 from . import _mujoco_scene as mujoco_scene

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...engines import require
+from ...installed import require
 from . import Figure, Finding, Findings, Question
 from ._bullet import load, world
 from ._marked import URDF

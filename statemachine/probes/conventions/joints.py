@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-from ...engines import require
+from ...installed import require
 from . import UNDECIDED, Figure, Finding, Findings, Question
 from ._bullet import load, world
 

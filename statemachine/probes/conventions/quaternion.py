@@ -7,8 +7,8 @@ from itertools import permutations
 
 import numpy as np
 
-from ...engines import require
-from ...records import Array
+from ...installed import require
+from ...interface import Array
 from . import UNDECIDED, Figure, Finding, Findings, Question, closest
 from ._bullet import load, world
 from ._marked import MARKS, MJCF, URDF, in_pinocchio, in_pybullet

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from ...engines import require
+from ...installed import require
 from . import Figure, Finding, Findings, Question
 from . import _bullet_scene as bullet
 from . import _mujoco_scene as mujoco_scene

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...engines import require
+from ...installed import require
 from ...silence import silence
 from . import NO_ANSWER, Figure, Finding, Findings, Question
 from . import _bullet_scene as bullet

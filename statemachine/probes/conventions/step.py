@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...engines import require
+from ...installed import require
 from . import Findings, Question
 from . import _floor as floor
 from ._bullet import load, world

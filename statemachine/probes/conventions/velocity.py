@@ -6,8 +6,8 @@ from itertools import product
 
 import numpy as np
 
-from ...engines import require
-from ...records import Array
+from ...installed import require
+from ...interface import Array
 from . import Figure, Finding, Findings, Question, closest
 from ._bullet import load, world
 from ._marked import CENTRE, MARKS, MJCF, URDF, in_pinocchio, in_pybullet

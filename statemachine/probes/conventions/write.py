@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...engines import require
+from ...installed import require
 from . import UNDECIDED, Figure, Finding, Findings, Question
 from . import _floor as floor
 from ._bullet import load, world

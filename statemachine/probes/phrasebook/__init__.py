@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ...engines import engine_version, require
+from ...installed import engine_version, require
 from ...silence import silence
 
 # In the order in which a program has them.

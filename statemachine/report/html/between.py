@@ -8,7 +8,7 @@ import numpy as np
 
 from ...compare import Series, series
 from ...compare.series import NORMAL
-from ...records import Array, Ints, JointType
+from ...interface import Array, Ints, JointType
 from ...traces import Trace
 from .scene import slerp
 from .timeline import Frames

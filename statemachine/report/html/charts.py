@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...compare import Agreement, Series
-from ...records import Array, Ints
+from ...interface import Array, Ints
 from ..figures_of import figure, quantity, scale_of, short_time
 from ..log_axis import LogAxis
 from .finding import name_of

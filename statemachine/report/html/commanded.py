@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...records import Array, JointType
+from ...interface import Array, JointType
 from ...traces import Trace
 from ..figures_of import figure
 from .markup import Html, kept, tag

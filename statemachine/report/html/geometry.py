@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...drawing import Drawing, Part
-from ...records import Array
+from ...interface import Array
 from ...traces import Trace
 
 _CREASE = np.cos(np.radians(35.0))  # faces that meet at less than this are one round surface

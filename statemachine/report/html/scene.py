@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...drawing import Drawing
-from ...records import Array
+from ...interface import Array
 from ...traces import Trace
 from .budget import Budget
 from .geometry import bones_of, mesh_as_data, mesh_of, packed, quantised

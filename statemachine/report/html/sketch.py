@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...records import Array
+from ...interface import Array
 from ...traces import Trace
 from ..figures_of import short_time
 from .markup import Html, tag

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...compare import Comparison
 from ...compare.align import common_moments
-from ...records import Array, Ints
+from ...interface import Array, Ints
 from ...traces import Trace
 
 _SMOOTH = 1 / 60  # seconds between two pictures that look like motion

@@ -10,11 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from ..errors import BadInputError, ForeignDataError, ForeignStateError
 from .checks import as_count, check_entries, check_finite, kind_of
-from .errors import BadInputError, ForeignDataError, ForeignStateError
-from .interface import Data, Model
+from .data import Data, alone
+from .model import Model
 from .records import INPUTS, State
-from .turns import HOLDERS, alone
+from .turns import HOLDERS
 
 _ONE = 1
 

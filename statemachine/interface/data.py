@@ -1,9 +1,6 @@
-"""The contract that every backend keeps: Model, and the Data that it makes.
+"""The contract of a Data: everything that changes while a simulation runs.
 
-A simulator is a state machine. A `Model` never changes; a `Data` holds all that
-does; `step` (see `verbs`) turns one Data into the next.
-
-A backend subclasses both. An engine whose caller owns the state (MuJoCo) lets the
+A backend subclasses Model and Data. An engine whose caller owns the state (MuJoCo) lets the
 arrays of a Data be its memory; an engine with a hidden world (PyBullet) keeps the
 arrays beside it and moves values across in the hooks, whose names begin with `_`.
 """
@@ -12,18 +9,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, NoReturn
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from numpy.typing import ArrayLike
 
+from ..errors import ClosedDataError, DivergedError, ReadOnlyError
 from .checks import as_scalar, as_vector
-from .errors import ClosedDataError, DivergedError, ReadOnlyError
-from .model import OPTIONS, Model
+from .model import Model
 from .records import INPUTS, Array, Contacts, State, read_only
-from .turns import Turn, alone
+from .turns import HOLDERS, LOCK, Turn, in_use_here
 
-__all__ = ["OPTIONS", "Data", "Model"]
-
+T = TypeVar("T")
 # By name, so that type checkers take the inputs for the descriptors below.
 _SLOTS = ("_home", "_turn", "_trouble", "_advance", "_warned", "_told", *INPUTS)
 
@@ -308,3 +305,54 @@ class Data(ABC):
 
     @abstractmethod
     def _close(self) -> None: ...
+
+
+def alone(
+    data: Data,
+    call: Callable[..., T],
+    *args: Any,
+    even_troubled: bool = False,
+) -> T:
+    """Call something while no other thread uses `data`.
+
+    Args:
+        data: What `call` uses.
+        call: A function.
+        *args: Its arguments.
+        even_troubled: Whether to do so while `data` refuses, too.
+
+    Raises:
+        BusyDataError: Another thread uses `data`.
+        DivergedError: `data` refuses.
+        ClosedDataError: `data` is closed.
+    """
+    turn, held = data._turn, False
+    key = (even_troubled and data._trouble) or data._home
+    try:
+        try:
+            if turn.free is key:
+                del turn.free
+                held = True
+        except AttributeError:  # nothing is there
+            pass
+        if not held:
+            if not even_troubled:
+                data._refuse_if_troubled()
+            with LOCK:
+                if not in_use_here(data):
+                    if not even_troubled:  # once more: another thread may have ended just now
+                        data._refuse_if_troubled()
+                    with suppress(AttributeError):
+                        del turn.free
+                    held = True
+        return call(*args)
+    except Exception as error:
+        if held:
+            data._failed(error)
+        raise
+    finally:
+        if held:
+            turn.free = data._trouble or data._home
+
+
+HOLDERS.add(alone.__code__)

@@ -9,34 +9,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from .checks import (
-    TINY,
-    as_count,
-    as_numbers,
-    as_scalar,
-    as_switch,
-    as_vector,
-    index_of,
-    whole_number,
-)
-from .errors import BadInputError, ReadOnlyError, UnsupportedError, shown, unknown_name
+from ..errors import BadInputError, ReadOnlyError, UnsupportedError, shown, unknown_name
+from .checks import TINY, as_numbers, as_vector, index_of, whole_number
+from .options import OPTIONS, PER_DOF, as_option
 from .records import Array, Capabilities, Ints, JointType, Keyframe, read_only
-
-if TYPE_CHECKING:
-    from .interface import Data
-
-OPTIONS = (
-    "actuation",
-    "gravity",
-    "timestep",
-    "substeps",
-    "contacts",
-    "armature",
-    "damping",
-    "frictionloss",
-    "limits",
-    "integrator",
-)
 
 
 class Model(ABC):
@@ -197,7 +173,10 @@ class Model(ABC):
                 ) from None
             if name not in self.capabilities.options:
                 raise self._unsupported(name)
-            checked[name] = self._checked_option(name, value)
+            if name in PER_DOF:
+                checked[name] = self._per_dof(name, value)
+            else:
+                checked[name] = as_option(name, value, self.capabilities.integrators)
         return self._replace(checked)
 
     def _unsupported(self, feature: str) -> UnsupportedError:
@@ -235,39 +214,23 @@ class Model(ABC):
             label = self.joint_names[int(np.searchsorted(starts, index, side="right")) - 1]
         return f" ({label})" if label else ""
 
-    def _checked_option(self, name: str, value: Any) -> Any:
-        if name in ("actuation", "contacts", "limits"):
-            return as_switch(value, name)
-        if name == "gravity":
-            return as_vector(value, (3,), name)
-        if name == "substeps":
-            return as_count(value, name)
-        if name == "integrator":
-            if not isinstance(value, str) or value not in self.capabilities.integrators:
-                raise unknown_name("integrator", value, self.capabilities.integrators)
-            return value
-        if name == "timestep":
-            seconds = as_scalar(value, name)
-            if seconds <= 0:
-                raise BadInputError(f"timestep must be above 0 s; got {seconds}")
-            return seconds
-        return self._per_dof(name, value)
-
     def _per_dof(self, name: str, value: Any) -> Array:
+        """The value of an option of `PER_DOF`, one number or (nv,), as a new array (nv,)."""
         numbers = as_numbers(value, name)
-        each = as_vector(numbers, (self.nv,) if numbers.ndim else (), name)
-        if (each < 0).any():
+        given = as_vector(numbers, (self.nv,) if numbers.ndim else (), name)
+        if (given < 0).any():
             raise BadInputError(f"{name} must not be negative; got {shown(value)}")
-        if each.ndim:
-            return each
+        if given.ndim:
+            return given
         # One number is meant for the joints of the robot, not for a free body.
-        array = np.array(getattr(self, f"dof_{name}"))
+        values = np.array(getattr(self, f"dof_{name}"))
         scalar = np.isin(self.jnt_type, (JointType.SLIDE, JointType.HINGE))
-        array[self.jnt_dofadr[scalar]] = each
-        return array
+        values[self.jnt_dofadr[scalar]] = given
+        return values
 
     @abstractmethod
-    def _make_data(self) -> Data: ...
+    def _make_data(self) -> Any:
+        """A new Data of this Model."""
 
     @abstractmethod
     def _replace(self, options: dict[str, Any]) -> Model:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import BadInputError, shown, unknown_name
+from ..errors import BadInputError, shown, unknown_name
 from .records import Array
 
 # MuJoCo calls a coordinate beyond this "huge" and the simulation unstable (mjMAXVAL).
@@ -111,7 +111,7 @@ def index_of(kind: str, name: str, names: Sequence[str]) -> int:
 def kind_of(value: object) -> str:
     """What a value is, for messages: "a Data" of any backend, else its type."""
     for kind in type(value).__mro__:
-        if kind.__module__ in ("statemachine.interface", "statemachine.model"):
+        if kind.__module__.startswith("statemachine.interface."):
             return f"a {kind.__name__}"
     module, name = type(value).__module__, type(value).__qualname__
     return name if module == "builtins" else f"{module}.{name}"

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import unknown_name
+from ..errors import unknown_name
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]

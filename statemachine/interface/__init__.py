@@ -1,0 +1,64 @@
+"""The contract that every backend keeps: Model, Data, State, and the seven verbs less `load`.
+
+A simulator is a state machine. A `Model` never changes; a `Data` holds all that does;
+`step` turns one Data into the next. From the bottom up:
+
+- `records`: what a backend says of itself, and what it hands out
+- `checks`: what is checked of an argument before an engine sees it
+- `options`: what `Model.replace` takes
+- `model`: the constants of a simulation
+- `turns`: one thread at a time
+- `data`: what changes, and what follows from it
+- `verbs`: what a user calls
+"""
+
+from .data import Data
+from .model import Model
+from .options import OPTIONS
+from .records import (
+    BEHAVIOURS,
+    DERIVED,
+    FORCES,
+    INPUTS,
+    PARTS,
+    POSES,
+    Array,
+    Behaviour,
+    Capabilities,
+    Contacts,
+    Ints,
+    JointType,
+    Keyframe,
+    State,
+    read_only,
+    usual_site,
+)
+from .verbs import forward, get_state, make_data, reset, set_state, step
+
+__all__ = [
+    "BEHAVIOURS",
+    "DERIVED",
+    "FORCES",
+    "INPUTS",
+    "OPTIONS",
+    "PARTS",
+    "POSES",
+    "Array",
+    "Behaviour",
+    "Capabilities",
+    "Contacts",
+    "Data",
+    "Ints",
+    "JointType",
+    "Keyframe",
+    "Model",
+    "State",
+    "forward",
+    "get_state",
+    "make_data",
+    "read_only",
+    "reset",
+    "set_state",
+    "step",
+    "usual_site",
+]

@@ -1,0 +1,62 @@
+"""Whose turn it is with a Data: who uses one takes it, and gives it back.
+
+Each Data has a `Turn`. To delete what is in it is to take the Data, which only one thread
+can do; a second one finds nothing. So a step learns from one attribute that the Data belongs
+to the Model, that it is usable, and that nobody else uses it.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from types import CodeType
+from typing import Any
+
+from ..errors import BusyDataError
+
+
+class Turn:
+    """Whose turn it is.
+
+    Attributes:
+        free: While nobody uses the Data its Model, or the reason why it refuses; nothing at
+            all while somebody does.
+    """
+
+    __slots__ = ("free",)
+
+    free: object
+
+    def __init__(self, free: object) -> None:
+        self.free = free
+
+
+def in_use_here(data: object) -> bool:
+    """Whether this thread is using `data` already: in a callback, a hook, a signal handler.
+
+    Nothing is in its turn. So somebody uses the Data, or was interrupted between taking it and
+    giving it back; the stacks tell which.
+
+    Raises:
+        BusyDataError: It is another thread.
+    """
+    here = threading.get_ident()
+    for thread, top in sys._current_frames().items():
+        frame: Any = top
+        while frame is not None:
+            if frame.f_code in HOLDERS and frame.f_locals.get("data") is data:
+                if thread != here:
+                    raise BusyDataError(
+                        "another thread is using this Data: a Data belongs to one thread at a "
+                        "time. Make one for each thread (a Model can be shared), or take a lock "
+                        "around every use"
+                    )
+                if frame.f_locals.get("held"):
+                    return True
+            frame = frame.f_back
+    return False
+
+
+LOCK = threading.Lock()
+# Of the functions that take a Data: each has the locals `data` and `held`.
+HOLDERS: set[CodeType] = set()
