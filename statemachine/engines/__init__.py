@@ -1,0 +1,63 @@
+"""The engines without us: what each does and calls things when its own users drive it.
+
+Each engine has a room here, a package with its name. A room has parts, modules with the names
+in `PARTS`; conventions, phrasebook, calls, audit, comparison and doctor ask for a part by the
+engine's name, and name no engine themselves. An engine without a part is not asked, and the
+page says so.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+import importlib.util
+from typing import Any
+
+from ..errors import BadInputError, unknown_name
+
+_ROOMS: dict[str, str] = {
+    name: f"{__name__}.{name}" for name in ("mujoco", "pybullet", "pinocchio")
+}
+# What a room may have.
+PARTS: dict[str, str] = {}
+
+
+def room_names() -> list[str]:
+    """Names of the engines that have a room, whether or not they are installed."""
+    for entry in importlib.metadata.entry_points(group="statemachine.engines"):
+        _ROOMS.setdefault(entry.name, entry.value)
+    return list(_ROOMS)
+
+
+def register(name: str, package: str) -> None:
+    """Give an engine of another package a room.
+
+    A package that declares it as an entry point of the group "statemachine.engines" is found
+    without this, by the command line too.
+
+    Args:
+        name: The engine's name.
+        package: What is imported, as "package.module"; its parts are looked for in it.
+
+    Raises:
+        BadInputError: There is another room of that name.
+    """
+    if _ROOMS.get(name, package) != package:
+        raise BadInputError(f"there is a room for {name!r} already; choose another name")
+    _ROOMS[name] = package
+
+
+def part(engine: str | None, name: str) -> Any | None:
+    """A part of an engine's room, imported now; None if the engine has none.
+
+    Args:
+        engine: Its name; None for no engine.
+        name: One of `PARTS`.
+    """
+    if name not in PARTS:
+        raise unknown_name("part of an engine's room", name, PARTS)
+    if engine is None or engine not in room_names():
+        return None
+    module = f"{_ROOMS[engine]}.{name}"
+    importlib.import_module(_ROOMS[engine])
+    return importlib.import_module(module) if importlib.util.find_spec(module) else None

@@ -1,0 +1,1 @@
+"""MuJoCo without us; `engines` says what the parts are."""

@@ -1,0 +1,1 @@
+"""Pinocchio without us; `engines` says what the parts are."""

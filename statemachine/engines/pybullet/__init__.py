@@ -1,0 +1,1 @@
+"""PyBullet without us; `engines` says what the parts are."""
