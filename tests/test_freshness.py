@@ -505,7 +505,7 @@ def test_contacts_are_matched_by_what_touches() -> None:
     assert sizes(gaps(model, "contacts", part([3, 1, 0, 2]), now)) == {}  # another order
     less = gaps(model, "contacts", part([0, 1, 2]), now)
     assert sizes(less) == {"appears": 1.0}
-    assert less[0].where == "floor – box"
+    assert less[0].where == "box on floor"
     assert sizes(gaps(model, "contacts", now, part([0, 1]))) == {"vanishes": 2.0}
     assert sizes(gaps(model, "contacts", part([0, 1, 2, 3], shift=1e-3), now)) == {
         "m": pytest.approx(1e-3)

@@ -333,9 +333,9 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
     assert "contact takes 50.0 % of it away*" in found.causes[1]
     assert "a hint, not a proof" in found.causes[1]
     # A proof comes before.
-    touch = Touch(0.27, "finger (gripper) on floor; other", 3e-16, 55)
+    touch = Touch(0.27, "gripper on floor (finger); other", 3e-16, 55)
     found = headline(comparison, [], attribution_of(hold, touch=touch))
-    assert found.causes[0].startswith("Until the first touch, finger (gripper) on floor at 0.270 s")
+    assert found.causes[0].startswith("Until the first touch, gripper on floor (finger) at 0.270 s")
     assert "2e-14° apart" in found.causes[0]
     late = Touch(0.27, "finger on floor", 0.01, 55)  # they were apart before
     assert len(headline(comparison, [], attribution_of(hold, touch=late)).causes) == 2
@@ -403,7 +403,7 @@ def test_who_presses_on_what(hold: Made) -> None:
     assert never == []
     both = f"with {mean:.1f} N (with friction {found.total['gripper on floor']:.1f} N)"
     assert f"gripper presses on floor {both}" in said[0]
-    whole = total_forces(one)["world – gripper"][360:]
+    whole = total_forces(one)["gripper on floor"][360:]
     assert found.total == {"gripper on floor": pytest.approx(whole.mean())}
     assert whole.mean() > mean
     said_under = "it is at most 351 N; the whole force, friction added as vectors, is at most 383 N"
@@ -421,7 +421,7 @@ def test_who_presses_on_what(hold: Made) -> None:
     assert "on pybullet nothing touches at all" in said[0]
     text = page_of(of_look(one, bare, hold[3]))
     assert "On pybullet gripper never touches floor" in text
-    assert "world – gripper normal force over time on both sides" in text
+    assert "gripper on floor normal force over time on both sides" in text
 
 
 def test_names_in_a_list_have_no_comma(hold: Made, page: Path) -> None:

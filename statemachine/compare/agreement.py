@@ -9,13 +9,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..comparison import same_pairs
 from ..errors import TraceError
 from ..experiments._common import Provenance
 from ..interface import Array
 from ..traces import Trace
 from .align import SAME, common_moments
 from .notes import notes_on
-from .series import UNITS, Kind, Series, same_pairs, series
+from .series import UNITS, Kind, Series, series
 from .tolerances import tolerance_for
 
 Verdict = Literal["agrees", "settles", "differs"]

@@ -116,7 +116,7 @@ def page(results: Mapping[str, gravity.Gravity], session: Session) -> Page:
     for name, run in columns.items():
         blocks.append(_finding(name, run, first))
         if run.touching:
-            touches = (f"{touch} (since {run.touches[touch]:.3f} s)" for touch in run.touching)
+            touches = (f"{touch} since {run.touches[touch]:.3f} s" for touch in run.touching)
             blocks.append(Text(f"{name}: touching at the end: {', '.join(touches)}."))
     blocks += longer(results)
     for name, result in results.items():

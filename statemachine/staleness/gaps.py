@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..comparison import ContactNames
 from ..interface import Array, Contacts, JointType, Model
 from ..rotations import angle_between, matrix_from_quat
 
@@ -130,7 +131,8 @@ def _vectors(model: Model) -> list[tuple[str, bool, int]]:
 
 def _between_contacts(model: Model, held: Contacts, now: Contacts) -> Iterator[Gap]:
     pairs = [tuple(pair) for pair in held.geom.tolist()], [tuple(p) for p in now.geom.tolist()]
-    names = {pair: _pair_name(model, pair) for pair in (*pairs[0], *pairs[1])}
+    called = ContactNames.of(model)
+    names = {pair: called.geoms(*pair) for pair in (*pairs[0], *pairs[1])}
     kept: list[tuple[int, int]] = []
     gone, come = [], []
     for pair in dict.fromkeys((*pairs[0], *pairs[1])):
@@ -162,11 +164,3 @@ def _between_contacts(model: Model, held: Contacts, now: Contacts) -> Iterator[G
     for unit, each in sizes.items():
         if each.any():
             yield _worst(each, unit, owners)
-
-
-def _pair_name(model: Model, pair: tuple[int, ...]) -> str:
-    """'floor – box', by geom; one without a name goes by its body."""
-    names = [
-        model.geom_names[geom] or model.body_names[int(model.geom_bodyid[geom])] for geom in pair
-    ]
-    return " – ".join(names)

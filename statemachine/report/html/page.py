@@ -13,7 +13,8 @@ import numpy as np
 
 from ... import __version__
 from ...compare import Comparison, Series, Witness, default_tip, series
-from ...compare.series import NORMAL, same_pairs, total_forces
+from ...compare.series import NORMAL, total_forces
+from ...comparison import same_pairs
 from ...page import Page, Verdict
 from ...traces import Trace
 from ..figures_of import figure
