@@ -23,11 +23,11 @@ from statemachine.compare import Comparison, compare, series, sides_of
 from statemachine.compare.series import total_forces
 from statemachine.compare.sides import Request
 from statemachine.compare.why import Attribution, Gap, Touch, Trial
+from statemachine.comparison.text import quantity
 from statemachine.drawing import drawing_of
 from statemachine.errors import BadInputError
 from statemachine.experiments.scenarios import SCENARIOS
 from statemachine.page import Page, Verdict
-from statemachine.report.figures_of import quantity
 from statemachine.report.html import Look, check_target, report, write_report
 from statemachine.report.html.between import shown_series
 from statemachine.report.html.charts import difference_chart, spread
@@ -259,7 +259,7 @@ def test_the_headline_is_made_of_the_figures(hold: Made) -> None:
     curves = series(one, two)
     finding = headline(comparison, events_of(comparison, one, two), None, curves)
     wrist = found["wrist_flex"]
-    far, at = quantity(wrist.max, "joint"), f"{wrist.at:.3f} s"
+    far, at = quantity(wrist.max, wrist.unit), f"{wrist.at:.3f} s"
     assert finding.lead.startswith(f"Joint wrist_flex is up to {far} apart")
     assert f", at {at}; " in finding.lead
     since = min(each.since for each in comparison.agreements if each.since is not None)
@@ -584,11 +584,11 @@ def test_every_figure_of_the_comparison_is_on_the_page(hold: Made, page: Path) -
         (line,) = [
             row for row in text.splitlines() if row.startswith(found.name.replace(", ", " ") + "\t")
         ]
-        assert quantity(found.tolerance, found.kind) in line
+        assert quantity(found.tolerance, found.unit) in line
         assert found.verdict in line
         if found.kind != "contact":
             for value in (found.max, found.rms, found.settled):
-                assert quantity(value, found.kind) in line
+                assert quantity(value, found.unit) in line
 
 
 def test_it_reads_without_a_script(page: Path) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..comparison.text import milliseconds, numbers, significant
 from ..interface import JointType
 from ..traces import Header, Trace
 from .align import SAME, Common
@@ -42,7 +43,7 @@ def notes_on(one: Trace, two: Trace, common: Common, found: Sequence[Agreement])
         yield f"the experiments are two: {a.experiment} and {b.experiment}"
     yield from _of_time(one, two, common)
     if not np.allclose(a.gravity, b.gravity, rtol=0, atol=1e-12):
-        yield f"gravity differs: {_vector(a.gravity)} and {_vector(b.gravity)} m/s²"
+        yield f"gravity differs: {numbers(a.gravity)} and {numbers(b.gravity)} m/s²"
     if any(header.defaults == "engine" and header.energy_by for header in (a, b)):
         yield (
             "energy is measured by one yardstick on both sides, masses, armature and gravity of "
@@ -98,8 +99,8 @@ def _of_time(one: Trace, two: Trace, common: Common) -> Iterator[str]:
     steps = [trace.header.timestep for trace in (one, two)]
     if steps[0] != steps[1]:
         yield (
-            f"timesteps differ, {1000 * steps[0]:.4g} and {1000 * steps[1]:.4g} ms: compared "
-            "are the moments that both have, nothing is interpolated"
+            f"timesteps differ, {significant(1000 * steps[0])} and {milliseconds(steps[1])}: "
+            "compared are the moments that both have, nothing is interpolated"
         )
     ends = [float(trace.time[-1] - trace.time[0]) for trace in (one, two)]
     if abs(ends[0] - ends[1]) > max(steps) * (1 + SAME):
@@ -131,7 +132,3 @@ def _start(trace: Trace, name: str, column: str) -> np.ndarray:
 
 def _lacking(a: Header, b: Header) -> list[str]:
     return [f"{name} ({a.label})" for name in a.joint_labels if name not in b.joint_labels]
-
-
-def _vector(values: tuple[float, ...]) -> str:
-    return " ".join(f"{value:g}" for value in values)

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ..comparison.text import millimetres
 from ..experiments import replay
 from ..page import Table, Text, Traces
-from ._words import millimetres, where
+from ._words import where
 
 _STEPS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 300, 600, 1000, 2000, 5000, 10_000, 20_000)
 _SHORT = {"extra-step": "one step more", "late-ctrl": "late ctrl"}

@@ -8,20 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from ..comparison.text import count, millimetres, vector
 from ..experiments import forward
 from ..page import Page, Pipeline, Question, Table, Text, Traces, Verdict
-from ._words import (
-    count,
-    differences,
-    emulation,
-    itself,
-    millimetres,
-    page_of,
-    sentence,
-    typed,
-    vector,
-    where,
-)
+from ._words import differences, emulation, itself, page_of, sentence, typed, where
 from .session import Session
 
 _WHEN = ("before it", "after it")

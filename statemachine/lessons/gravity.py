@@ -7,19 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ..comparison.text import apart, position, signed
 from ..experiments import gravity
 from ..page import Page, Question, Table, Text, Verdict
 from ._fall import longer, longer_apart
-from ._words import (
-    angle_or_length,
-    differences,
-    emulation,
-    page_of,
-    position,
-    signed,
-    typed,
-    where,
-)
+from ._words import differences, emulation, page_of, typed, where
 from .session import Session
 
 _PARTS = (
@@ -167,7 +159,7 @@ def _worst(
             return "nothing touched"
         gap = np.concatenate([np.zeros(first), gap[first:]])
     worst = int(np.argmax(gap))
-    found = angle_or_length(float(gap[worst]), one.slide)
+    found = apart(float(gap[worst]), one.slide)
     return found if found.startswith("below") else f"{found} at {worst * timestep:.3f} s"
 
 

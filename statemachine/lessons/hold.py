@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ..comparison.text import apart, position
 from ..experiments import hold
 from ..interface import Array
 from ..page import Page, Question, Table, Text, Traces
-from ._words import angle_or_length, differences, page_of, position, typed, where
+from ._words import differences, page_of, typed, where
 from .session import Session
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -134,7 +135,7 @@ def _traces(results: Mapping[str, hold.Hold]) -> Traces:
 def _gap(one: hold.Hold, gaps: Array, time: float | None = None) -> str:
     """The largest of the joints' gaps, whose it is, and when."""
     joint = int(np.argmax(gaps))
-    found = angle_or_length(float(gaps[joint]), one.slides[joint])
+    found = apart(float(gaps[joint]), one.slides[joint])
     if found.startswith("below"):
         return found
     return f"{found}  {one.joints[joint]}" + ("" if time is None else f" at {time:.3f} s")

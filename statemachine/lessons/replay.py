@@ -7,20 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ..comparison.text import count, degrees, millimetres, vector
 from ..experiments import replay
 from ..page import Page, Question, Table, Text, Verdict
 from ._broken import BROKEN, course, growth, in_short, traces
-from ._words import (
-    count,
-    degrees,
-    differences,
-    millimetres,
-    page_of,
-    sentence,
-    typed,
-    vector,
-    where,
-)
+from ._words import differences, page_of, sentence, typed, where
 from .session import Session
 
 

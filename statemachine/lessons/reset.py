@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..comparison.text import count, millimetres
 from ..experiments import reset
 from ..page import Page, Question, Table, Text, Verdict
-from ._words import count, differences, emulation, millimetres, page_of, sentence, typed, where
+from ._words import differences, emulation, page_of, sentence, typed, where
 from .session import Session
 
 

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..compare.why import FACTORS, Attribution, Trial
+from ..comparison.text import NONE, capital, percent, quantity, short_time
 from ..page import Page, Table, Text, Verdict
-from .figures_of import quantity as in_units
-from .figures_of import short_time
-from .why_words import ENOUGH, KINDS, amount, astray, conclusion, percent, shown, titles, upper
+from .why_words import ENOUGH, amount, astray, conclusion, shown, titles
 
 _BAR = 16  # characters of the longest bar
 
@@ -72,7 +71,7 @@ def _gap_sentence(result: Attribution) -> str:
         f"{amount(result, gap.end)})."
     )
     others = [
-        f"{name} {in_units(other.worst, KINDS[other.unit])}"
+        f"{name} {quantity(other.worst, other.unit)}"
         for name, other in result.first.items()
         if name != result.quantity
     ]
@@ -111,7 +110,7 @@ def _brought(result: Attribution, trial: Trial) -> str:
     if trial.way == "parity":
         had = trial.had if trial.did == f"as {result.names[0]}" else trial.had[::-1]
         return f"{had[1]} → {had[0]}"
-    return trial.did or "–"
+    return trial.did or NONE
 
 
 def _another(trial: Trial) -> bool:
@@ -129,7 +128,7 @@ def _notes(result: Attribution) -> list[str]:
             "this one is as it came. The parts need not add up: one setting can hide another."
         )
     found += [
-        f"{upper(FACTORS[trial.factor].title)}, put back, takes {titles(trial.along)} back "
+        f"{capital(FACTORS[trial.factor].title)}, put back, takes {titles(trial.along)} back "
         "with it: they can be set only where it is."
         for trial in result.alone
         if trial.along
@@ -147,7 +146,7 @@ def _notes(result: Attribution) -> list[str]:
         )
     for trial in result.alone:
         if trial.note:
-            found.append(f"{upper(FACTORS[trial.factor].title)}: {trial.note}.")
+            found.append(f"{capital(FACTORS[trial.factor].title)}: {trial.note}.")
     if any(trial.way == "one side" for trial in result.alone):
         found.append(f"Integrator: {two} has none to choose from, so only {one} was changed.")
     return found

@@ -8,12 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..comparison import ContactNames
+from ..comparison.text import TINY, distance, reading
 from ..interface import Array, Contacts, JointType, Model
 from ..rotations import angle_between, matrix_from_quat
-
-# What is shown of a size in SI: factor and unit.
-_SHOWN = {"m": (1e3, " mm"), "rad": (180 / np.pi, "°")}
-_TINY = 1e-6  # smaller than this, in what is shown, nobody wants the digits
 
 
 @dataclass(frozen=True)
@@ -35,11 +32,9 @@ class Gap:
     @property
     def shown(self) -> float:
         """The size in the unit that is shown, mm or degrees; infinite if it has none."""
-        factor, _ = _SHOWN.get(self.unit, (1.0, ""))
-        return np.inf if self.size is None else factor * self.size
+        return np.inf if self.size is None else reading(self.unit)[0] * self.size
 
     def __str__(self) -> str:
-        _, unit = _SHOWN.get(self.unit, (1.0, f" {self.unit}"))
         if self.size is None:
             text = "all zero, which is no rotation"
         elif self.unit in ("appears", "vanishes"):
@@ -47,13 +42,13 @@ class Gap:
             if self.size > 1:
                 text = f"{self.size:.0f} {self.unit.removesuffix('es').removesuffix('s')}"
         else:
-            text = f"{self.shown:.3g}{unit}" if self.shown >= _TINY else f"below {_TINY:g}{unit}"
+            text = distance(self.size, self.unit)
         return f"{text} at {self.where}" if self.where else text
 
 
 def told(found: Sequence[Gap]) -> str:
     """Gaps in words; what is nothing but rounding is left out beside what is more."""
-    worth = [gap for gap in found if gap.shown >= _TINY]
+    worth = [gap for gap in found if gap.shown >= TINY]
     return "; ".join(str(gap) for gap in worth or found[:1])
 
 

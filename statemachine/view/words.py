@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
+from ..comparison.text import millimetres, position, short_time
 from .frames import Frame
 from .live import Pace
 
@@ -17,7 +16,7 @@ def rows(frame: Frame, pace: Pace, tip: str) -> list[tuple[str, str]]:
         tip: Name of the site that stands for the fingertip, or "".
     """
     found = [
-        ("time", f"{frame.time:.3f} s"),
+        ("time", short_time(frame.time)),
         ("steps", f"{frame.steps:,}"),
         ("pace", _pace(frame, pace)),
     ]
@@ -29,13 +28,9 @@ def rows(frame: Frame, pace: Pace, tip: str) -> list[tuple[str, str]]:
             found.append((f"on {pose.name}", f"{where} mm"))
     if frame.gap is not None:
         if frame.gap.tip is not None:
-            found.append(("tips apart", f"{1000 * frame.gap.tip:.3f} mm"))
+            found.append(("tips apart", millimetres(frame.gap.tip, 3)))
         if frame.gap.angle is not None:
-            far = (
-                f"{1000 * frame.gap.angle:.3f} mm"
-                if frame.gap.slide
-                else f"{math.degrees(frame.gap.angle):.3f}°"
-            )
+            far = position(frame.gap.angle, frame.gap.slide, 3)
             found.append(("joints apart", f"{far}, {frame.gap.joint}"))
     return found
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ...compare.why import Attribution, Trial
-from ..why import amount, conclusion, percent
-from .finding import capital, moves, title
+from ...comparison.text import capital, listed, percent
+from ..why_words import amount, conclusion
+from .finding import moves, title
 from .markup import Html, joined, kept, tag
 from .sections import table
 
@@ -102,9 +103,9 @@ def agreement_steps(found: Attribution) -> Html | None:
         what = f"What remains is all of the gap, {same}."
     if rest:
         last = rest[-1]
-        listed = " and ".join(title(t.factor) for t in rest)
+        names = listed([title(t.factor) for t in rest])
         what += (
-            f" With {listed} left out on both ({last.did.removesuffix(', both')}) it is "
+            f" With {names} left out on both ({last.did.removesuffix(', both')}) it is "
             f"{amount(found, last.worst)}: that is each engine's own doing, and no setting that "
             "was tried brings it to the same."
         )

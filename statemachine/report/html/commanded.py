@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...comparison.text import figure, quantity
 from ...interface import Array, JointType
 from ...traces import Trace
-from ..figures_of import figure
 from .markup import Html, kept, tag
 from .sections import table
 
@@ -88,5 +88,5 @@ def _misses(one: Trace, two: Trace, labels: tuple[str, str]) -> str:
         far = _ends(trace)
         worst = int(np.argmax(far))
         name = trace.header.actuators[worst]
-        each.append(f"{name} on {label}, by {figure(float(np.degrees(far[worst])))}°")
+        each.append(f"{name} on {label}, by {quantity(float(far[worst]), 'rad')}")
     return f" In the end farthest from that is {' and '.join(each)}."

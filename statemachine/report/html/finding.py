@@ -10,7 +10,7 @@ import numpy as np
 
 from ...compare import Agreement, Comparison, Series
 from ...compare.agreement import SETTLED
-from ..figures_of import quantity, short_time
+from ...comparison.text import capital, milliseconds, percent, quantity, short_time, significant
 from .timeline import Event
 
 if TYPE_CHECKING:
@@ -130,12 +130,12 @@ def _in_the_end(comparison: Comparison, curves: Sequence[Series]) -> str:
     if not still:
         return f"{over}, all of the motion is within its tolerance." if motion else ""
     most = max(still, key=lambda found: found.settled / found.tolerance)
-    text = f"{over} {named(most)} is still {quantity(most.settled, most.kind)} apart"
+    text = f"{over} {named(most)} is still {quantity(most.settled, most.unit)} apart"
     curve = next((each for each in curves if each.name == most.name), None)
     last = None if curve is None else changing(curve, most)
     if last is None:
         return f"{text}."
-    return f"{text}, and still changing: {quantity(last, most.kind)} at the last moment."
+    return f"{text}, and still changing: {quantity(last, most.unit)} at the last moment."
 
 
 def changing(curve: Series, found: Agreement) -> float | None:
@@ -172,8 +172,8 @@ def subject(comparison: Comparison, attribution: Attribution | None = None) -> S
     if attribution is None or not attribution.alone:
         if found is None:
             return None
-        return Subject(named(found), quantity(found.max, found.kind), found.at, found)
-    from ..why import amount
+        return Subject(named(found), quantity(found.max, found.unit), found.at, found)
+    from ..why_words import amount
 
     gap = attribution.first[attribution.quantity]
     kinds = {"joints": "joint", "slides": "slide"}
@@ -237,7 +237,7 @@ def in_words(
         if worst is not None and worst.max:
             text += (
                 f" Nearest to its tolerance comes {name_of(worst.name)}: "
-                f"{quantity(worst.max, worst.kind)} of {quantity(worst.tolerance, worst.kind)}."
+                f"{quantity(worst.max, worst.unit)} of {quantity(worst.tolerance, worst.unit)}."
             )
         found.append(text)
     else:
@@ -252,13 +252,13 @@ def in_words(
         if of is not None and of.found is not None and of.found.kind != "contact":
             text += (
                 f" The tolerance of {named(of.found)} is "
-                f"{quantity(of.found.tolerance, of.found.kind)}."
+                f"{quantity(of.found.tolerance, of.found.unit)}."
             )
         far = leading(comparison)
         if of is not None and of.found is None and far is not None:
             text += (
                 f" Farthest beyond its tolerance is {named(far)}: "
-                f"{quantity(far.max, far.kind)} of {quantity(far.tolerance, far.kind)}, at "
+                f"{quantity(far.max, far.unit)} of {quantity(far.tolerance, far.unit)}, at "
                 f"{short_time(far.at)}."
             )
         found.append(text)
@@ -279,10 +279,10 @@ def coarsely(comparison: Comparison) -> str:
     if apart is None:
         return ""
     steps = " and ".join(
-        f"{1000 * step:.3g}" for step in (comparison.one.timestep, comparison.two.timestep)
+        significant(1000 * step, 3) for step in (comparison.one.timestep, comparison.two.timestep)
     )
     return (
-        f"The sides step every {steps} ms and meet every {1000 * apart:.3g} ms. Figures are of "
+        f"The sides step every {steps} ms and meet every {milliseconds(apart, 3)}. Figures are of "
         "these common moments alone: times are no finer, and a peak between two of them is not "
         "seen, so a largest difference may be larger."
     )
@@ -296,7 +296,7 @@ def _causes(attribution: Attribution | None) -> tuple[str, ...]:
     """What takes the largest difference away, of the ladder; what is a proof comes first."""
     if attribution is None or not attribution.alone:
         return ()
-    from ..why import amount, percent
+    from ..why_words import amount
 
     counted = [trial for trial in attribution.ladder if trial.explains is not None]
     if max((trial.explains or 0.0 for trial in counted), default=0.0) < _SOME:
@@ -342,8 +342,3 @@ def title(factor: str) -> str:
     from ...compare.why import FACTORS
 
     return FACTORS[factor].title if factor in FACTORS else factor
-
-
-def capital(text: str) -> str:
-    """With a capital letter first."""
-    return text[:1].upper() + text[1:]

@@ -15,9 +15,9 @@ from ... import __version__
 from ...compare import Comparison, Series, Witness, default_tip, series
 from ...compare.series import NORMAL, total_forces
 from ...comparison import same_pairs
+from ...comparison.text import figure, sentence
 from ...page import Page, Verdict
 from ...traces import Trace
-from ..figures_of import figure
 from . import sections
 from .between import own_series, shown_series
 from .budget import Budget
@@ -177,7 +177,7 @@ def _report(
         parts.append(_section("emulated", "What is emulated", emulated))
     if steps is not None:
         parts.append(_section("agree", "To make them agree", steps))
-    notes = [_sentence(line) for line in (*said, *comparison.notes, *scene.notes)]
+    notes = [sentence(line) for line in (*said, *comparison.notes, *scene.notes)]
     parts.append(
         _section(
             "origin",
@@ -336,8 +336,3 @@ def _assembled(title: str, body: Html, data: dict[str, Any]) -> str:
 
 def _file(name: str) -> str:
     return resources.files(__package__ or "").joinpath(name).read_text(encoding="utf-8")
-
-
-def _sentence(line: str) -> str:
-    text = line[:1].upper() + line[1:]
-    return text if text.endswith(".") else text + "."

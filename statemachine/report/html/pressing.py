@@ -10,8 +10,8 @@ import numpy as np
 from ...compare import Comparison
 from ...compare.agreement import SETTLED
 from ...compare.series import world_forces
+from ...comparison.text import figure, quantity, short_time
 from ...traces import Trace
-from ..figures_of import figure, short_time
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def pressing_words(comparison: Comparison, traces: Sequence[Trace]) -> tuple[lis
     each = [_end(side, label) for side, label in zip((one, two), labels, strict=True)]
     said = [f"{over}, on average: {'; '.join(each)}."]
     deep = [
-        f"{figure(1000 * side.deepest)} mm on {label} ({side.deep}, at {short_time(side.deep_at)})"
+        f"{quantity(side.deepest, 'm')} on {label} ({side.deep}, at {short_time(side.deep_at)})"
         for side, label in zip((one, two), labels, strict=True)
         if side.deepest > 0
     ]
