@@ -536,3 +536,20 @@ def test_a_robot_that_stands_still_agrees_with_itself(form: str, cli: Cli, tmp_p
     assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
     # As it is spelt in the file, or as a page escapes it.
     assert "a$b$c" in out.read_text()
+
+
+def test_poses_that_are_no_numbers_cost_the_picture_and_no_more(
+    hold: Trace, cli: Cli, tmp_path: Path
+) -> None:
+    xpos = np.array(hold["xpos"])
+    xpos[len(xpos) // 2 :] = np.nan
+    write(hold, tmp_path / "whole.npz")
+    write(changed(hold, xpos=xpos), tmp_path / "nan.npz")
+    for pair in (("nan.npz", "whole.npz"), ("whole.npz", "nan.npz")):
+        done = cli("compare", *(tmp_path / name for name in pair), "--html", tmp_path / "a.html")
+        assert "Traceback" not in done.stderr
+        assert (tmp_path / "a.html").stat().st_size > 100_000
+    done = cli("trace", "film", tmp_path / "nan.npz", "-o", tmp_path / "a.webp")
+    assert done.returncode != 0
+    assert "no poses of the bodies that are numbers" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
