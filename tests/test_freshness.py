@@ -14,6 +14,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.backends.mujoco_backend import MujocoData
+from statemachine.comparison import Gap
 from statemachine.errors import (
     BadInputError,
     ClosedDataError,
@@ -25,7 +26,7 @@ from statemachine.interface import DERIVED, POSES, Data, Model
 from statemachine.report.as_json import plain
 from statemachine.rotations import matrix_from_quat
 from statemachine.staleness import look
-from statemachine.staleness.gaps import Gap, gaps, told
+from statemachine.staleness.gaps import gaps, told
 from statemachine.staleness.look import Scratch, back, readings
 from statemachine.staleness.result import table
 

@@ -22,7 +22,7 @@ import statemachine as sm
 from statemachine.compare import Comparison, compare, series, sides_of
 from statemachine.compare.series import total_forces
 from statemachine.compare.sides import Request
-from statemachine.compare.why import Attribution, Gap, Touch, Trial
+from statemachine.compare.why import Attribution, Deviation, Touch, Trial
 from statemachine.comparison.text import quantity
 from statemachine.drawing import drawing_of
 from statemachine.errors import BadInputError
@@ -293,7 +293,7 @@ def attribution_of(made: Made, quantity: str = "joints", **more: Any) -> Attribu
     """An attribution with figures of our own: a servo law, and contact that hides the rest."""
     comparison, one, two, _ = made
     worst = max((a for a in comparison.agreements if a.kind == "joint"), key=lambda a: a.max)
-    gap = Gap("rad", worst.max, worst.at, worst.rms, worst.settled)
+    gap = Deviation("rad", worst.max, worst.at, worst.rms, worst.settled)
     g = worst.max
 
     def trial(factor: str, way: Any, after: float, before: float, moved: float) -> Trial:

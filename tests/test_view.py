@@ -437,7 +437,7 @@ def test_commands_are_obeyed_in_their_order() -> None:
 def test_the_readout_says_what_the_frame_says() -> None:
     pose = frames.Pose("mujoco", np.zeros((1, 3)), np.zeros((1, 4)), np.array([0.1, -0.02, 0.3]))
     ghost = frames.Pose("pybullet", pose.xpos, pose.xquat, np.array([0.1, -0.02, 0.3015]))
-    gap = frames.Gap(0.0015, "elbow", math.radians(2.5))
+    gap = frames.Separation(0.0015, "elbow", math.radians(2.5))
     frame = Frame(1.25, 250, True, np.zeros(1), 1, (pose, ghost), gap, "")
     rows = dict(words.rows(frame, Pace(1.0, 0.997, False), "tip"))
     assert rows["time"] == "1.250 s"

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..comparison import SAME, Common
 from ..comparison.text import milliseconds, numbers, significant
 from ..interface import JointType
 from ..traces import Header, Trace
-from .align import SAME, Common
 from .series import tell
 
 if TYPE_CHECKING:

@@ -7,11 +7,10 @@ from typing import Literal
 
 import numpy as np
 
-from ..comparison import same_pairs
+from ..comparison import Common, common_moments, same_pairs
 from ..interface import Array, JointType, usual_site
 from ..rotations import angle_between, matrix_from_quat
 from ..traces import Header, Trace
-from .align import Common, common_moments
 
 Kind = Literal[
     "joint", "slide", "tip", "tip rotation", "body", "body rotation", "energy", "contact", "force"

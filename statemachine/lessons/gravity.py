@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison.text import apart, position, signed
+from ..comparison import largest
+from ..comparison.text import apart, position, short_time, signed
 from ..experiments import gravity
 from ..page import Page, Question, Table, Text, Verdict
 from ._fall import longer, longer_apart
@@ -158,9 +159,9 @@ def _worst(
         if first >= len(gap):
             return "nothing touched"
         gap = np.concatenate([np.zeros(first), gap[first:]])
-    worst = int(np.argmax(gap))
-    found = apart(float(gap[worst]), one.slide)
-    return found if found.startswith("below") else f"{found} at {worst * timestep:.3f} s"
+    size, row = largest(gap)
+    found = apart(size, one.slide)
+    return found if found.startswith("below") else f"{found} at {short_time(row * timestep)}"
 
 
 def _alone(name: str, result: gravity.Gravity) -> list[Table | Text]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from ..comparison import Gap
 from ..comparison.text import count, few, listed, milliseconds
 from ..errors import UnsupportedError
 from ..interface import (
@@ -28,7 +29,7 @@ from ..interface import (
     set_state,
 )
 from ..rotations import times
-from .gaps import Gap, gaps, same
+from .gaps import gaps, same
 from .result import Freshness, Row
 
 if TYPE_CHECKING:

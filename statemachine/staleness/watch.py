@@ -15,10 +15,11 @@ from typing import Any, cast
 
 import numpy as np
 
+from ..comparison import Gap
 from ..comparison.text import few
 from ..errors import BadInputError, StaleReadError
 from ..interface import INPUTS, Array, Contacts, Data, Model, State, get_state
-from .gaps import Gap, told
+from .gaps import told
 from .look import DEPEND, Moment, Readings, Scratch, find, readings, row, stale_row
 from .result import Row, StaleRead, table
 

@@ -293,6 +293,11 @@ class Trace:
         return column in self.columns
 
     @property
+    def timestep(self) -> float:
+        """Simulated time between two rows [s]."""
+        return self.header.timestep
+
+    @property
     def time(self) -> Array:
         """(n,) [s]."""
         return self.columns["time"]

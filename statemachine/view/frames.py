@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..comparison import largest
 from ..interface import Array, JointType, Model, usual_site
 
 _TURN = math.pi / 180  # radians in a degree
@@ -48,7 +49,7 @@ class Pose:
 
 
 @dataclass(frozen=True)
-class Gap:
+class Separation:
     """How far two engines are apart.
 
     Attributes:
@@ -85,7 +86,7 @@ class Frame:
     ctrl: Array
     resets: int
     poses: tuple[Pose, ...]
-    gap: Gap | None
+    gap: Separation | None
     trouble: str
 
 
@@ -178,7 +179,7 @@ def gap_between(
     addresses: Sequence[int],
     qpos: tuple[Array, Array],
     tips: tuple[Array | None, Array | None],
-) -> Gap:
+) -> Separation:
     """How far two moments of one model are apart.
 
     Args:
@@ -195,6 +196,6 @@ def gap_between(
         if joints:
             starts = [addresses[joint] for joint in joints]
             apart = np.abs(qpos[0][starts] - qpos[1][starts])
-            worst = int(apart.argmax())
-            return Gap(tip, names[joints[worst]], float(apart[worst]), kind == JointType.SLIDE)
-    return Gap(tip, "", None)
+            angle, worst = largest(apart)
+            return Separation(tip, names[joints[worst]], angle, kind == JointType.SLIDE)
+    return Separation(tip, "", None)

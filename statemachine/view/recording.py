@@ -14,12 +14,12 @@ from .frames import (
     Command,
     Control,
     Frame,
-    Gap,
     Pause,
     Pose,
     Reset,
     Run,
     Seek,
+    Separation,
     Step,
     gap_between,
 )
@@ -144,7 +144,7 @@ class Recording:
             trouble="",
         )
 
-    def _gap(self, poses: tuple[Pose, Pose], qpos: tuple[Array, Array]) -> Gap:
+    def _gap(self, poses: tuple[Pose, Pose], qpos: tuple[Array, Array]) -> Separation:
         header = self.header
         return gap_between(
             header.joints,

@@ -12,11 +12,11 @@ from ..interface import Data, Model, forward, make_data, reset, step
 from .frames import (
     Command,
     Frame,
-    Gap,
     Pause,
     Pose,
     Reset,
     Run,
+    Separation,
     SetCtrl,
     Step,
     controls_of,
@@ -76,7 +76,7 @@ class Session:
         start = None if keyframe is None else first.key_id(keyframe)
         self._arms: list[tuple[Model, Data]] = []
         self._poses: tuple[Pose, ...] = ()
-        self._gap: Gap | None = None
+        self._gap: Separation | None = None
         self._time = 0.0
         self._running, self._trouble, self._steps, self._resets = False, "", 0, 0
         try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .attribute import attribute
 from .factors import FACTORS, Factor
-from .gap import Gap
+from .gap import Deviation
 from .results import Attribution, Touch, Trial
 
-__all__ = ["FACTORS", "Attribution", "Factor", "Gap", "Touch", "Trial", "attribute"]
+__all__ = ["FACTORS", "Attribution", "Deviation", "Factor", "Touch", "Trial", "attribute"]

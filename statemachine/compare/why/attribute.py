@@ -11,7 +11,7 @@ from ...experiments._common import Progress, silent
 from ...experiments.scenarios import Scenario
 from ...interface import Model
 from .factors import FACTORS, OFF_ORDER, PARITY_ORDER, Factor
-from .gap import Gap
+from .gap import Deviation
 from .results import Attribution, Trial, Way
 from .runs import Runs
 from .sides import Change, Changes, same, side_of
@@ -207,7 +207,7 @@ def _trial(
     runs: Runs,
     factor: Factor,
     move: _Move,
-    gaps: dict[str, Gap],
+    gaps: dict[str, Deviation],
     before: float,
     changes: Changes,
     note: str = "",

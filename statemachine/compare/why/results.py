@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ...experiments._common import Provenance
-from .gap import Gap
+from .gap import Deviation
 
 Way = Literal["parity", "off", "one side", "alike", "none"]
 
@@ -38,7 +38,7 @@ class Trial:
     way: Way
     had: tuple[str, str]
     did: str
-    gaps: dict[str, Gap]
+    gaps: dict[str, Deviation]
     worst: float | None
     explains: float | None
     moved: float | None
@@ -93,7 +93,7 @@ class Attribution:
     names: tuple[str, str]
     quantity: str
     unit: str
-    first: dict[str, Gap]
+    first: dict[str, Deviation]
     alone: tuple[Trial, ...]
     ladder: tuple[Trial, ...]
     left: float

@@ -10,7 +10,7 @@ from ...experiments.scenarios import Scenario
 from ...interface import Data, Model
 from ...traces import Trace, record
 from .factors import FACTORS
-from .gap import Curves, Gap, Ruler
+from .gap import Curves, Deviation, Ruler
 from .results import Touch
 from .sides import Changes, Side
 
@@ -78,7 +78,7 @@ class Runs:
             self.ended = f"{self.names[place]} does not stand: {_first(self._reasons[key])}"
         return self._curves[key]
 
-    def gaps(self, one: Changes, two: Changes) -> dict[str, Gap]:
+    def gaps(self, one: Changes, two: Changes) -> dict[str, Deviation]:
         """The gap with changes on both sides; nothing if one of them did not end well."""
         first, second = self.curves(0, one), self.curves(1, two)
         return self.ruler.gaps(first, second) if first and second else {}

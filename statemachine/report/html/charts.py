@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...compare import Agreement, Series
+from ...comparison import largest
 from ...comparison.text import figure, quantity, reading, short_time
 from ...interface import Array, Ints
 from ..log_axis import LogAxis
@@ -104,7 +105,7 @@ def data_table(curve: Series, found: Agreement, labels: tuple[str, str]) -> Html
     """The figures of a chart: moments evenly spaced, and that of the largest difference."""
     scale, unit = reading(curve.unit)
     rows = np.linspace(0, len(curve.time) - 1, min(_ROWS, len(curve.time))).round().astype(int)
-    worst = int(np.argmax(curve.difference))
+    _, worst = largest(curve.difference)
     rows = np.unique([*rows, worst])
     columns = []
     parts = "xyz" if curve.one.ndim == 2 and curve.one.shape[1] == 3 else ("",)

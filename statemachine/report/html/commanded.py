@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...comparison import largest
 from ...comparison.text import figure, quantity
 from ...interface import Array, JointType
 from ...traces import Trace
@@ -86,7 +87,7 @@ def _misses(one: Trace, two: Trace, labels: tuple[str, str]) -> str:
     each = []
     for trace, label in zip((one, two), labels, strict=True):
         far = _ends(trace)
-        worst = int(np.argmax(far))
+        most, worst = largest(far)
         name = trace.header.actuators[worst]
-        each.append(f"{name} on {label}, by {quantity(float(far[worst]), 'rad')}")
+        each.append(f"{name} on {label}, by {quantity(most, 'rad')}")
     return f" In the end farthest from that is {' and '.join(each)}."

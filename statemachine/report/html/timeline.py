@@ -8,8 +8,7 @@ from typing import Literal
 import numpy as np
 
 from ...compare import Comparison
-from ...compare.align import common_moments
-from ...comparison import same_pairs
+from ...comparison import common_moments, same_pairs
 from ...interface import Array, Ints
 from ...traces import Trace
 
