@@ -21,7 +21,7 @@ from rich.cells import cell_len
 import statemachine as sm
 from statemachine.experiments.in_turns import Ratio
 from statemachine.lessons import LESSONS, STATIONS, module
-from statemachine.lessons.session import Session, Taken, load_line, page_of_lesson, play, take
+from statemachine.lessons.session import Taken, TypedCode, load_line, page_of_lesson, play, take
 from statemachine.page import Code, Page, Printed, Question, Text, Verdict
 from statemachine.report import quiz
 
@@ -41,7 +41,7 @@ def _take(name: str, backend: str, **options: Any) -> tuple[Page, Taken]:
 
 def _repage(name: str, backend: str, result: Any) -> Page:
     """The page of a result that was changed."""
-    return module(name).page({backend: result}, Session("", {backend: ""}))
+    return module(name).page({backend: result}, TypedCode("", {backend: ""}))
 
 
 def test_the_path_has_ten_stations_in_the_order_of_the_course() -> None:
@@ -144,7 +144,7 @@ def test_a_result_that_belies_a_claim_fails_it(claim: str) -> None:
 
 def test_the_right_choice_is_computed() -> None:
     def right(name: str, result: Any) -> int | None:
-        page = module(name).page({"mujoco": result}, Session("sleep(0.2)", {"mujoco": ""}))
+        page = module(name).page({"mujoco": result}, TypedCode("sleep(0.2)", {"mujoco": ""}))
         return next(block.right for block in page.blocks if isinstance(block, Question))
 
     forward = _take("forward", "mujoco")[1].result

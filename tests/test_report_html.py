@@ -22,13 +22,13 @@ import statemachine as sm
 from statemachine.compare import Comparison, compare, series, sides_of
 from statemachine.compare.series import total_forces
 from statemachine.compare.sides import Request
-from statemachine.compare.why import Attribution, Deviation, Touch, Trial
+from statemachine.compare.why import Attribution, Deviation, FactorTrial, FirstTouch
 from statemachine.comparison.text import quantity
 from statemachine.drawing import drawing_of
 from statemachine.errors import BadInputError
 from statemachine.experiments.scenarios import SCENARIOS
 from statemachine.page import Page, Verdict
-from statemachine.report.html import Look, check_target, report, write_report
+from statemachine.report.html import SideDrawing, check_target, report, write_report
 from statemachine.report.html.between import shown_series
 from statemachine.report.html.charts import difference_chart, spread
 from statemachine.report.html.finding import headline
@@ -41,15 +41,15 @@ from .browser import Tab, browser
 from .conftest import ROOT, Cli, need_engine
 
 LIMIT = 2_000_000  # bytes
-Made = tuple[Comparison, Trace, Trace, Look]
+Made = tuple[Comparison, Trace, Trace, SideDrawing]
 
 
 def of(one: Trace, two: Trace) -> Made:
     return compare(one, two), one, two, look_of(one)
 
 
-def look_of(trace: Trace) -> Look:
-    return Look(drawing_of(sm.load(trace.header.provenance.model_file)))
+def look_of(trace: Trace) -> SideDrawing:
+    return SideDrawing(drawing_of(sm.load(trace.header.provenance.model_file)))
 
 
 def page_of(made: Made, **more: Any) -> str:
@@ -191,7 +191,7 @@ def test_names_that_are_markup_do_nothing(hold: Made, tmp_path: Path) -> None:
         tab.nothing_wrong()
 
 
-def of_look(one: Trace, two: Trace, look: Look) -> Made:
+def of_look(one: Trace, two: Trace, look: SideDrawing) -> Made:
     return compare(one, two), one, two, look
 
 
@@ -243,7 +243,7 @@ def test_much_to_draw_is_drawn_with_less(hold: Made) -> None:
         vertices=ball.reshape(-1, 3).astype(np.float32),
         faces=faces.astype(np.int32),
     )
-    big = Look(dataclasses.replace(look.drawing, parts=(*look.drawing.parts, part)))
+    big = SideDrawing(dataclasses.replace(look.drawing, parts=(*look.drawing.parts, part)))
     text = page_of(of_look(Trace(one.header, columns), two, big))
     assert len(text.encode()) <= LIMIT
     assert "triangles" in text
@@ -296,8 +296,8 @@ def attribution_of(made: Made, quantity: str = "joints", **more: Any) -> Attribu
     gap = Deviation("rad", worst.max, worst.at, worst.rms, worst.settled)
     g = worst.max
 
-    def trial(factor: str, way: Any, after: float, before: float, moved: float) -> Trial:
-        return Trial(
+    def trial(factor: str, way: Any, after: float, before: float, moved: float) -> FactorTrial:
+        return FactorTrial(
             factor, way, ("kp 998.2", "its motors"), "as mujoco" if way == "parity" else "none",
             {}, after * g, before - after, moved,
         )  # fmt: skip
@@ -333,11 +333,11 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
     assert "contact takes 50.0 % of it away*" in found.causes[1]
     assert "a hint, not a proof" in found.causes[1]
     # A proof comes before.
-    touch = Touch(0.27, "gripper on floor (finger); other", 3e-16, 55)
+    touch = FirstTouch(0.27, "gripper on floor (finger); other", 3e-16, 55)
     found = headline(comparison, [], attribution_of(hold, touch=touch))
     assert found.causes[0].startswith("Until the first touch, gripper on floor (finger) at 0.270 s")
     assert "2e-14° apart" in found.causes[0]
-    late = Touch(0.27, "finger on floor", 0.01, 55)  # they were apart before
+    late = FirstTouch(0.27, "finger on floor", 0.01, 55)  # they were apart before
     assert len(headline(comparison, [], attribution_of(hold, touch=late)).causes) == 2
     # Of another quantity than any that is compared: named as it is.
     other = headline(comparison, [], attribution_of(hold, quantity="box in the hand"))
@@ -1017,7 +1017,7 @@ def test_timesteps_that_differ_are_drawn_between_and_it_is_said(tmp_path: Path) 
 
 
 def test_without_the_model_there_are_sticks(hold: Made, tmp_path: Path) -> None:
-    none = Look(None, "there is no so101/scene.xml here")
+    none = SideDrawing(None, "there is no so101/scene.xml here")
     target = write_report(tmp_path / "x.html", page_of(hold, looks=(none, none)))
     with browser(height=1000) as tab:
         open_page(tab, target)

@@ -18,9 +18,9 @@ from statemachine.drawing import drawing_of
 from statemachine.traces import record
 from statemachine.view import server as serving
 from statemachine.view.door import Door
-from statemachine.view.frames import Pause, Reset, Run, SetCtrl
-from statemachine.view.live import Live, Pace
-from statemachine.view.recording import Recording
+from statemachine.view.frames import Pause, Play, ResetTo, SetCtrl
+from statemachine.view.live import Live, Tempo
+from statemachine.view.recording import TraceSession
 from statemachine.view.session import Session
 from statemachine.view.viser_front import ViserFront, _page, thinner
 
@@ -279,7 +279,7 @@ def test_the_page_is_told_where_every_body_is_on_each_engine() -> None:
         server = _serve(Door("127.0.0.1"))
         try:
             front = ViserFront(server, session, drawing, 1.0, 0)
-            front.show(session.frame(), Pace(1.0, None, False), "")
+            front.show(session.frame(), Tempo(1.0, None, False), "")
             placed = 0
             for root, (_, data) in zip(("/mujoco", "/pybullet ghost"), session._arms, strict=True):
                 for body in range(1, models[0].nbody):
@@ -303,18 +303,18 @@ def test_the_page_is_told_where_every_body_is_on_each_engine() -> None:
 
 def test_the_slider_of_a_recording_follows_it() -> None:
     model = sm.load("so101/scene")
-    recording = Recording([record(model, seconds=0.5)])
+    recording = TraceSession([record(model, seconds=0.5)])
     server = _serve(Door("127.0.0.1"))
     try:
         front = ViserFront(server, recording, drawing_of(model))
         assert (front._seek.min, front._seek.max) == (0, pytest.approx(0.5))
-        recording.apply(Run())
+        recording.apply(Play())
         for _ in range(40):
             recording.advance()
-            front.show(recording.frame(), Pace(1.0, None, False), "")
+            front.show(recording.frame(), Tempo(1.0, None, False), "")
         assert front._seek.value == pytest.approx(40 * model.timestep)
-        recording.apply(Reset())
-        front.show(recording.frame(), Pace(1.0, None, False), "")
+        recording.apply(ResetTo())
+        front.show(recording.frame(), Tempo(1.0, None, False), "")
         assert front._seek.value == 0
         time.sleep(0.2)
         assert front.commands() == []

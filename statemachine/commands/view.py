@@ -95,14 +95,14 @@ def _play(options: argparse.Namespace, port: int) -> int:
     from ..backends import load
     from ..drawing import drawing_of
     from ..traces import model_file, read
-    from ..view.recording import Recording
+    from ..view.recording import TraceSession
 
     if len(options.traces) > 2:
         raise BadInputError(f"view shows one trace or two; got {len(options.traces)}")
     for name in ("ghost", "keyframe", "site"):
         if getattr(options, name) is not None:
             raise BadInputError(f"--{name} is for a simulation, and a trace is a recording")
-    recording = Recording([read(path) for path in options.traces])
+    recording = TraceSession([read(path) for path in options.traces])
     header = recording.header
     name, same = options.model or header.provenance.model_file.removesuffix(".xml"), True
     if options.model:
@@ -139,7 +139,7 @@ def _serve(
     """Show a session until it is interrupted: the ordinary end of a server, no failure."""
     from ..view import server as serving
     from ..view.door import Door
-    from ..view.frames import Run
+    from ..view.frames import Play
     from ..view.live import Live
     from ..view.viser_front import ViserFront
 
@@ -149,7 +149,7 @@ def _serve(
         front = ViserFront(server, session, drawing, options.speed, keyframe)
         _announce(options, server.get_port(), door.token, what, drawing)
         if not options.paused:
-            session.apply(Run())
+            session.apply(Play())
         Live(session, front, options.speed).run(options.seconds)
     except KeyboardInterrupt:
         if sys.stdout.isatty():

@@ -14,7 +14,7 @@ class Answers:
     """What each question is answered by."""
 
     forward: forward.Forward
-    state: state.Layout
+    state: state.StateLayout
     replay: replay.Replay
     gravity: gravity.Gravity
     objects: objects.Objects

@@ -10,7 +10,7 @@ from ._common import Provenance, provenance
 
 
 @dataclass(frozen=True)
-class Joint:
+class JointSlots:
     """One joint's slots: qpos[qpos_start:qpos_stop] and qvel[qvel_start:qvel_stop]."""
 
     name: str
@@ -22,7 +22,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Layout:
+class StateLayout:
     """Sizes and addresses of a model's state.
 
     Attributes:
@@ -36,7 +36,7 @@ class Layout:
     nv: int
     nu: int
     nbody: int
-    joints: tuple[Joint, ...]
+    joints: tuple[JointSlots, ...]
     fresh_time: float
     keyframe: str | None
     keyframe_time: float | None
@@ -44,7 +44,7 @@ class Layout:
     provenance: Provenance
 
 
-def run(model: Model) -> Layout:
+def run(model: Model) -> StateLayout:
     """Read the layout off a Model, and the time off a Data at keyframe 0."""
     joints = []
     for name, kind, place, dof in zip(
@@ -52,7 +52,7 @@ def run(model: Model) -> Layout:
     ):
         known = JointType(int(kind))
         joints.append(
-            Joint(
+            JointSlots(
                 name=name,
                 type=known.name.lower(),
                 qpos_start=int(place),
@@ -67,7 +67,7 @@ def run(model: Model) -> Layout:
         if model.keyframes:
             reset(model, data, keyframe=0)
             name, time = model.keyframes[0].name, data.time
-    return Layout(
+    return StateLayout(
         nq=model.nq,
         nv=model.nv,
         nu=model.nu,

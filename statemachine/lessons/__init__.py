@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 
 if TYPE_CHECKING:
     from ..page import Page
-    from .session import Session
+    from .session import TypedCode
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Module(Protocol):
         """The code as a student would type it; `load` is the call that loads the model."""
         ...
 
-    def page(self, results: Mapping[str, Any], session: Session) -> Page:
+    def page(self, results: Mapping[str, Any], session: TypedCode) -> Page:
         """Say what the results, by backend, mean; `session` is the code and what it printed."""
         ...
 

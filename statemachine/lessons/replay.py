@@ -13,7 +13,7 @@ from ..experiments import replay
 from ..page import Page, Question, Table, Text, Verdict
 from ._broken import BROKEN, course, growth, in_short, traces
 from ._words import differences, page_of, sentence, typed, where
-from .session import Session
+from .session import TypedCode
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> replay.Replay:
@@ -63,7 +63,7 @@ print(np.array_equal(one, two), abs(one - two).max())
 """
 
 
-def page(results: Mapping[str, replay.Replay], session: Session) -> Page:
+def page(results: Mapping[str, replay.Replay], session: TypedCode) -> Page:
     """Equal or not, and what touched on the way."""
     first = next(iter(results.values()))
     nstep = len(first.contacts)

@@ -9,7 +9,7 @@ from ..comparison.text import count, millimetres
 from ..experiments import reset
 from ..page import Page, Question, Table, Text, Verdict
 from ._words import differences, emulation, page_of, sentence, typed, where
-from .session import Session
+from .session import TypedCode
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> reset.Reset:
@@ -33,7 +33,7 @@ for frame in model.keyframes[:1]:
 """
 
 
-def page(results: Mapping[str, reset.Reset], session: Session) -> Page:
+def page(results: Mapping[str, reset.Reset], session: TypedCode) -> Page:
     """What a reset takes back, and what the keyframes show."""
     first = next(iter(results.values()))
     blocks: list[Any] = [
@@ -87,7 +87,9 @@ def _question(first: reset.Reset) -> Question | None:
     )
 
 
-def _contacts(number: int, first: reset.Scene, scenes: Mapping[str, reset.Scene]) -> Table:
+def _contacts(
+    number: int, first: reset.KeyframeScene, scenes: Mapping[str, reset.KeyframeScene]
+) -> Table:
     pairs = dict.fromkeys(pair for scene in scenes.values() for pair in scene.contacts)
     rows = [
         (pair, *(count(scene.contacts.get(pair, 0), "contact") for scene in scenes.values()))

@@ -19,7 +19,7 @@ _NAME = "<lesson>"
 
 
 @dataclass(frozen=True)
-class Session:
+class TypedCode:
     """Code as one types it, for the first of the engines, and what it printed on each."""
 
     code: str
@@ -84,7 +84,7 @@ def page_of_lesson(lesson: Lesson, taken: Mapping[str, Taken]) -> Page:
     if others:  # each ran with its own name there
         both = ", then ".join(f'"{name}"' for name in others)
         code = code.replace(f'backend="{first}")', f'backend="{first}")  # then {both}')
-    session = Session(code, {name: each.printed for name, each in taken.items()})
+    session = TypedCode(code, {name: each.printed for name, each in taken.items()})
     return module(lesson.name).page({name: t.result for name, t in taken.items()}, session)
 
 

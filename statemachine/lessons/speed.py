@@ -10,7 +10,7 @@ from ..experiments import speed
 from ..experiments.in_turns import FEWEST, Ratio
 from ..page import Page, Question, Table, Text
 from ._words import differences, page_of, sentence, typed
-from .session import Session
+from .session import TypedCode
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> speed.Speed:
@@ -45,7 +45,7 @@ for name, seconds in (
 """
 
 
-def page(results: Mapping[str, speed.Speed], session: Session) -> Page:
+def page(results: Mapping[str, speed.Speed], session: TypedCode) -> Page:
     """Times and factors; they are this machine's, now."""
     first = next(iter(results.values()))
     blocks: list[Any] = [

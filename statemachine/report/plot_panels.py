@@ -44,7 +44,7 @@ class Panel:
 
 
 @dataclass(frozen=True, eq=False)
-class Touch:
+class TouchSpans:
     """When two bodies touch: spans of time [s] on each side."""
 
     name: str
@@ -52,7 +52,7 @@ class Touch:
 
 
 @dataclass(frozen=True, eq=False)
-class Figure:
+class Plot:
     """All of a figure.
 
     Attributes:
@@ -70,13 +70,13 @@ class Figure:
     lines: Sequence[str]
     labels: Sequence[str]
     panels: Sequence[Panel]
-    touches: Sequence[Touch]
+    touches: Sequence[TouchSpans]
     seconds: float
     part: float | None
     notes: Sequence[str]
 
 
-def of_comparison(one: Trace, two: Trace, comparison: Comparison, tip: str | None = None) -> Figure:
+def of_comparison(one: Trace, two: Trace, comparison: Comparison, tip: str | None = None) -> Plot:
     """The figure of two traces: fingertip first, then joints, bodies, energy, touches."""
     found = {agreement.name: agreement for agreement in comparison.agreements}
     curves = series(one, two, tip)
@@ -98,7 +98,7 @@ def of_comparison(one: Trace, two: Trace, comparison: Comparison, tip: str | Non
         notes.append(f"Grey line: they part at {short_time(first)}, first {few(names, 1)}.")
     if len(shown) > len(kept):
         notes.append(f"{len(shown) - len(kept)} further joints and bodies differ less.")
-    return Figure(
+    return Plot(
         title=one.header.experiment,
         lines=_origin(one, two),
         labels=side_labels(one, two),
@@ -110,7 +110,7 @@ def of_comparison(one: Trace, two: Trace, comparison: Comparison, tip: str | Non
     )
 
 
-def of_trace(trace: Trace) -> Figure:
+def of_trace(trace: Trace) -> Plot:
     """The figure of one trace: joints and what they were told, fingertip, energy, touches."""
     header, time = trace.header, trace.time - trace.time[0]
     told = {joint: k for k, joint in enumerate(header.actuator_jntid) if joint >= 0}
@@ -140,7 +140,7 @@ def of_trace(trace: Trace) -> Figure:
     notes = ["Dashed: the command."] if told else []
     if len(joints) > MOST:
         notes.append(f"{len(joints) - MOST} further joints are not shown.")
-    return Figure(
+    return Plot(
         title=header.experiment,
         lines=_origin(trace),
         labels=[header.label, "the command"] if told else [header.label],
@@ -191,7 +191,7 @@ def _worst_of(shown: list[Series], found: dict[str, Agreement]) -> list[Series]:
     return [curve for curve in shown if any(curve is one for one in kept)]
 
 
-def _touches(traces: Sequence[Trace], until: float) -> list[Touch]:
+def _touches(traces: Sequence[Trace], until: float) -> list[TouchSpans]:
     """Spans of each pair of bodies; those that touch first come first."""
     touching = [trace.touches() for trace in traces]
     found = []
@@ -203,7 +203,7 @@ def _touches(traces: Sequence[Trace], until: float) -> list[Touch]:
             for touch, trace in zip(touching, traces, strict=True)
         ]
         if any(spans):
-            found.append(Touch(pair, spans))
+            found.append(TouchSpans(pair, spans))
     found.sort(key=lambda touch: min(span[0] for side in touch.spans for span in side))
     return found[:_MOST_PAIRS]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ..compare.why import FACTORS, Attribution, Trial
+from ..compare.why import FACTORS, Attribution, FactorTrial
 from ..comparison.text import NONE, capital, percent, quantity, short_time
 from ..page import Page, Table, Text, Verdict
 from .why_words import ENOUGH, amount, astray, conclusion, shown, titles
@@ -106,14 +106,14 @@ def _alone(result: Attribution) -> Table:
     return Table(headers, rows, "One at a time: what happens to the gap", frozenset({0, 1}))
 
 
-def _brought(result: Attribution, trial: Trial) -> str:
+def _brought(result: Attribution, trial: FactorTrial) -> str:
     if trial.way == "parity":
         had = trial.had if trial.did == f"as {result.names[0]}" else trial.had[::-1]
         return f"{had[1]} → {had[0]}"
     return trial.did or NONE
 
 
-def _another(trial: Trial) -> bool:
+def _another(trial: FactorTrial) -> bool:
     """Whether one itself moves otherwise with it: then the gap is that of another motion."""
     return bool(trial.moved) and trial.worst is not None
 
@@ -176,7 +176,7 @@ def _ladder(result: Attribution) -> Table:
     )
 
 
-def _rung(trial: Trial) -> str:
+def _rung(trial: FactorTrial) -> str:
     if trial.explains is None and trial.worst:
         return trial.note
     return percent(trial.explains) + ("*" if _another(trial) else "")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..compare.why import FACTORS, Attribution, Trial
+from ..compare.why import FACTORS, Attribution, FactorTrial
 from ..comparison.text import listed, percent, quantity, short_time
 
 _WORTH = 0.005  # the least part of the gap that the conclusion speaks of
@@ -19,7 +19,7 @@ def amount(result: Attribution, value: float | None) -> str:
     return quantity(value, result.unit)
 
 
-def shown(result: Attribution, value: float | None, trial: Trial | None = None) -> str:
+def shown(result: Attribution, value: float | None, trial: FactorTrial | None = None) -> str:
     """A gap, marked where it is out of all proportion; not of a trial that moves one too."""
     own = trial is not None and bool(trial.moved)
     return amount(result, value) + ("!" if not own and astray(result, value) else "")
@@ -96,7 +96,7 @@ def conclusion(result: Attribution) -> list[str]:
     return found
 
 
-def _other_orders(result: Attribution, worth: Sequence[Trial]) -> list[str]:
+def _other_orders(result: Attribution, worth: Sequence[FactorTrial]) -> list[str]:
     """What settings explain if they come first or last, where that is another part."""
     alone = {trial.factor: trial for trial in result.alone}
     parts = []

@@ -45,7 +45,7 @@ _ROUNDING = 1e-12  # of poses that are equal but for the order of additions [m, 
 
 
 @dataclass(frozen=True)
-class Moment:
+class Origin:
     """The state that derived values belong to, as far as it is known.
 
     Attributes:
@@ -153,7 +153,7 @@ def readings(data: Data, copied: bool = False) -> Readings:
 
 
 def row(
-    model: Model, name: str, held: Array | Contacts, now: Array | Contacts, moment: Moment
+    model: Model, name: str, held: Array | Contacts, now: Array | Contacts, moment: Origin
 ) -> Row:
     """What is to be told of one array."""
     if same(held, now):
@@ -161,7 +161,7 @@ def row(
     return stale_row(model, name, moment, gaps(model, name, held, now))
 
 
-def stale_row(model: Model, name: str, moment: Moment, found: tuple[Gap, ...]) -> Row:
+def stale_row(model: Model, name: str, moment: Origin, found: tuple[Gap, ...]) -> Row:
     """What is to be told of an array that is not of now, and off by `found`."""
     if moment.never:
         return Row(name, False, None, None, "never computed", found)
@@ -177,7 +177,7 @@ def stale_row(model: Model, name: str, moment: Moment, found: tuple[Gap, ...]) -
     return Row(name, False, moment.steps, writes, of, found)
 
 
-def find(model: Model, state: State, held: Readings, now: Readings, scratch: Scratch) -> Moment:
+def find(model: Model, state: State, held: Readings, now: Readings, scratch: Scratch) -> Origin:
     """The moment that derived values belong to, from nothing but their values.
 
     Args:
@@ -188,25 +188,25 @@ def find(model: Model, state: State, held: Readings, now: Readings, scratch: Scr
         scratch: Where other states are tried.
     """
     if all(same(held[name], now[name]) for name in held):
-        return Moment(steps=0)
+        return Origin(steps=0)
     if not _array(held, "xquat").any():  # a rotation is never zero
-        return Moment(never=True)
+        return Origin(never=True)
     poses = np.hstack((_array(held, "xpos"), _array(held, "xquat")))
     lag = np.abs(np.hstack((_array(now, "xpos"), _array(now, "xquat"))) - poses).max(axis=1)
     if not lag.any():  # the poses, which alone can be retraced, are of now
-        return Moment()
+        return Origin()
     off = np.abs(scratch.one_step_back(state) - poses).max(axis=1)
     # Nearer than rounding makes them, and much nearer than those of now. One body is enough:
     # what else is not there was written since.
     moved = lag > 0
     there = moved & (off <= _ROUNDING * (1 + np.abs(poses).max())) & (off <= lag / 100)
     if not there.any():
-        return Moment()
+        return Origin()
 
     def names(chosen: Any) -> tuple[str, ...]:
         return tuple(model.body_names[b] or f"body {b}" for b in np.flatnonzero(chosen).tolist())
 
-    return Moment(
+    return Origin(
         steps=1,
         retraced=names(there),
         strays=names(moved & ~there),
@@ -247,7 +247,7 @@ def _engine_step(model: Model) -> float:
     return model.timestep / model.substeps
 
 
-def _notes(model: Model, rows: tuple[Row, ...], moment: Moment, touching: bool) -> Iterator[str]:
+def _notes(model: Model, rows: tuple[Row, ...], moment: Origin, touching: bool) -> Iterator[str]:
     behaviours = model.capabilities.behaviours
     stale = [each.name for each in rows if not each.now]
     untold = [name for name in DERIVED if name not in {each.name for each in rows}]
@@ -269,7 +269,7 @@ def _notes(model: Model, rows: tuple[Row, ...], moment: Moment, touching: bool) 
     yield "sm.forward(model, data) makes all of them of now."
 
 
-def _how(model: Model, moment: Moment, poses: bool) -> Iterator[str]:
+def _how(model: Model, moment: Origin, poses: bool) -> Iterator[str]:
     """How the moment was found, or what stood in the way."""
     if moment.retraced:
         exact = f"to {moment.within:.1e} m" if moment.within else "to the bit"

@@ -7,8 +7,8 @@
 
 from __future__ import annotations
 
-from .frames import Control, Frame, Pose, Separation
+from .frames import Control, EnginePose, Separation, Snapshot
 from .pace import Pacer
 from .session import Session
 
-__all__ = ["Control", "Frame", "Pacer", "Pose", "Separation", "Session"]
+__all__ = ["Control", "EnginePose", "Pacer", "Separation", "Session", "Snapshot"]

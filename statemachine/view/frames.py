@@ -33,7 +33,7 @@ class Control:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class EnginePose:
     """Where one engine has everything.
 
     Attributes:
@@ -66,7 +66,7 @@ class Separation:
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class Snapshot:
     """One moment.
 
     Attributes:
@@ -85,7 +85,7 @@ class Frame:
     running: bool
     ctrl: Array
     resets: int
-    poses: tuple[Pose, ...]
+    poses: tuple[EnginePose, ...]
     gap: Separation | None
     trouble: str
 
@@ -99,7 +99,7 @@ class SetCtrl:
 
 
 @dataclass(frozen=True)
-class Run:
+class Play:
     """Let time go on."""
 
 
@@ -116,7 +116,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Reset:
+class ResetTo:
     """To a keyframe by number, or to the default state."""
 
     keyframe: int | None = None
@@ -136,7 +136,7 @@ class SetSpeed:
     factor: float
 
 
-Command = SetCtrl | Run | Pause | Step | Reset | Seek | SetSpeed
+Command = SetCtrl | Play | Pause | Step | ResetTo | Seek | SetSpeed
 
 
 def controls_of(model: Model) -> tuple[Control, ...]:

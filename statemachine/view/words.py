@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from ..comparison.text import millimetres, position, short_time
-from .frames import Frame
-from .live import Pace
+from .frames import Snapshot
+from .live import Tempo
 
 
-def rows(frame: Frame, pace: Pace, tip: str) -> list[tuple[str, str]]:
+def rows(frame: Snapshot, pace: Tempo, tip: str) -> list[tuple[str, str]]:
     """The readout of one moment.
 
     Args:
@@ -35,7 +35,7 @@ def rows(frame: Frame, pace: Pace, tip: str) -> list[tuple[str, str]]:
     return found
 
 
-def _pace(frame: Frame, pace: Pace) -> str:
+def _pace(frame: Snapshot, pace: Tempo) -> str:
     if not frame.running:
         return "paused"
     if pace.reached is None:
@@ -46,7 +46,7 @@ def _pace(frame: Frame, pace: Pace) -> str:
     return text
 
 
-def warning(frame: Frame, note: str) -> str:
+def warning(frame: Snapshot, note: str) -> str:
     """What is wrong, or ""."""
     if frame.trouble:
         return f"{frame.trouble}. Reset to go on."

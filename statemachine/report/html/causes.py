@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...compare.why import Attribution, Trial
+from ...compare.why import Attribution, FactorTrial
 from ...comparison.text import capital, listed, percent
 from ..why_words import amount, conclusion
 from .finding import moves, title
@@ -112,27 +112,27 @@ def agreement_steps(found: Attribution) -> Html | None:
     return joined((first, tag("ol", *items) if items else "", tag("p", kept(what))))
 
 
-def _whose(found: Attribution, trial: Trial) -> str:
+def _whose(found: Attribution, trial: FactorTrial) -> str:
     one, two = found.names
     return two if trial.did == f"as {one}" else one
 
 
-def _left(found: Attribution, trial: Trial) -> str:
+def _left(found: Attribution, trial: FactorTrial) -> str:
     if trial.worst is None:
         return trial.note or "not known by itself"
     return amount(found, trial.worst)
 
 
-def _change(found: Attribution, trial: Trial) -> str:
+def _change(found: Attribution, trial: FactorTrial) -> str:
     had = trial.had if trial.did == f"as {found.names[0]}" else trial.had[::-1]
     return f"{had[1]} → {had[0]}"
 
 
-def _did(found: Attribution, trial: Trial) -> str:
+def _did(found: Attribution, trial: FactorTrial) -> str:
     return _change(found, trial) if trial.way == "parity" else trial.did or "–"
 
 
-def _star(found: Attribution, trials: Sequence[Trial]) -> list[Html]:
+def _star(found: Attribution, trials: Sequence[FactorTrial]) -> list[Html]:
     if not any(moves(trial) for trial in trials):
         return []
     text = (

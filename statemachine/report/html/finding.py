@@ -14,7 +14,7 @@ from ...comparison.text import capital, milliseconds, percent, quantity, short_t
 from .timeline import Event
 
 if TYPE_CHECKING:
-    from ...compare.why import Attribution, Trial
+    from ...compare.why import Attribution, FactorTrial
 
 MOTION = ("joint", "slide", "tip", "tip rotation", "body", "body rotation")
 _SOME = 0.1  # share of the gap from which on a factor is a cause
@@ -24,7 +24,7 @@ _MOVES = 0.1  # share by which a difference may change in the end and be called 
 
 
 @dataclass(frozen=True)
-class Finding:
+class Headline:
     """What the page begins with.
 
     Attributes:
@@ -44,7 +44,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Subject:
+class MainDifference:
     """The difference to speak of: its name, the largest value as text, and when [s]."""
 
     named: str
@@ -58,23 +58,23 @@ def headline(
     events: Sequence[Event],
     attribution: Attribution | None = None,
     curves: Sequence[Series] = (),
-) -> Finding:
+) -> Headline:
     """The largest difference, what explains it, and what is left of it in the end."""
     if comparison.agrees:
         if all(found.max == 0 for found in comparison.agreements):
-            return Finding("The two runs are the same in every figure that was compared")
-        return Finding(
+            return Headline("The two runs are the same in every figure that was compared")
+        return Headline(
             f"The two runs agree for {comparison.until:g} s: nothing leaves its tolerance"
         )
     of = subject(comparison, attribution)
     if all(found.verdict == "agrees" for found in comparison.agreements):
         sides = [side.label for side in (comparison.one, comparison.two) if side.ended]
-        return Finding(
+        return Headline(
             f"The two runs agree for {comparison.until:g} s, and {' and '.join(sides)} ended "
             "before its time"
         )
     if of is None:
-        return Finding("The two runs differ")
+        return Headline("The two runs differ")
     if of.found is not None and of.found.kind == "contact":
         found = of.found
         lead = f"{name_of(found.name)}: {found.note or of.far + ' apart'}"
@@ -84,7 +84,7 @@ def headline(
         if names[0] != names[1]:
             lead += f" on {names[0]} and {names[1]}"
         lead += f", at {short_time(of.at)}"
-    return Finding(
+    return Headline(
         capital("; ".join([lead, *_parting(comparison, events)])),
         _causes(attribution),
         _in_the_end(comparison, curves),
@@ -166,13 +166,15 @@ def _meets(what: str) -> str:
     return f"{one} touches {two}"
 
 
-def subject(comparison: Comparison, attribution: Attribution | None = None) -> Subject | None:
+def subject(
+    comparison: Comparison, attribution: Attribution | None = None
+) -> MainDifference | None:
     """The largest difference: that whose causes were looked for, else the leading one."""
     found = leading(comparison)
     if attribution is None or not attribution.alone:
         if found is None:
             return None
-        return Subject(named(found), quantity(found.max, found.unit), found.at, found)
+        return MainDifference(named(found), quantity(found.max, found.unit), found.at, found)
     from ..why_words import amount
 
     gap = attribution.first[attribution.quantity]
@@ -186,9 +188,9 @@ def subject(comparison: Comparison, attribution: Attribution | None = None) -> S
     ]
     far = amount(attribution, gap.worst)
     if same:
-        return Subject(named(same[0]), far, gap.at, same[0])
+        return MainDifference(named(same[0]), far, gap.at, same[0])
     who = f"one of the {attribution.quantity}" if kind else f"the {attribution.quantity}"
-    return Subject(who, far, gap.at, None)
+    return MainDifference(who, far, gap.at, None)
 
 
 def leading(comparison: Comparison) -> Agreement | None:
@@ -331,7 +333,7 @@ def _all(attribution: Attribution) -> str:
     return f"the {attribution.quantity} is"
 
 
-def moves(trial: Trial) -> bool:
+def moves(trial: FactorTrial) -> bool:
     """Whether it moves the first side itself, so that the gap is of another motion."""
     return bool(trial.moved and trial.worst is not None and trial.way != "none")
 

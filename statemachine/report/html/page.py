@@ -23,11 +23,11 @@ from .between import own_series, shown_series
 from .budget import Budget
 from .commanded import commanded
 from .curves import curves_section
-from .finding import Finding, headline, in_words, leading, subject
+from .finding import Headline, headline, in_words, leading, subject
 from .geometry import packed
 from .markup import Html, data_of, escaped, joined, kept, tag
 from .pressing import pressing_words
-from .scene import Look, scene_of
+from .scene import SideDrawing, scene_of
 from .sketch import sketch
 from .stage import quantity_data, stage
 from .timeline import events_of, frames_of
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 _SCRIPTS = ("gl.js", "scene.js", "page.js")
 LIMIT = 2_000_000  # bytes of a page
-_NO_LOOK = Look(None, "no model was given")
+_NO_LOOK = SideDrawing(None, "no model was given")
 
 
 def report(
@@ -45,7 +45,7 @@ def report(
     one: Trace,
     two: Trace,
     *,
-    looks: Sequence[Look] = (_NO_LOOK, _NO_LOOK),
+    looks: Sequence[SideDrawing] = (_NO_LOOK, _NO_LOOK),
     tip: str | None = None,
     attribution: Attribution | None = None,
     why_not: str = "",
@@ -98,7 +98,7 @@ def _report(
     one: Trace,
     two: Trace,
     *,
-    looks: Sequence[Look],
+    looks: Sequence[SideDrawing],
     tip: str | None,
     attribution: Attribution | None,
     why_not: str,
@@ -214,7 +214,7 @@ def _head(
     comparison: Comparison,
     one: Trace,
     labels: tuple[str, str],
-    finding: Finding,
+    finding: Headline,
     never: Sequence[str],
     words: Sequence[str],
     command: Html | None,
