@@ -146,13 +146,18 @@ def compare(
     common = common_moments(one, two)
     if "contact_row" in one and "contact_row" in two:
         found += _touches(one, two, float(common.time[-1]), tolerances)
+    strange = [
+        f"{each.name}: {each.note}, so it cannot agree"
+        for each in found
+        if each.note.startswith("no number")
+    ]
     return Comparison(
         one=_side(one),
         two=_side(two),
         moments=len(curves[0].time),
         until=float(curves[0].time[-1]),
         agreements=tuple(found),
-        notes=tuple(notes_on(one, two, common, found)),
+        notes=tuple(notes_on(one, two, common, strange)),
     )
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -12,9 +11,6 @@ from ..comparison.text import milliseconds, numbers, significant
 from ..interface import JointType
 from ..traces import Header, Trace
 from .series import tell
-
-if TYPE_CHECKING:
-    from .agreement import Agreement
 
 # Columns that are compared, and what a page calls them.
 _COMPARED = {
@@ -26,8 +22,15 @@ _COMPARED = {
 }
 
 
-def notes_on(one: Trace, two: Trace, common: Common, found: Sequence[Agreement]) -> Iterator[str]:
-    """A line for each thing that a reader of the figures must know."""
+def notes_on(one: Trace, two: Trace, common: Common, of_quantities: Iterable[str]) -> Iterator[str]:
+    """A line for each thing that a reader of the figures must know.
+
+    Args:
+        one: A trace.
+        two: The other.
+        common: The moments that they share.
+        of_quantities: What is to be said of single quantities.
+    """
     a, b = one.header, two.header
     if a.provenance.model_sha256 != b.provenance.model_sha256:
         yield (
@@ -36,9 +39,7 @@ def notes_on(one: Trace, two: Trace, common: Common, found: Sequence[Agreement])
         )
     yield from _of_joints(one, two)
     yield from _of_columns(one, two)
-    for each in found:
-        if each.note.startswith("no number"):
-            yield f"{each.name}: {each.note}, so it cannot agree"
+    yield from of_quantities
     if a.experiment != b.experiment:
         yield f"the experiments are two: {a.experiment} and {b.experiment}"
     yield from _of_time(one, two, common)

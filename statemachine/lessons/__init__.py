@@ -11,11 +11,9 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import Any, Protocol, cast
 
-if TYPE_CHECKING:
-    from ..page import Page
-    from .session import TypedCode
+from ..page import Page
 
 
 @dataclass(frozen=True)
@@ -44,6 +42,14 @@ class Lesson:
     model: str
     options: tuple[Option, ...] = ()
     station: bool = True  # of the path
+
+
+@dataclass(frozen=True)
+class TypedCode:
+    """Code as one types it, for the first of the engines, and what it printed on each."""
+
+    code: str
+    printed: Mapping[str, str]
 
 
 class Module(Protocol):

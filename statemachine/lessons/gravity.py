@@ -11,9 +11,9 @@ from ..comparison import largest
 from ..comparison.text import apart, position, short_time, signed
 from ..experiments import gravity
 from ..page import Page, Question, Table, Text, Verdict
+from . import TypedCode
 from ._fall import longer, longer_apart
 from ._words import differences, emulation, page_of, typed, where
-from .session import TypedCode
 
 _PARTS = (
     ("gravity (−bias)", "bias"),

@@ -8,8 +8,8 @@ from typing import Any
 from ..comparison.text import count, duration
 from ..experiments import objects
 from ..page import Page, Question, Table, Text, Verdict
+from . import TypedCode
 from ._words import WORDS, differences, page_of, sentence, typed, where
-from .session import TypedCode
 
 _CHEAP = 5  # times; a Data that is not cheaper than that is no bargain
 

@@ -8,8 +8,8 @@ from typing import Any
 from ..comparison.text import count, degrees, duration, millimetres
 from ..experiments import questions
 from ..page import Page, Question, Text, Verdict
+from . import TypedCode
 from ._words import page_of, where
-from .session import TypedCode
 
 _Results = Mapping[str, questions.Answers]
 # What is asked, what the run says, and whether that bears out the right choice.

@@ -8,8 +8,8 @@ from typing import Any
 from ..comparison.text import count, millimetres
 from ..experiments import reset
 from ..page import Page, Question, Table, Text, Verdict
+from . import TypedCode
 from ._words import differences, emulation, page_of, sentence, typed, where
-from .session import TypedCode
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> reset.Reset:

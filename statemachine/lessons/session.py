@@ -13,17 +13,9 @@ from ..backends import backend_engine
 from ..interface import Model
 from ..page import Page
 from ..probes.calls import Recording, record
-from . import Lesson, module
+from . import Lesson, TypedCode, module
 
 _NAME = "<lesson>"
-
-
-@dataclass(frozen=True)
-class TypedCode:
-    """Code as one types it, for the first of the engines, and what it printed on each."""
-
-    code: str
-    printed: Mapping[str, str]
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from ..comparison.text import capital, count, duration
 from ..experiments import speed
 from ..experiments.in_turns import FEWEST, Ratio
 from ..page import Page, Question, Table, Text
+from . import TypedCode
 from ._words import differences, page_of, sentence, typed
-from .session import TypedCode
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> speed.Speed:

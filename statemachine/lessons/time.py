@@ -9,8 +9,8 @@ from ..comparison.text import count, duration
 from ..errors import BadInputError
 from ..experiments import pace
 from ..page import Page, Question, Table, Text, Verdict
+from . import TypedCode
 from ._words import page_of, typed, where
-from .session import TypedCode
 
 _BEFORE = "A simulation, a pause of the program, and the time on the simulator's own clock."
 _BRIEF, _WATCHED = 0.5, 4.0  # simulated seconds, without and with --realtime

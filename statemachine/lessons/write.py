@@ -8,8 +8,8 @@ from typing import Any
 from ..comparison.text import count, position
 from ..experiments import write
 from ..page import Page, Question, Table, Text, Verdict
+from . import TypedCode
 from ._words import emulation, page_of, sentence, typed, where
-from .session import TypedCode
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> write.Write:

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...compare import Agreement, Comparison, Series
 from ...compare.agreement import SETTLED
+from ...compare.why import FACTORS, Attribution, FactorTrial
 from ...comparison.text import capital, milliseconds, percent, quantity, short_time, significant
+from ..why_words import amount
 from .timeline import Event
-
-if TYPE_CHECKING:
-    from ...compare.why import Attribution, FactorTrial
 
 MOTION = ("joint", "slide", "tip", "tip rotation", "body", "body rotation")
 _SOME = 0.1  # share of the gap from which on a factor is a cause
@@ -175,8 +173,6 @@ def subject(
         if found is None:
             return None
         return MainDifference(named(found), quantity(found.max, found.unit), found.at, found)
-    from ..why_words import amount
-
     gap = attribution.first[attribution.quantity]
     kinds = {"joints": "joint", "slides": "slide"}
     kind = kinds.get(attribution.quantity)
@@ -297,8 +293,6 @@ def _causes(attribution: Attribution | None) -> tuple[str, ...]:
     """What takes the largest difference away, of the ladder; what is a proof comes first."""
     if attribution is None or not attribution.alone:
         return ()
-    from ..why_words import amount
-
     counted = [trial for trial in attribution.ladder if trial.explains is not None]
     if max((trial.explains or 0.0 for trial in counted), default=0.0) < _SOME:
         return ("None of the factors that were tried explains a tenth of it.",)
@@ -340,6 +334,4 @@ def moves(trial: FactorTrial) -> bool:
 
 def title(factor: str) -> str:
     """A factor in words."""
-    from ...compare.why import FACTORS
-
     return FACTORS[factor].title if factor in FACTORS else factor

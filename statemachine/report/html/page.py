@@ -7,13 +7,14 @@ import hashlib
 import re
 from collections.abc import Mapping, Sequence
 from importlib import resources
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ... import __version__
 from ...compare import Comparison, Series, Witness, default_tip, series
 from ...compare.series import NORMAL, total_forces
+from ...compare.why import Attribution
 from ...comparison import same_pairs
 from ...comparison.text import figure, sentence
 from ...page import Page, Verdict
@@ -21,6 +22,7 @@ from ...traces import Trace
 from . import sections
 from .between import own_series, shown_series
 from .budget import Budget
+from .causes import agreement_steps, causes_section
 from .commanded import commanded
 from .curves import curves_section
 from .finding import Headline, headline, in_words, leading, subject
@@ -31,9 +33,6 @@ from .scene import SideDrawing, scene_of
 from .sketch import sketch
 from .stage import quantity_data, stage
 from .timeline import events_of, frames_of
-
-if TYPE_CHECKING:
-    from ...compare.why import Attribution
 
 _SCRIPTS = ("gl.js", "scene.js", "page.js")
 LIMIT = 2_000_000  # bytes of a page
@@ -142,8 +141,6 @@ def _report(
         stage(comparison, drawn, events, frames, start, labels, still, site, scene.strongest),
     ]
     if attribution is not None:
-        from .causes import agreement_steps, causes_section
-
         parts.append(_section("why", "What causes it", causes_section(attribution)))
         steps = agreement_steps(attribution)
     elif why_not:

@@ -1,0 +1,100 @@
+"""`freshness`: how stale a Data is, found afterwards from its values alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import nullcontext
+from typing import cast
+
+from ..comparison.text import few, milliseconds
+from ..interface import DERIVED, POSES, Contacts, Data, Model, get_state
+from .look import Origin, Scratch, engine_step, find, readings, row
+from .result import Freshness, Row
+from .watch import Watch
+
+_REMEMBERED = {"contacts", "qacc", "qfrc_constraint", "qfrc_contact"}
+
+
+def freshness(model: Model, data: Data) -> Freshness:
+    """Of which moment is each derived array of `data`, and how wrong is it by now?
+
+    It needs no preparation and changes nothing: what the arrays would be now is computed in
+    another Data. An array is of now if `forward` would leave every number of it as it is.
+    Otherwise it is one step old if its poses are those of qpos − h·qvel; how many writes ago
+    only `watch_freshness` can tell.
+
+    Args:
+        model: The Model that made `data`.
+        data: Read, and not touched.
+
+    Raises:
+        ForeignDataError: `data` was made by another Model.
+        BadInputError: An input is not finite.
+        DivergedError: The Data diverged earlier.
+        ClosedDataError: `data` is closed.
+    """
+    state = get_state(model, data)
+    watch: Watch | None = getattr(type(data), "_watch", None)
+    with nullcontext() if watch is None else watch.aside():
+        held = readings(data)
+    if watch is not None:
+        now, moment = watch.now(state), watch.moment()
+    else:
+        scratch = Scratch(model)
+        try:
+            now = scratch.now(state)
+            moment = find(model, state, held, now, scratch)
+        finally:
+            scratch.close()
+    touching = any(len(cast("Contacts", found["contacts"])) for found in (held, now))
+    rows = tuple(row(model, name, held[name], now[name], moment) for name in held)
+    return Freshness(
+        backend=model.backend,
+        engine_version=model.engine_version,
+        model=model.path.stem,
+        time=state.time,
+        rows=rows,
+        written=moment.written,
+        notes=tuple(_notes(model, rows, moment, touching)),
+    )
+
+
+def _notes(model: Model, rows: tuple[Row, ...], moment: Origin, touching: bool) -> Iterator[str]:
+    behaviours = model.capabilities.behaviours
+    stale = [each.name for each in rows if not each.now]
+    untold = [name for name in DERIVED if name not in {each.name for each in rows}]
+    if untold:
+        yield f"This backend does not tell: {', '.join(untold)}."
+    if not stale:
+        yield "All are of now."
+        return
+    yield from _how(model, moment, not set(POSES).isdisjoint(stale))
+    if moment.written:
+        yield f"Written since: {', '.join(moment.written)}."
+    if behaviours["stale after a step"].support == "unsupported":
+        yield f"After a step: {behaviours['stale after a step'].note}."
+    if touching and not model.capabilities.exact_restore and not _REMEMBERED.isdisjoint(stale):
+        yield (
+            "In contacts, and the forces and accelerations of what touches, not all of the "
+            f"difference need be age: {behaviours['exact restore'].note}."
+        )
+    yield "sm.forward(model, data) makes all of them of now."
+
+
+def _how(model: Model, moment: Origin, poses: bool) -> Iterator[str]:
+    """How the moment was found, or what stood in the way."""
+    if moment.retraced:
+        exact = f"to {moment.within:.1e} m" if moment.within else "to the bit"
+        yield (
+            f"Found by going back: qpos − h·qvel, h = {milliseconds(engine_step(model))}, gives "
+            f"the poses of {few(moment.retraced)}, {exact}."
+        )
+        if moment.strays:
+            yield (
+                f"Not so {few(moment.strays)}: qpos or qvel was written since, or the engine "
+                "integrates otherwise."
+            )
+    elif not moment.never and moment.steps is None:
+        if poses:
+            yield "Going back one step, to qpos − h·qvel, does not lead to these poses."
+        yield "Writes are not recorded, unless sm.watch_freshness(model, data) does."
