@@ -25,7 +25,7 @@ from statemachine.audit import apart, elsewhere, falls, look, repeat, restore
 from statemachine.audit.conclusions import conclude
 from statemachine.audit.drivers import Driver, Run, drivers
 from statemachine.audit.drivers.mujoco_driver import MujocoDriver
-from statemachine.audit.findings import Divergence, Finding, Layout, gap
+from statemachine.audit.findings import Finding, Gap, Layout, gap
 from statemachine.audit.points import points
 from statemachine.backends import mujoco_backend
 from statemachine.backends.mujoco_backend import MujocoData
@@ -50,7 +50,7 @@ def test_what_is_compared_are_bytes() -> None:
     other = zero.copy()
     assert gap(zero, other, HINGE).exact
     other[2, 1] = -0.0
-    assert gap(zero, other, HINGE) == Divergence(3, 2, 0.0, 0.0)
+    assert gap(zero, other, HINGE) == Gap(3, 2, 0.0, 0.0)
     other[2, 1] = 5e-324  # the last bit
     assert gap(zero, other, HINGE).first == 2
     lost = np.full((4, 2), math.nan)
@@ -61,7 +61,7 @@ def test_what_is_compared_are_bytes() -> None:
 def test_the_first_row_is_before_any_step() -> None:
     one, other = np.zeros((3, 2)), np.ones((3, 2))
     assert gap(one, other, HINGE).first == 0
-    assert gap(one, other, HINGE, np.array([0, 7, 8])) == Divergence(8, 0, 1.0, 0.0)
+    assert gap(one, other, HINGE, np.array([0, 7, 8])) == Gap(8, 0, 1.0, 0.0)
     other[0] = 0
     assert gap(one, other, HINGE, np.array([0, 7, 8])).first == 7
 
@@ -605,7 +605,7 @@ def test_conclusions_follow_from_findings(of_mujoco: audit.Audit) -> None:
 
     def without_warm_start(each: Finding) -> Finding:
         if each.case == "warmstart":
-            return dataclasses.replace(each, gap=Divergence(each.gap.steps, None, 0.0, 0.0))
+            return dataclasses.replace(each, gap=Gap(each.gap.steps, None, 0.0, 0.0))
         return each
 
     changed = [without_warm_start(each) for each in engine.findings]

@@ -37,7 +37,7 @@ from statemachine.view.frames import (
 from statemachine.view.live import Live, Tempo
 from statemachine.view.pace import Pacer
 from statemachine.view.recording import TraceSession
-from statemachine.view.session import Session
+from statemachine.view.session import LiveSession
 
 from .conftest import ROOT, Cli, need_engine
 
@@ -68,8 +68,8 @@ def odd(tmp_path: Path) -> sm.Model:
 
 
 @pytest.fixture
-def session(backend: str) -> Iterator[Session]:
-    with Session([sm.load(SCENE, backend=backend)], "held") as made:
+def session(backend: str) -> Iterator[LiveSession]:
+    with LiveSession([sm.load(SCENE, backend=backend)], "held") as made:
         yield made
 
 
@@ -79,7 +79,7 @@ def session(backend: str) -> Iterator[Session]:
 def test_a_session_is_the_plain_loop_and_looking_changes_nothing(backend: str) -> None:
     """Bit by bit, with the box in the jaws, seen after every step and never."""
     model = sm.load(SCENE, backend=backend)
-    with sm.make_data(model) as plain, Session([model], "held") as session:
+    with sm.make_data(model) as plain, LiveSession([model], "held") as session:
         sm.reset(model, plain, "held")
         frame = session.frame()
         for k in range(150):
@@ -101,7 +101,7 @@ def test_a_session_is_the_plain_loop_and_looking_changes_nothing(backend: str) -
         assert (frame.time, frame.steps) == (plain.time, 150)
 
 
-def test_a_frame_is_a_copy(session: Session) -> None:
+def test_a_frame_is_a_copy(session: LiveSession) -> None:
     frame = session.frame()
     before = frame.poses[0].xpos.copy(), frame.ctrl.copy()
     session.apply(SetCtrl(0, 1.0))
@@ -111,7 +111,7 @@ def test_a_frame_is_a_copy(session: Session) -> None:
     np.testing.assert_array_equal(frame.ctrl, before[1])
 
 
-def test_commands_do_what_they_say(session: Session) -> None:
+def test_commands_do_what_they_say(session: LiveSession) -> None:
     start = session.frame()
     assert not start.running
     assert session.places == ("held", "pickup")
@@ -148,7 +148,7 @@ def test_commands_do_what_they_say(session: Session) -> None:
     ],
 )
 def test_what_cannot_be_done_is_refused_and_changes_nothing(command: Command) -> None:
-    with Session([sm.load(SCENE)], "held") as session:
+    with LiveSession([sm.load(SCENE)], "held") as session:
         session.apply(Play())
         before = session.frame()
         with pytest.raises(BadInputError):
@@ -161,7 +161,7 @@ def test_what_cannot_be_done_is_refused_and_changes_nothing(command: Command) ->
 def test_the_ghost_gets_the_same_commands_at_the_same_steps() -> None:
     need_engine("pybullet")
     models = [sm.load(SCENE, backend=name) for name in ("mujoco", "pybullet")]
-    with Session(models) as session:
+    with LiveSession(models) as session:
         session.apply(SetCtrl(1, -0.6))
         session.apply(SetCtrl(2, 1.2))
         session.advance(300)
@@ -187,7 +187,7 @@ def test_the_ghost_gets_the_same_commands_at_the_same_steps() -> None:
 
 def test_a_ghost_that_falls_is_far_away() -> None:
     model = sm.load("so101/scene")
-    with Session([model, model.replace(actuation=False)]) as session:
+    with LiveSession([model, model.replace(actuation=False)]) as session:
         session.advance(200)
         gap = session.frame().gap
         assert gap is not None
@@ -199,7 +199,7 @@ def test_a_ghost_that_falls_is_far_away() -> None:
 
 
 def test_a_divergence_pauses_and_a_reset_recovers(odd: sm.Model) -> None:
-    with Session([odd, odd]) as session:
+    with LiveSession([odd, odd]) as session:
         session.advance(3)
         good = session.frame()
         session.apply(Play())
@@ -226,7 +226,7 @@ def test_a_divergence_pauses_and_a_reset_recovers(odd: sm.Model) -> None:
 def test_a_divergence_on_the_ghost_alone_stops_both() -> None:
     need_engine("pybullet")
     models = [sm.load("so101/scene", backend=name) for name in ("mujoco", "pybullet")]
-    with Session(models) as session:
+    with LiveSession(models) as session:
         session._arms[1][1].qvel[0] = math.nan
         session.apply(Play())
         session.advance()
@@ -240,13 +240,13 @@ def test_a_divergence_on_the_ghost_alone_stops_both() -> None:
 def test_a_session_refuses_what_does_not_fit(odd: sm.Model) -> None:
     scene = sm.load("so101/scene")
     with pytest.raises(BadInputError, match="another model"):
-        Session([scene, odd])
+        LiveSession([scene, odd])
     with pytest.raises(BadInputError, match="timesteps differ"):
-        Session([scene, scene.replace(timestep=0.001)])
+        LiveSession([scene, scene.replace(timestep=0.001)])
     with pytest.raises(UnknownNameError, match="hled"):
-        Session([sm.load(SCENE)], "hled")
+        LiveSession([sm.load(SCENE)], "hled")
     with pytest.raises(UnknownNameError):
-        Session([scene], site="nose")
+        LiveSession([scene], site="nose")
 
 
 def test_sliders_speak_degrees_where_an_angle_is_asked_for(odd: sm.Model) -> None:
@@ -336,7 +336,7 @@ class Hand:
         self.shown.append((frame, pace, note))
 
 
-class Slow(Session):
+class Slow(LiveSession):
     """A session whose every step costs some time of a clock."""
 
     def __init__(self, clock: Clock, cost: float) -> None:

@@ -21,7 +21,7 @@ from statemachine.view.door import Door
 from statemachine.view.frames import Pause, Play, ResetTo, SetCtrl
 from statemachine.view.live import Live, Tempo
 from statemachine.view.recording import TraceSession
-from statemachine.view.session import Session
+from statemachine.view.session import LiveSession
 from statemachine.view.viser_front import ViserFront, _page, thinner
 
 from .browser import Tab, browser, tabs
@@ -48,7 +48,7 @@ def _serve(door: Door) -> Any:
 class Stage:
     """A session on a page, with tabs before it; time passes only in `until`."""
 
-    def __init__(self, session: Session, model: sm.Model, new_tab: Callable[[], Tab]) -> None:
+    def __init__(self, session: LiveSession, model: sm.Model, new_tab: Callable[[], Tab]) -> None:
         self.session, self.new_tab = session, new_tab
         self.door = Door("127.0.0.1")
         self.server = _serve(self.door)
@@ -95,7 +95,10 @@ class Stage:
 def stage() -> Iterator[Stage]:
     """The arm, and as its ghost the arm without its servos, which falls."""
     model = sm.load("so101/scene")
-    with tabs(1000, 640) as new_tab, Session([model, model.replace(actuation=False)]) as session:
+    with (
+        tabs(1000, 640) as new_tab,
+        LiveSession([model, model.replace(actuation=False)]) as session,
+    ):
         made = Stage(session, model, new_tab)
         yield made
         serving.stop(made.server)
@@ -110,7 +113,7 @@ def _colours(tab: Tab) -> tuple[int, int]:
     return int(((r > 150) & (r - b > 80)).sum()), int(((b > 150) & (b - r > 80)).sum())
 
 
-def _ctrl(session: Session) -> np.ndarray:
+def _ctrl(session: LiveSession) -> np.ndarray:
     return session.frame().ctrl
 
 
@@ -273,7 +276,7 @@ def test_the_page_is_told_where_every_body_is_on_each_engine() -> None:
     need_engine("pybullet")
     models = [sm.load("so101/scene_box", backend=name) for name in ("mujoco", "pybullet")]
     drawing = drawing_of(models[0])
-    with Session(models, "held") as session:
+    with LiveSession(models, "held") as session:
         session.apply(SetCtrl(0, 0.7))
         session.advance(100)
         server = _serve(Door("127.0.0.1"))

@@ -8,11 +8,11 @@ from pathlib import Path
 
 from .drivers import drivers
 from .drivers.interface_driver import InterfaceDriver
-from .elsewhere import Job, JobResult, Traces
+from .elsewhere import Answer, Job, Traces
 from .points import points
 
 
-def answer(job: Job) -> JobResult:
+def answer(job: Job) -> Answer:
     """All runs from the start, and a future of each State."""
     runs: Traces = {}
     futures = {}
@@ -26,7 +26,7 @@ def answer(job: Job) -> JobResult:
             runs[driver.layer, name] = driver.run(point, job.steps).future
             if isinstance(driver, InterfaceDriver):
                 futures[name] = driver.future(point, job.states[name], job.steps)
-    return JobResult(runs, futures)
+    return Answer(runs, futures)
 
 
 def main(asked: str, answered: str) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from .drivers import ONLY
-from .findings import EACH_OTHER, Divergence, Finding, worst
+from .findings import EACH_OTHER, Finding, Gap, worst
 from .restore import FORGETS, ITSELF, NO_CONTACTS, NOT_RESTORED, RESTORE, WITHOUT
 
 _NEARLY = 1e-6  # of a difference: what is left of it is rounding
@@ -26,7 +26,7 @@ class Missing:
     field: str
     points: tuple[str, ...]
     itself: tuple[str, ...]
-    gap: Divergence
+    gap: Gap
 
 
 @dataclass(frozen=True)
@@ -48,13 +48,13 @@ class Conclusion:
     """
 
     suffice: tuple[str, ...]
-    fail: dict[str, Divergence]
+    fail: dict[str, Gap]
     agree: tuple[str, ...]
     missing: tuple[Missing, ...]
     idle: tuple[str, ...]
     smallest: bool | None
     forgotten: dict[str, tuple[str, ...]]
-    touching: dict[str, tuple[Divergence, Divergence]]
+    touching: dict[str, tuple[Gap, Gap]]
     not_read_back: dict[str, tuple[str, ...]]
 
     @property
@@ -121,7 +121,7 @@ def _forgotten(findings: Iterable[Finding]) -> dict[str, tuple[str, ...]]:
     return {way: tuple(of) for way, of in found.items()}
 
 
-def _touching(findings: Sequence[Finding]) -> dict[str, tuple[Divergence, Divergence]]:
+def _touching(findings: Sequence[Finding]) -> dict[str, tuple[Gap, Gap]]:
     found = {}
     for off in findings:
         if off.experiment == NO_CONTACTS:

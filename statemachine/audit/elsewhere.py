@@ -35,14 +35,14 @@ class Job:
 
 
 @dataclass(frozen=True)
-class JobResult:
+class Answer:
     """What it did: runs from the start, and futures of the States by point."""
 
     runs: Traces
     futures: dict[str, Array]
 
 
-def run(job: Job) -> JobResult:
+def run(job: Job) -> Answer:
     """Do a job in a fresh Python, whose strings hash otherwise; nothing of it is left.
 
     Raises:
@@ -75,7 +75,7 @@ def run(job: Job) -> JobResult:
         return pickle.loads(answered.read_bytes())
 
 
-def findings(answer: JobResult, driver: Driver, runs: Sequence[Run]) -> Iterator[Finding]:
+def findings(answer: Answer, driver: Driver, runs: Sequence[Run]) -> Iterator[Finding]:
     """The other process's runs against those of this one."""
     for run in runs:
         off = driver.gap(run, answer.runs[driver.layer, run.point.name])
@@ -83,7 +83,7 @@ def findings(answer: JobResult, driver: Driver, runs: Sequence[Run]) -> Iterator
 
 
 def pickled(
-    answer: JobResult, driver: InterfaceDriver, runs: Sequence[Run], states: dict[str, State]
+    answer: Answer, driver: InterfaceDriver, runs: Sequence[Run], states: dict[str, State]
 ) -> Iterator[Finding]:
     """The future of a State that was pickled to another process, against its future here."""
     for run in runs:

@@ -50,7 +50,7 @@ def layout_of(model: Model) -> Layout:
 
 
 @dataclass(frozen=True)
-class Divergence:
+class Gap:
     """How far two futures are apart.
 
     Attributes:
@@ -77,7 +77,7 @@ class Divergence:
         return max(self.angle, self.length)
 
 
-def gap(one: Array, other: Array, layout: Layout, counts: Ints | None = None) -> Divergence:
+def gap(one: Array, other: Array, layout: Layout, counts: Ints | None = None) -> Gap:
     """The gap between two futures.
 
     Args:
@@ -93,7 +93,7 @@ def gap(one: Array, other: Array, layout: Layout, counts: Ints | None = None) ->
     ).any(axis=1)
     steps = int(rows[-1])
     if not differs.any():
-        return Divergence(steps, None, 0.0, 0.0)
+        return Gap(steps, None, 0.0, 0.0)
     off = np.abs(one - other)
     angles = [float(off[:, layout.angles].max(initial=0.0))]
     for start in layout.quats:
@@ -102,13 +102,13 @@ def gap(one: Array, other: Array, layout: Layout, counts: Ints | None = None) ->
         chord = np.minimum(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
         angles.append(float(4 * np.arcsin(np.minimum(chord / 2, 1.0)).max()))
     length = float(off[:, layout.lengths].max(initial=0.0))
-    return Divergence(steps, int(rows[np.argmax(differs)]), _worst(angles), _worst([length]))
+    return Gap(steps, int(rows[np.argmax(differs)]), _worst(angles), _worst([length]))
 
 
-def worst(gaps: list[Divergence]) -> Divergence:
+def worst(gaps: list[Gap]) -> Gap:
     """The earliest difference and the largest, of several gaps over the same steps."""
     firsts = [each.first for each in gaps if each.first is not None]
-    return Divergence(
+    return Gap(
         gaps[0].steps,
         min(firsts, default=None),
         _worst([each.angle for each in gaps]),
@@ -142,7 +142,7 @@ class Finding:
     case: str
     into: str
     promised: bool
-    gap: Divergence
+    gap: Gap
 
     @property
     def verdict(self) -> str:

@@ -78,14 +78,14 @@ def _simulate(options: argparse.Namespace, port: int) -> int:
     """A session on one engine or two."""
     from ..backends import load
     from ..drawing import drawing_of
-    from ..view.session import Session
+    from ..view.session import LiveSession
 
     name = options.model or _MODEL
     backends = [options.backend, *([options.ghost] if options.ghost else [])]
     models = [load(name, backend=backend, menagerie=options.menagerie) for backend in backends]
     keyframe = _keyframe(options.keyframe, models[0])
     engines = " and ".join(f"{model.backend} {model.engine_version}" for model in models)
-    with Session(models, keyframe, options.site) as session:
+    with LiveSession(models, keyframe, options.site) as session:
         _serve(options, session, drawing_of(models[0]), keyframe, port, f"{name} on {engines}")
     return 0
 

@@ -14,7 +14,7 @@ class Answers:
     """What each question is answered by."""
 
     forward: forward.Forward
-    state: state.StateLayout
+    state: state.Layout
     replay: replay.Replay
     gravity: gravity.Gravity
     objects: objects.Objects

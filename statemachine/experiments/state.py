@@ -10,7 +10,7 @@ from ._common import Provenance, provenance
 
 
 @dataclass(frozen=True)
-class JointSlots:
+class Joint:
     """One joint's slots: qpos[qpos_start:qpos_stop] and qvel[qvel_start:qvel_stop]."""
 
     name: str
@@ -22,7 +22,7 @@ class JointSlots:
 
 
 @dataclass(frozen=True)
-class StateLayout:
+class Layout:
     """Sizes and addresses of a model's state.
 
     Attributes:
@@ -36,7 +36,7 @@ class StateLayout:
     nv: int
     nu: int
     nbody: int
-    joints: tuple[JointSlots, ...]
+    joints: tuple[Joint, ...]
     fresh_time: float
     keyframe: str | None
     keyframe_time: float | None
@@ -44,7 +44,7 @@ class StateLayout:
     provenance: Provenance
 
 
-def run(model: Model) -> StateLayout:
+def run(model: Model) -> Layout:
     """Read the layout off a Model, and the time off a Data at keyframe 0."""
     joints = []
     for name, kind, place, dof in zip(
@@ -52,7 +52,7 @@ def run(model: Model) -> StateLayout:
     ):
         known = JointType(int(kind))
         joints.append(
-            JointSlots(
+            Joint(
                 name=name,
                 type=known.name.lower(),
                 qpos_start=int(place),
@@ -67,7 +67,7 @@ def run(model: Model) -> StateLayout:
         if model.keyframes:
             reset(model, data, keyframe=0)
             name, time = model.keyframes[0].name, data.time
-    return StateLayout(
+    return Layout(
         nq=model.nq,
         nv=model.nv,
         nu=model.nu,

@@ -11,9 +11,11 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
-from ..page import Page
+if TYPE_CHECKING:
+    from ..page import Page
+    from .session import Session
 
 
 @dataclass(frozen=True)
@@ -44,14 +46,6 @@ class Lesson:
     station: bool = True  # of the path
 
 
-@dataclass(frozen=True)
-class TypedCode:
-    """Code as one types it, for the first of the engines, and what it printed on each."""
-
-    code: str
-    printed: Mapping[str, str]
-
-
 class Module(Protocol):
     """What a lesson's module offers."""
 
@@ -63,7 +57,7 @@ class Module(Protocol):
         """The code as a student would type it; `load` is the call that loads the model."""
         ...
 
-    def page(self, results: Mapping[str, Any], session: TypedCode) -> Page:
+    def page(self, results: Mapping[str, Any], session: Session) -> Page:
         """Say what the results, by backend, mean; `session` is the code and what it printed."""
         ...
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..comparison.text import capital, milliseconds
 from ..page import Code, Page, Printed, Question, Table, Text
-from . import TypedCode
+from .session import Session
 
 WORDS = (
     "A few words first. A model file says what a robot is made of. A body is a rigid piece of "
@@ -32,7 +32,7 @@ def page_of(title: str, results: Mapping[str, Any], blocks: Sequence[Any]) -> Pa
     return Page(title, origin(results), list(blocks))
 
 
-def typed(session: TypedCode, question: Question | None = None) -> list[Code | Question | Printed]:
+def typed(session: Session, question: Question | None = None) -> list[Code | Question | Printed]:
     """The code of a lesson, a prediction, and what it printed."""
     code = Code(session.code.splitlines())
     return [code, *([question] if question else []), Printed(session.printed)]

@@ -10,8 +10,8 @@ from ..comparison import largest
 from ..comparison.text import count, millimetres, short_time, vector
 from ..experiments import forward
 from ..page import Page, Pipeline, Question, Table, Text, Traces, Verdict
-from . import TypedCode
 from ._words import differences, emulation, itself, page_of, sentence, typed, where
+from .session import Session
 
 _WHEN = ("before it", "after it")
 _MOMENTS = ("xpos", "site_xpos", "contacts", "qacc")  # shown of what a step leaves behind
@@ -48,7 +48,7 @@ print(4, data.site_xpos[tip].round(4))
 """
 
 
-def page(results: Mapping[str, forward.Forward], session: TypedCode) -> Page:
+def page(results: Mapping[str, forward.Forward], session: Session) -> Page:
     """The readings, which are equal, what each call changes, and of which moment it is."""
     first = next(iter(results.values()))
     blocks: list[Any] = [

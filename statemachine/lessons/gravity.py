@@ -11,9 +11,9 @@ from ..comparison import largest
 from ..comparison.text import apart, position, short_time, signed
 from ..experiments import gravity
 from ..page import Page, Question, Table, Text, Verdict
-from . import TypedCode
 from ._fall import longer, longer_apart
 from ._words import differences, emulation, page_of, typed, where
+from .session import Session
 
 _PARTS = (
     ("gravity (−bias)", "bias"),
@@ -59,7 +59,7 @@ for each in (model, limp):
 """
 
 
-def page(results: Mapping[str, gravity.Gravity], session: TypedCode) -> Page:
+def page(results: Mapping[str, gravity.Gravity], session: Session) -> Page:
     """The table of the course, and the balance of forces at its end."""
     first = next(iter(results.values()))
     columns = {

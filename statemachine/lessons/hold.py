@@ -12,8 +12,8 @@ from ..comparison.text import apart, position, short_time
 from ..experiments import hold
 from ..interface import Array
 from ..page import Page, Question, Table, Text, Traces
-from . import TypedCode
 from ._words import differences, page_of, typed, where
+from .session import Session
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
 _THERE = np.radians(0.1)  # rad, or m
@@ -45,7 +45,7 @@ for _ in range(4):
 """
 
 
-def page(results: Mapping[str, hold.Hold], session: TypedCode) -> Page:
+def page(results: Mapping[str, hold.Hold], session: Session) -> Page:
     """Error over time, pose at the end, what is in the way."""
     first = next(iter(results.values()))
     end = float(first.time[-1])

@@ -8,8 +8,8 @@ from typing import Any
 from ..comparison.text import count, duration
 from ..experiments import objects
 from ..page import Page, Question, Table, Text, Verdict
-from . import TypedCode
 from ._words import WORDS, differences, page_of, sentence, typed, where
+from .session import Session
 
 _CHEAP = 5  # times; a Data that is not cheaper than that is no bargain
 
@@ -33,7 +33,7 @@ print(round(one.time, 6), round(two.time, 6))
 """
 
 
-def page(results: Mapping[str, objects.Objects], session: TypedCode) -> Page:
+def page(results: Mapping[str, objects.Objects], session: Session) -> Page:
     """What costs, what is shared, what goes its own way."""
     first = next(iter(results.values()))
     stepped = first.provenance.timestep * 100

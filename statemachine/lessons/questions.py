@@ -8,8 +8,8 @@ from typing import Any
 from ..comparison.text import count, degrees, duration, millimetres
 from ..experiments import questions
 from ..page import Page, Question, Text, Verdict
-from . import TypedCode
 from ._words import page_of, where
+from .session import Session
 
 _Results = Mapping[str, questions.Answers]
 # What is asked, what the run says, and whether that bears out the right choice.
@@ -26,7 +26,7 @@ def code(options: Mapping[str, Any], load: str) -> str:
     return ""
 
 
-def page(results: _Results, session: TypedCode) -> Page:
+def page(results: _Results, session: Session) -> Page:
     """Question, answer, and the figures behind it."""
     blocks: list[Any] = [
         Text("Think first, then read: under each question stands what the run says about it.")

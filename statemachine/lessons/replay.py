@@ -11,9 +11,9 @@ from ..comparison import largest
 from ..comparison.text import count, degrees, millimetres, vector
 from ..experiments import replay
 from ..page import Page, Question, Table, Text, Verdict
-from . import TypedCode
 from ._broken import BROKEN, course, growth, in_short, traces
 from ._words import differences, page_of, sentence, typed, where
+from .session import Session
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> replay.Replay:
@@ -63,7 +63,7 @@ print(np.array_equal(one, two), abs(one - two).max())
 """
 
 
-def page(results: Mapping[str, replay.Replay], session: TypedCode) -> Page:
+def page(results: Mapping[str, replay.Replay], session: Session) -> Page:
     """Equal or not, and what touched on the way."""
     first = next(iter(results.values()))
     nstep = len(first.contacts)

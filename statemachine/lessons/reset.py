@@ -8,8 +8,8 @@ from typing import Any
 from ..comparison.text import count, millimetres
 from ..experiments import reset
 from ..page import Page, Question, Table, Text, Verdict
-from . import TypedCode
 from ._words import differences, emulation, page_of, sentence, typed, where
+from .session import Session
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> reset.Reset:
@@ -33,7 +33,7 @@ for frame in model.keyframes[:1]:
 """
 
 
-def page(results: Mapping[str, reset.Reset], session: TypedCode) -> Page:
+def page(results: Mapping[str, reset.Reset], session: Session) -> Page:
     """What a reset takes back, and what the keyframes show."""
     first = next(iter(results.values()))
     blocks: list[Any] = [

@@ -13,9 +13,17 @@ from ..backends import backend_engine
 from ..interface import Model
 from ..page import Page
 from ..probes.calls import Recording, record
-from . import Lesson, TypedCode, module
+from . import Lesson, module
 
 _NAME = "<lesson>"
+
+
+@dataclass(frozen=True)
+class Session:
+    """Code as one types it, for the first of the engines, and what it printed on each."""
+
+    code: str
+    printed: Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -76,7 +84,7 @@ def page_of_lesson(lesson: Lesson, taken: Mapping[str, Taken]) -> Page:
     if others:  # each ran with its own name there
         both = ", then ".join(f'"{name}"' for name in others)
         code = code.replace(f'backend="{first}")', f'backend="{first}")  # then {both}')
-    session = TypedCode(code, {name: each.printed for name, each in taken.items()})
+    session = Session(code, {name: each.printed for name, each in taken.items()})
     return module(lesson.name).page({name: t.result for name, t in taken.items()}, session)
 
 

@@ -9,8 +9,8 @@ from ..comparison.text import capital, count, duration
 from ..experiments import speed
 from ..experiments.in_turns import FEWEST, Ratio
 from ..page import Page, Question, Table, Text
-from . import TypedCode
 from ._words import differences, page_of, sentence, typed
+from .session import Session
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> speed.Speed:
@@ -45,7 +45,7 @@ for name, seconds in (
 """
 
 
-def page(results: Mapping[str, speed.Speed], session: TypedCode) -> Page:
+def page(results: Mapping[str, speed.Speed], session: Session) -> Page:
     """Times and factors; they are this machine's, now."""
     first = next(iter(results.values()))
     blocks: list[Any] = [

@@ -7,11 +7,11 @@ from typing import Any
 
 from ..experiments import state
 from ..page import Page, Question, Slots, Table, Text
-from . import TypedCode
 from ._words import differences, page_of, typed
+from .session import Session
 
 
-def run(model: Any, options: Mapping[str, Any], progress: Any) -> state.StateLayout:
+def run(model: Any, options: Mapping[str, Any], progress: Any) -> state.Layout:
     """Read the layout."""
     return state.run(model)
 
@@ -28,7 +28,7 @@ for j, name in enumerate(model.joint_names):
 """
 
 
-def page(results: Mapping[str, state.StateLayout], session: TypedCode) -> Page:
+def page(results: Mapping[str, state.Layout], session: Session) -> Page:
     """Sizes, slots, the keyframe's time."""
     first = next(iter(results.values()))
     blocks: list[Any] = [
@@ -111,8 +111,8 @@ def page(results: Mapping[str, state.StateLayout], session: TypedCode) -> Page:
 
 
 def _alike(
-    results: Mapping[str, state.StateLayout], of: Callable[[state.StateLayout], Any]
-) -> list[tuple[str, state.StateLayout]]:
+    results: Mapping[str, state.Layout], of: Callable[[state.Layout], Any]
+) -> list[tuple[str, state.Layout]]:
     """Engines that say the same are shown once: the prefix "a, b: " and one's result."""
     groups: dict[Any, list[str]] = {}
     for name, layout in results.items():
@@ -123,12 +123,12 @@ def _alike(
     ]
 
 
-def _layouts(one: state.StateLayout, two: state.StateLayout) -> str:
+def _layouts(one: state.Layout, two: state.Layout) -> str:
     sizes = [(each.nq, each.nv, each.nu, each.nbody, each.joints) for each in (one, two)]
     return "none" if sizes[0] == sizes[1] else "they differ: see above"
 
 
-def _question(first: state.StateLayout) -> Question:
+def _question(first: state.Layout) -> Question:
     return Question(
         f"qpos has nq = {first.nq} numbers. How many has qvel?",
         (f"{first.nq}: one velocity for each position", f"{first.nu}, as ctrl has", f"{first.nv}"),

@@ -9,8 +9,8 @@ from ..comparison.text import count, duration
 from ..errors import BadInputError
 from ..experiments import pace
 from ..page import Page, Question, Table, Text, Verdict
-from . import TypedCode
 from ._words import page_of, typed, where
+from .session import Session
 
 _BEFORE = "A simulation, a pause of the program, and the time on the simulator's own clock."
 _BRIEF, _WATCHED = 0.5, 4.0  # simulated seconds, without and with --realtime
@@ -59,7 +59,7 @@ print(f"{{data.time:.3f}} s simulated in {{wall:.3f}} s")
 """
 
 
-def page(results: Mapping[str, pace.Pace], session: TypedCode) -> Page:
+def page(results: Mapping[str, pace.Pace], session: Session) -> Page:
     """Nothing waits unless the loop does, and waiting changes nothing."""
     first = next(iter(results.values()))
     blocks: list[Any] = [

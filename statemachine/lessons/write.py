@@ -8,8 +8,8 @@ from typing import Any
 from ..comparison.text import count, position
 from ..experiments import write
 from ..page import Page, Question, Table, Text, Verdict
-from . import TypedCode
 from ._words import emulation, page_of, sentence, typed, where
+from .session import Session
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> write.Write:
@@ -32,7 +32,7 @@ print(data.qpos[slot], copy[slot], view is data.qpos)
 """
 
 
-def page(results: Mapping[str, write.Write], session: TypedCode) -> Page:
+def page(results: Mapping[str, write.Write], session: Session) -> Page:
     """The same memory, what it changes, what is refused."""
     first = next(iter(results.values()))
     blocks: list[Any] = [

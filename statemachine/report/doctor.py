@@ -22,7 +22,7 @@ _ROLES = {
 
 
 @dataclass(frozen=True)
-class Check:
+class Finding:
     """One thing looked at: its state, and the next step if it is not well."""
 
     name: str
@@ -36,7 +36,7 @@ class Check:
 class Diagnosis:
     """All findings."""
 
-    findings: tuple[Check, ...]
+    findings: tuple[Finding, ...]
 
     @property
     def healthy(self) -> bool:
@@ -76,49 +76,49 @@ def page(diagnosis: Diagnosis) -> Page:
     )
 
 
-def _python() -> Check:
-    return Check("python", True, f"{platform.python_version()}, {sys.executable}")
+def _python() -> Finding:
+    return Finding("python", True, f"{platform.python_version()}, {sys.executable}")
 
 
-def _engine(name: str) -> Check:
+def _engine(name: str) -> Finding:
     optional = name != "mujoco"
     code = f"from statemachine.installed import require; require({name!r})"
     # In a subprocess: a broken engine may take its process down, or print at will.
     try:
         done = _run(code)
     except subprocess.TimeoutExpired:
-        return Check(name, False, f"import takes over {PATIENCE} s", "try again", optional)
+        return Finding(name, False, f"import takes over {PATIENCE} s", "try again", optional)
     if done.returncode == 0:
         found = f"{engine_version(name)}, {_ROLES[name]}"
-        return Check(name, True, found, optional=optional)
+        return Finding(name, True, found, optional=optional)
     reason = (done.stderr.strip().splitlines() or [f"import ended with code {done.returncode}"])[-1]
     reason = reason.removeprefix("statemachine.errors.MissingEngineError: ")
     told = any(word in reason for word in ("pip install", "no wheel", "apt-get", "unset it"))
     wheel = wheel_here(ENGINES[name])
     step = "" if told or not wheel else f"pip install --force-reinstall {wheel.requirement}"
-    return Check(name, False, reason, step, optional)
+    return Finding(name, False, reason, step, optional)
 
 
-def _rendering() -> Check:
+def _rendering() -> Finding:
     if importlib.util.find_spec("mujoco") is None:
-        return Check("rendering", False, "needs mujoco", optional=True)
+        return Finding("rendering", False, "needs mujoco", optional=True)
     works = offscreen_opengl()
     if works is None:
         step = opengl_remedy()
-        return Check("rendering", False, "no offscreen OpenGL", step, optional=True)
+        return Finding("rendering", False, "no offscreen OpenGL", step, optional=True)
     if works == os.environ.get("MUJOCO_GL", ""):
-        return Check("rendering", True, "offscreen", optional=True)
+        return Finding("rendering", True, "offscreen", optional=True)
     found = f"offscreen with MUJOCO_GL={works}" if works else "offscreen by default"
     step = f"export MUJOCO_GL={works}" if works else "unset MUJOCO_GL"
-    return Check("rendering", True, found, f"{step}, before rendering", optional=True)
+    return Finding("rendering", True, found, f"{step}, before rendering", optional=True)
 
 
-def _clash() -> Check:
+def _clash() -> Finding:
     try:
         version = importlib.metadata.version("python-statemachine")
     except importlib.metadata.PackageNotFoundError:
-        return Check("import name", True, "statemachine is ours alone")
-    return Check(
+        return Finding("import name", True, "statemachine is ours alone")
+    return Finding(
         "import name",
         False,
         f"python-statemachine {version} uses the same import name",

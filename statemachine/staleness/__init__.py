@@ -12,8 +12,8 @@ by computing what the derived values would be now in another Data. `watch_freshn
 
 from __future__ import annotations
 
-from .afterwards import freshness
 from .gaps import Gap
+from .look import freshness
 from .result import Freshness, Row, StaleRead
 from .watch import Watch, watch_freshness
 

@@ -1,17 +1,17 @@
-"""What a Data says, held against what it would say now."""
+"""`freshness`: what a Data says, held against what it would say now."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from ..comparison import Gap
-from ..comparison.text import count, listed
+from ..comparison.text import count, few, listed, milliseconds
 from ..errors import UnsupportedError
 from ..interface import (
     DERIVED,
@@ -24,23 +24,28 @@ from ..interface import (
     Model,
     State,
     forward,
+    get_state,
     make_data,
     set_state,
 )
 from ..rotations import times
 from .gaps import gaps, same
-from .result import Row
+from .result import Freshness, Row
+
+if TYPE_CHECKING:
+    from .watch import Watch
 
 Readings = Mapping[str, "Array | Contacts"]
 # The inputs that each is computed from; a write to another is no reason why it is stale.
 DEPEND = dict.fromkeys(DERIVED, INPUTS) | {"contacts": INPUTS}
 DEPEND |= dict.fromkeys(POSES, INPUTS[:1])
 DEPEND |= dict.fromkeys(("qfrc_bias", "qfrc_passive"), INPUTS[:2])
+_REMEMBERED = {"contacts", "qacc", "qfrc_constraint", "qfrc_contact"}
 _ROUNDING = 1e-12  # of poses that are equal but for the order of additions [m, and 1]
 
 
 @dataclass(frozen=True)
-class Origin:
+class Moment:
     """The state that derived values belong to, as far as it is known.
 
     Attributes:
@@ -83,13 +88,57 @@ class Scratch:
         """
         model, data = self._model, self._data
         set_state(model, data, state)
-        data.qpos[:] = back(model, state["qpos"], state["qvel"], engine_step(model))
+        data.qpos[:] = back(model, state["qpos"], state["qvel"], _engine_step(model))
         forward(model, data)
         return np.hstack((data.xpos, data.xquat))
 
     def close(self) -> None:
         """Give the Data back."""
         self._data.close()
+
+
+def freshness(model: Model, data: Data) -> Freshness:
+    """Of which moment is each derived array of `data`, and how wrong is it by now?
+
+    It needs no preparation and changes nothing: what the arrays would be now is computed in
+    another Data. An array is of now if `forward` would leave every number of it as it is.
+    Otherwise it is one step old if its poses are those of qpos − h·qvel; how many writes ago
+    only `watch_freshness` can tell.
+
+    Args:
+        model: The Model that made `data`.
+        data: Read, and not touched.
+
+    Raises:
+        ForeignDataError: `data` was made by another Model.
+        BadInputError: An input is not finite.
+        DivergedError: The Data diverged earlier.
+        ClosedDataError: `data` is closed.
+    """
+    state = get_state(model, data)
+    watch: Watch | None = getattr(type(data), "_watch", None)
+    with nullcontext() if watch is None else watch.aside():
+        held = readings(data)
+    if watch is not None:
+        now, moment = watch.now(state), watch.moment()
+    else:
+        scratch = Scratch(model)
+        try:
+            now = scratch.now(state)
+            moment = find(model, state, held, now, scratch)
+        finally:
+            scratch.close()
+    touching = any(len(cast("Contacts", found["contacts"])) for found in (held, now))
+    rows = tuple(row(model, name, held[name], now[name], moment) for name in held)
+    return Freshness(
+        backend=model.backend,
+        engine_version=model.engine_version,
+        model=model.path.stem,
+        time=state.time,
+        rows=rows,
+        written=moment.written,
+        notes=tuple(_notes(model, rows, moment, touching)),
+    )
 
 
 def readings(data: Data, copied: bool = False) -> Readings:
@@ -104,7 +153,7 @@ def readings(data: Data, copied: bool = False) -> Readings:
 
 
 def row(
-    model: Model, name: str, held: Array | Contacts, now: Array | Contacts, moment: Origin
+    model: Model, name: str, held: Array | Contacts, now: Array | Contacts, moment: Moment
 ) -> Row:
     """What is to be told of one array."""
     if same(held, now):
@@ -112,7 +161,7 @@ def row(
     return stale_row(model, name, moment, gaps(model, name, held, now))
 
 
-def stale_row(model: Model, name: str, moment: Origin, found: tuple[Gap, ...]) -> Row:
+def stale_row(model: Model, name: str, moment: Moment, found: tuple[Gap, ...]) -> Row:
     """What is to be told of an array that is not of now, and off by `found`."""
     if moment.never:
         return Row(name, False, None, None, "never computed", found)
@@ -128,7 +177,7 @@ def stale_row(model: Model, name: str, moment: Origin, found: tuple[Gap, ...]) -
     return Row(name, False, moment.steps, writes, of, found)
 
 
-def find(model: Model, state: State, held: Readings, now: Readings, scratch: Scratch) -> Origin:
+def find(model: Model, state: State, held: Readings, now: Readings, scratch: Scratch) -> Moment:
     """The moment that derived values belong to, from nothing but their values.
 
     Args:
@@ -139,25 +188,25 @@ def find(model: Model, state: State, held: Readings, now: Readings, scratch: Scr
         scratch: Where other states are tried.
     """
     if all(same(held[name], now[name]) for name in held):
-        return Origin(steps=0)
+        return Moment(steps=0)
     if not _array(held, "xquat").any():  # a rotation is never zero
-        return Origin(never=True)
+        return Moment(never=True)
     poses = np.hstack((_array(held, "xpos"), _array(held, "xquat")))
     lag = np.abs(np.hstack((_array(now, "xpos"), _array(now, "xquat"))) - poses).max(axis=1)
     if not lag.any():  # the poses, which alone can be retraced, are of now
-        return Origin()
+        return Moment()
     off = np.abs(scratch.one_step_back(state) - poses).max(axis=1)
     # Nearer than rounding makes them, and much nearer than those of now. One body is enough:
     # what else is not there was written since.
     moved = lag > 0
     there = moved & (off <= _ROUNDING * (1 + np.abs(poses).max())) & (off <= lag / 100)
     if not there.any():
-        return Origin()
+        return Moment()
 
     def names(chosen: Any) -> tuple[str, ...]:
         return tuple(model.body_names[b] or f"body {b}" for b in np.flatnonzero(chosen).tolist())
 
-    return Origin(
+    return Moment(
         steps=1,
         retraced=names(there),
         strays=names(moved & ~there),
@@ -194,6 +243,46 @@ def _array(found: Readings, name: str) -> Array:
     return array
 
 
-def engine_step(model: Model) -> float:
-    """Simulated time of a step of the engine itself [s]."""
+def _engine_step(model: Model) -> float:
     return model.timestep / model.substeps
+
+
+def _notes(model: Model, rows: tuple[Row, ...], moment: Moment, touching: bool) -> Iterator[str]:
+    behaviours = model.capabilities.behaviours
+    stale = [each.name for each in rows if not each.now]
+    untold = [name for name in DERIVED if name not in {each.name for each in rows}]
+    if untold:
+        yield f"This backend does not tell: {', '.join(untold)}."
+    if not stale:
+        yield "All are of now."
+        return
+    yield from _how(model, moment, not set(POSES).isdisjoint(stale))
+    if moment.written:
+        yield f"Written since: {', '.join(moment.written)}."
+    if behaviours["stale after a step"].support == "unsupported":
+        yield f"After a step: {behaviours['stale after a step'].note}."
+    if touching and not model.capabilities.exact_restore and not _REMEMBERED.isdisjoint(stale):
+        yield (
+            "In contacts, and the forces and accelerations of what touches, not all of the "
+            f"difference need be age: {behaviours['exact restore'].note}."
+        )
+    yield "sm.forward(model, data) makes all of them of now."
+
+
+def _how(model: Model, moment: Moment, poses: bool) -> Iterator[str]:
+    """How the moment was found, or what stood in the way."""
+    if moment.retraced:
+        exact = f"to {moment.within:.1e} m" if moment.within else "to the bit"
+        yield (
+            f"Found by going back: qpos − h·qvel, h = {milliseconds(_engine_step(model))}, gives "
+            f"the poses of {few(moment.retraced)}, {exact}."
+        )
+        if moment.strays:
+            yield (
+                f"Not so {few(moment.strays)}: qpos or qvel was written since, or the engine "
+                "integrates otherwise."
+            )
+    elif not moment.never and moment.steps is None:
+        if poses:
+            yield "Going back one step, to qpos − h·qvel, does not lead to these poses."
+        yield "Writes are not recorded, unless sm.watch_freshness(model, data) does."

@@ -20,7 +20,7 @@ from ..comparison.text import few
 from ..errors import BadInputError, StaleReadError
 from ..interface import INPUTS, Array, Contacts, Data, Model, State, get_state
 from .gaps import told
-from .look import DEPEND, Origin, Readings, Scratch, find, readings, row, stale_row
+from .look import DEPEND, Moment, Readings, Scratch, find, readings, row, stale_row
 from .result import Row, StaleRead, table
 
 _PACKAGE = str(Path(os.path.abspath(__file__)).parent.parent) + os.sep
@@ -120,10 +120,10 @@ class Watch:
             self._present = state.blob, self._scratch.now(state)
         return self._present[1]
 
-    def moment(self) -> Origin:
+    def moment(self) -> Moment:
         """The moment that derived values belong to, as counted."""
         self.touch()
-        return Origin(
+        return Moment(
             self._steps,
             None if self._steps is None else dict(self._writes),
             self._never,

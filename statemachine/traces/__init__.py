@@ -11,11 +11,10 @@ from __future__ import annotations
 
 from .csv_files import export_csv
 from .files import read, write
-from .header import COLUMNS, CONTACTS, Header
 from .models import model_file
 from .recorder import play, record, record_scenario
 from .shipped import shipped, shipped_names
-from .trace import Trace
+from .trace import COLUMNS, CONTACTS, Header, Trace
 
 __all__ = [
     "COLUMNS",

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import TraceError
-from ..experiments._common import Provenance
 from ..interface import OPTIONS, JointType
 from ..interface.checks import HUGE
-from .header import SCHEMA, Header
+
+if TYPE_CHECKING:
+    from .trace import Header
+
 
 # Bytes that a trace may unfold into: this many, or so many times the size of its file.
 # Recorded runs are 2 to 3 times as large as their files.
@@ -117,41 +117,7 @@ _OF_PROVENANCE: dict[str, Callable[[Any], bool]] = {
 }
 
 
-def header_of(text: str) -> Header:
-    """The header that `Header.as_json` wrote.
-
-    Raises:
-        TraceError: It is none, or of a schema that this version does not know.
-    """
-    try:
-        facts = json.loads(text)
-        if facts.get("schema") != SCHEMA:
-            given = repr(facts.get("schema"))[:20]
-            raise TraceError(f"this trace has schema {given}; this version reads {SCHEMA}")
-        facts["provenance"] = Provenance(**_known(facts["provenance"], Provenance))
-        header = Header(**_known(facts, Header))
-        _check_kinds(header)
-        _check_lengths(header)
-        _check_places(header)
-    except TraceError:
-        raise
-    except (ValueError, TypeError, AttributeError, KeyError, RecursionError) as error:
-        raise TraceError(f"this is no header of a trace: {error}") from None
-    return header
-
-
-def _known(facts: Mapping[str, Any], kind: type[Any]) -> dict[str, Any]:
-    """What a dataclass has a field for."""
-    names = {field.name for field in dataclasses.fields(kind)}
-    return {name: _frozen(value) for name, value in facts.items() if name in names}
-
-
-def _frozen(value: Any) -> Any:
-    """Lists of JSON as tuples."""
-    return tuple(_frozen(item) for item in value) if isinstance(value, list) else value
-
-
-def _check_kinds(header: Header) -> None:
+def check_header(header: Header) -> None:
     """Every field is of its kind, and no name stands twice.
 
     Raises:
@@ -168,29 +134,7 @@ def _check_kinds(header: Header) -> None:
             raise TraceError(f"two {what} of the trace are called {most[0][:40]!r}")
 
 
-def _check_lengths(header: Header) -> None:
-    for name in ("nq", "nv", "nu", "substeps"):
-        value = getattr(header, name)
-        if not isinstance(value, int) or not 0 <= value < 10**6:
-            raise TraceError(f"{name} = {str(value)[:40]} of the trace is no count")
-    if not isinstance(header.timestep, float) or not 0 < header.timestep < 1e6:
-        raise TraceError(f"timestep = {header.timestep!r} of the trace is no time")
-    lengths = {
-        "jnt_type": len(header.joints),
-        "jnt_qposadr": len(header.joints),
-        "jnt_dofadr": len(header.joints),
-        "geom_bodyid": len(header.geoms),
-        "body_parentid": len(header.bodies),
-        "actuator_jntid": header.nu,
-        "actuators": header.nu,
-        "ctrlrange": header.nu,
-    }
-    for name, length in lengths.items():
-        if len(getattr(header, name)) != length:
-            raise TraceError(f"{name} of the trace has {len(getattr(header, name))} entries")
-
-
-def _check_places(header: Header) -> None:
+def check_places(header: Header) -> None:
     """Every number that says where something is says a place that there is.
 
     Raises:

@@ -12,8 +12,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..interface import JointType
-from .header import COLUMNS, Header
-from .trace import Trace
+from .trace import COLUMNS, Header, Trace
 from .whole import beside, fill_file
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import DivergedError, UnsupportedError
 from ..experiments._common import Progress
 from ..interface import DERIVED, Array, Data, Model, forward, get_state, make_data, set_state, step
-from .header import COLUMNS, CONTACTS
+from .trace import COLUMNS, CONTACTS
 
 _TOLD = tuple(name for name in DERIVED if name in COLUMNS)
 Start = Callable[[Model, Data], None]

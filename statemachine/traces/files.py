@@ -8,10 +8,9 @@ import os
 from pathlib import Path
 
 from ..errors import BadInputError, MissingEngineError, TraceError
-from .checked import header_of
 from .npz_files import read_npz, write_npz
 from .parquet_files import read_parquet, require_pyarrow, write_parquet
-from .trace import Trace
+from .trace import Header, Trace
 from .whole import replace_file
 
 SUFFIXES = (".npz", ".parquet")
@@ -33,7 +32,7 @@ def write(trace: Trace, path: str | os.PathLike[str]) -> Path:
         OSError: It cannot be written.
     """
     target = _known(path)
-    header_of(trace.header.as_json())
+    Header.from_json(trace.header.as_json())
     if target.suffix.lower() == ".parquet":
         require_pyarrow()
         replace_file(target, lambda out: write_parquet(trace, out))

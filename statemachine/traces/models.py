@@ -10,7 +10,7 @@ from pathlib import Path
 from ..errors import ModelFileError, StateMachineError
 from ..experiments._common import model_digest
 from ..models import resolve
-from .header import Header
+from .trace import Header
 
 
 def model_file(

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.lib import format as npy
 
 from ..errors import TraceError
-from .checked import WHOLE, as_column, check_size, header_of
-from .header import INPUTS, Header
-from .trace import Trace, check_shapes
+from .checked import WHOLE, as_column, check_size
+from .trace import INPUTS, Header, Trace, check_shapes
 
 _HEADER_MOST = 2**24  # bytes of a header
 
@@ -80,7 +79,7 @@ def _read_header(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Header:
         raise TraceError("has a header that is no text: it is no trace")
     if shape[0] > _HEADER_MOST:
         raise TraceError(f"has a header of {shape[0]:,} bytes; at most {_HEADER_MOST:,}")
-    return header_of(_unfold(archive, entry).tobytes().decode())
+    return Header.from_json(_unfold(archive, entry).tobytes().decode())
 
 
 def _check_kind(name: str, kind: np.dtype[Any]) -> None:

@@ -10,9 +10,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..errors import MissingEngineError, TraceError
-from .checked import as_column, check_size, header_of
-from .header import COLUMNS, CONTACTS, Header
-from .trace import Trace
+from .checked import as_column, check_size
+from .trace import COLUMNS, CONTACTS, Header, Trace
 
 # Of the header in the metadata: a digest of header and columns, then the header. Parquet
 # has no checksum of its own that every reader looks at.
@@ -42,7 +41,7 @@ def read_parquet(path: Path) -> tuple[Header, dict[str, Any]]:
     parquet = importlib.import_module("pyarrow.parquet")
     with parquet.ParquetFile(path) as file:
         digest, text = _header_text(file.metadata.metadata or {})
-        header = header_of(text)
+        header = Header.from_json(text)
         check_size(_unfolded(file.metadata, header), path)
         columns = _columns(file.read(), header)
     if digest and digest != _digest(text, columns):

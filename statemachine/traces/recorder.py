@@ -18,8 +18,7 @@ from ..experiments.scenarios import Controller, Scenario
 from ..interface import Array, Data, Model, State, make_data, reset, set_state, step
 from .derived import derived
 from .energy import energies
-from .header import Header
-from .trace import Trace
+from .trace import Header, Trace
 
 
 def record(

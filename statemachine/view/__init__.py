@@ -9,6 +9,6 @@ from __future__ import annotations
 
 from .frames import Control, EnginePose, Separation, Snapshot
 from .pace import Pacer
-from .session import Session
+from .session import LiveSession
 
-__all__ = ["Control", "EnginePose", "Pacer", "Separation", "Session", "Snapshot"]
+__all__ = ["Control", "EnginePose", "LiveSession", "Pacer", "Separation", "Snapshot"]

@@ -16,7 +16,7 @@ _MOST_LAG = 0.25  # seconds behind the clock that may still be caught up
 
 
 class Show(Protocol):
-    """What can be shown: a running simulation, or a recording. See `Session`."""
+    """What can be shown: a running simulation, or a recording. See `LiveSession`."""
 
     timestep: float
     names: tuple[str, ...]

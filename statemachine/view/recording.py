@@ -31,7 +31,7 @@ _EQUAL = 1e-6  # seconds between moments that count as the same
 class TraceSession:
     """One or two traces of one model, row by row.
 
-    Attributes: those of a `Session`; it has no sliders, and the only place is its start.
+    Attributes: those of a `LiveSession`; it has no sliders, and the only place is its start.
     """
 
     controls: tuple[Control, ...] = ()

@@ -27,7 +27,7 @@ from .frames import (
 _STEPS_MOST = 100_000  # of one press of a button
 
 
-class Session:
+class LiveSession:
     """One or two engines under the same commands, at the same steps.
 
     Whoever makes it is the only one to touch its Data: what other threads want comes as
@@ -187,7 +187,7 @@ class Session:
         for _, data in self._arms:
             data.close()
 
-    def __enter__(self) -> Session:
+    def __enter__(self) -> LiveSession:
         return self
 
     def __exit__(

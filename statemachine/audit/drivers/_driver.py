@@ -13,7 +13,7 @@ import numpy as np
 
 from ...errors import DivergedError
 from ...interface import Array, Model
-from ..findings import Divergence, Finding, Layer, Layout, gap, worst
+from ..findings import Finding, Gap, Layer, Layout, gap, worst
 from ..points import Point
 
 _AFTERWARDS = 50  # steps of another past beyond the save point
@@ -275,18 +275,12 @@ class Driver(ABC):
             raise DivergedError(f"{self.name} diverged")
         return Run(point, future)
 
-    def gap(self, run: Run, *futures: Array) -> Divergence:
+    def gap(self, run: Run, *futures: Array) -> Gap:
         """The worst gap of futures to that of a run."""
         return worst([gap(run.future, future, self.layout) for future in futures])
 
     def found(
-        self,
-        experiment: str,
-        run: Run,
-        case: str,
-        into: str,
-        off: Divergence,
-        promised: bool = True,
+        self, experiment: str, run: Run, case: str, into: str, off: Gap, promised: bool = True
     ) -> Finding:
         """A finding about this driver."""
         return Finding(experiment, self.layer, run.point.name, case, into, promised, off)
