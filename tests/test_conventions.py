@@ -17,20 +17,21 @@ import numpy as np
 import pytest
 from rich.cells import cell_len
 
-from statemachine.errors import BadInputError, MissingEngineError, UnknownNameError
-from statemachine.installed import ENGINES, require
-from statemachine.probes import phrasebook
-from statemachine.probes.conventions import (
+from statemachine.conventions import (
     NO_ANSWER,
     QUESTIONS,
     UNDECIDED,
-    _mujoco_scene,
-    _pendulum,
     ask,
-    closest,
     joints,
+    phrasebook,
     probe,
 )
+from statemachine.conventions.answers import closest
+from statemachine.engines import part
+from statemachine.engines.mujoco import pile
+from statemachine.engines.samples import pendulum
+from statemachine.errors import BadInputError, MissingEngineError, UnknownNameError
+from statemachine.installed import ENGINES, require
 from statemachine.report import conventions as report
 
 from .conftest import ROOT, Cli, need_engine
@@ -169,11 +170,11 @@ FACTS = {
 
 
 def answers(question: str, engine: str) -> dict[str, str]:
-    return {finding.of: finding.answer for finding in ask(question, engine)}
+    return {finding.of: finding.answer for finding in ask(question, engine) or ()}
 
 
 def figures(question: str, engine: str, of: str = "") -> dict[str, Any]:
-    finding = next(each for each in ask(question, engine) if each.of == of)
+    finding = next(each for each in ask(question, engine) or () if each.of == of)
     return {figure.name: figure.value for figure in finding.figures}
 
 
@@ -248,9 +249,9 @@ def test_the_limp_pendulum_keeps_its_energy() -> None:
     """Half I ω² is what gravity gave; ω by a difference of two angles."""
     h = 1e-4
     for seconds in (0.1, 0.25, 0.4):
-        rate = (_pendulum.limp(seconds + h) - _pendulum.limp(seconds - h)) / (2 * h)
-        fallen = -_pendulum.tip_at(_pendulum.limp(seconds))[2] / _pendulum.TIP
-        assert rate**2 == pytest.approx(2 * _pendulum.RATE * fallen, rel=1e-5)
+        rate = (pendulum.limp(seconds + h) - pendulum.limp(seconds - h)) / (2 * h)
+        fallen = -pendulum.tip_at(pendulum.limp(seconds))[2] / pendulum.TIP
+        assert rate**2 == pytest.approx(2 * pendulum.RATE * fallen, rel=1e-5)
 
 
 def test_no_two_orders_of_the_joints_are_the_same() -> None:
@@ -495,8 +496,8 @@ def test_a_restore_that_loses_the_warm_start(mj: Any, monkeypatch: pytest.Monkey
 def test_an_engine_without_a_warm_start(monkeypatch: pytest.MonkeyPatch) -> None:
     """Then positions and velocities are all that there is."""
     flag = '<option><flag warmstart="disable"/></option><worldbody>'
-    text = _mujoco_scene.MJCF.replace("<worldbody>", flag)
-    monkeypatch.setattr(_mujoco_scene, "MJCF", text)
+    text = pile.MJCF.replace("<worldbody>", flag)
+    monkeypatch.setattr(pile, "MJCF", text)
     assert set(answers("future", "mujoco").values()) == {"exact"}
 
 
@@ -566,7 +567,7 @@ def test_every_call_works(engine: str) -> None:
 
 def test_the_cells_of_an_engine_are_a_program(engine: str, tmp_path: Path) -> None:
     """As a reader would type them, with nothing of ours."""
-    module = __import__(f"statemachine.probes.phrasebook.{engine}_calls", fromlist=["CELLS"])
+    module: Any = part(engine, "phrasebook")
     file = tmp_path / module.FILE[0]
     file.write_text(module.FILE[1])
     lines = [f"file = {str(file)!r}", *(module.CELLS[name].code for name in phrasebook.CONCEPTS)]
@@ -585,7 +586,7 @@ def test_the_cells_of_an_engine_are_a_program(engine: str, tmp_path: Path) -> No
 def test_a_cell_that_does_nothing_is_found_out(
     engine: str, concept: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    module = __import__(f"statemachine.probes.phrasebook.{engine}_calls", fromlist=["CELLS"])
+    module: Any = part(engine, "phrasebook")
     monkeypatch.setitem(
         module.CELLS, concept, dataclasses.replace(module.CELLS[concept], code="pass")
     )
