@@ -9,7 +9,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from ...engines import part
-from ...engines.parts import Dials, DialsPart
+from ...engines.parts import Dials, DialsPart, Setting
 from ...errors import UnsupportedError
 from ...interface import Model
 from .factors import FACTORS, Factor
@@ -163,8 +163,8 @@ class ModelSide:
         options = {**self._options, **options}
         model = model.replace(**options) if options else model
         smoothed = "surfaces" in changes and changes["surfaces"].how == "off"
-        own: DialsPart | None = part(model.backend, "dials")
-        return own.frictionless(model) if smoothed and own else model
+        dials: DialsPart | None = part(model.backend, "dials") if smoothed else None
+        return dials.frictionless(model) if dials else model
 
     def _off(self, factor: Factor) -> dict[str, Any]:
         if factor.name == "gravity":
@@ -227,7 +227,9 @@ class EngineSide:
         return {name: change for name, change in changes.items() if name not in gone}
 
     def build(self, changes: Changes) -> Model:
-        settings = {name: "off" if c.how == "off" else "model" for name, c in changes.items()}
+        settings: dict[str, Setting] = {
+            name: "off" if c.how == "off" else "model" for name, c in changes.items()
+        }
         values: dict[str, Any] = {}
         for name, change in changes.items():
             if name == "timestep":
