@@ -375,6 +375,7 @@ def test_gravity_says_nothing_of_a_joint_that_still_moves(cli: Cli, tmp_path: Pa
     assert "position servo" in page.stdout
 
 
+@pytest.mark.slow
 def test_gravity_at_the_moment_of_the_first_touch(cli: Cli) -> None:
     for seconds in ("0.005", "0.3", "0.535", "0.54", "1"):
         done = cli("lesson", "gravity", "--seconds", seconds)

@@ -518,3 +518,38 @@ def test_mistakes_are_one_line(words: tuple[str, ...], says: str, cli: Cli) -> N
     (line,) = done.stderr.splitlines()
     assert says in line
     assert not done.stdout
+
+
+# What does not move at all, and names that a plot could take for formulas.
+
+_STILL = """<mujoco><option gravity="0 0 0"/><worldbody><geom name="$floor$" type="plane"
+size="1 1 .1"/><body name="$\\frac{" pos="0 0 1"><joint name="$x^$_$" type="slide"
+axis="0 0 1"/><geom size=".1"/><site name="a$b$c"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("form", ["html", "plot"])
+def test_a_robot_that_stands_still_agrees_with_itself(form: str, cli: Cli, tmp_path: Path) -> None:
+    need_engine("pybullet")
+    (tmp_path / "still.xml").write_text(_STILL)
+    out = tmp_path / ("a.html" if form == "html" else "a.svg")
+    done = cli("compare", "fall", "--model", tmp_path / "still.xml", f"--{form}", out)
+    assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
+    # As it is spelt in the file, or as a page escapes it.
+    assert "a$b$c" in out.read_text()
+
+
+def test_poses_that_are_no_numbers_cost_the_picture_and_no_more(
+    hold: Trace, cli: Cli, tmp_path: Path
+) -> None:
+    xpos = np.array(hold["xpos"])
+    xpos[len(xpos) // 2 :] = np.nan
+    write(hold, tmp_path / "whole.npz")
+    write(changed(hold, xpos=xpos), tmp_path / "nan.npz")
+    for pair in (("nan.npz", "whole.npz"), ("whole.npz", "nan.npz")):
+        done = cli("compare", *(tmp_path / name for name in pair), "--html", tmp_path / "a.html")
+        assert "Traceback" not in done.stderr
+        assert (tmp_path / "a.html").stat().st_size > 100_000
+    done = cli("trace", "film", tmp_path / "nan.npz", "-o", tmp_path / "a.webp")
+    assert done.returncode != 0
+    assert "no poses of the bodies that are numbers" in done.stderr
+    assert len(done.stderr.splitlines()) == 1

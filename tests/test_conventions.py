@@ -231,6 +231,7 @@ def test_the_figures_are_those_of_closed_forms(mj: ModuleType, pb: Any) -> None:
     assert all(slope == pytest.approx(0.75, rel=0.05) for slope in slopes)
 
 
+@pytest.mark.slow
 def test_a_second_look_sees_the_same() -> None:
     """Bit by bit: nothing is random, and no probe leaves a trace in the next."""
     found = [name for name in ENGINES if not _is_missing(name)]
@@ -601,6 +602,7 @@ def test_a_cell_that_does_nothing_is_found_out(
 # The command.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", [(), ("--calls",)])
 def test_the_page_reads_well_piped(cli: Cli, arguments: tuple[str, ...]) -> None:
     for name in ENGINES:

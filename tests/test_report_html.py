@@ -144,6 +144,7 @@ def test_its_policy_lets_nothing_in(page: Path) -> None:
     assert str(ROOT) not in text
 
 
+@pytest.mark.slow
 def test_a_script_that_was_put_in_is_not_run(page: Path, tmp_path: Path) -> None:
     """The policy does what it says: else the test above would say nothing."""
     text = page.read_text(encoding="utf-8")
@@ -222,6 +223,7 @@ def test_a_long_run_is_small_too_and_keeps_the_moments_that_count() -> None:
     assert len(frames_of(one, two)) < len(one)
 
 
+@pytest.mark.slow
 def test_much_to_draw_is_drawn_with_less(hold: Made) -> None:
     """Many contacts at once, and a shape of two hundred thousand triangles."""
     _, one, two, look = hold
@@ -529,6 +531,7 @@ def test_ticks_have_their_labels_under_them(page: Path) -> None:
         assert max(far) < 1.5
 
 
+@pytest.mark.slow
 def test_on_a_phone_the_slider_is_under_the_picture(page: Path) -> None:
     with browser(width=390, height=844) as tab:
         open_page(tab, page)
@@ -633,6 +636,7 @@ def test_the_slider_moves_both_arms_the_cursors_and_the_figures(page: Path, hold
         tab.nothing_wrong()
 
 
+@pytest.mark.slow
 def test_each_side_is_drawn_and_can_be_left_out(page: Path) -> None:
     with browser(height=1000) as tab:
         open_page(tab, page)
@@ -645,6 +649,7 @@ def test_each_side_is_drawn_and_can_be_left_out(page: Path) -> None:
             assert changed(before, picture(tab)) == 0, name
 
 
+@pytest.mark.slow
 def test_the_sides_are_drawn_where_they_are(hold: Made, tmp_path: Path) -> None:
     """A run against itself turned by a quarter: the ghost is somewhere else."""
     _, one, _, look = hold
@@ -684,6 +689,7 @@ def moved(tab: Tab, since: float) -> float:
     return float(slider.input_value())
 
 
+@pytest.mark.slow
 def test_it_plays_and_pauses(page: Path) -> None:
     with browser(height=1000) as tab:
         open_page(tab, page)
@@ -704,6 +710,7 @@ def test_it_plays_and_pauses(page: Path) -> None:
         until(tab, lambda: tab.locator("#said").text_content().startswith("Paused at "))
 
 
+@pytest.mark.slow
 def test_it_can_be_used_by_keyboard(page: Path) -> None:
     with browser(height=1000) as tab:
         open_page(tab, page)
@@ -738,6 +745,7 @@ def test_it_can_be_used_by_keyboard(page: Path) -> None:
             assert style[1] >= 2
 
 
+@pytest.mark.slow
 def test_a_time_in_a_table_and_a_press_on_a_chart_go_there(page: Path) -> None:
     with browser(height=1000) as tab:
         open_page(tab, page)
@@ -752,6 +760,7 @@ def test_a_time_in_a_table_and_a_press_on_a_chart_go_there(page: Path) -> None:
         assert tab.locator("#clock").inner_text() == "1.500 s"
 
 
+@pytest.mark.slow
 def test_the_view_turns_and_comes_back(page: Path) -> None:
     with browser(height=1000) as tab:
         open_page(tab, page)
@@ -773,6 +782,7 @@ def test_the_view_turns_and_comes_back(page: Path) -> None:
 # How it looks, and to whom.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [360, 768, 1280])
 def test_nothing_is_wider_than_the_screen(page: Path, width: int) -> None:
     with browser(width=width, height=700) as tab:
@@ -785,6 +795,7 @@ def test_nothing_is_wider_than_the_screen(page: Path, width: int) -> None:
         assert box["x"] + box["width"] <= width
 
 
+@pytest.mark.slow
 def test_dark_and_light(page: Path) -> None:
     def paper(tab: Tab) -> float:
         colour = tab.evaluate("getComputedStyle(document.body).backgroundColor")
@@ -853,6 +864,7 @@ def test_the_sides_differ_for_the_colour_blind() -> None:
             assert np.abs(a - b).max() > 0.2
 
 
+@pytest.mark.slow
 def test_what_a_screen_reader_hears(page: Path) -> None:
     with browser() as tab:
         open_page(tab, page)
@@ -895,6 +907,7 @@ def test_what_a_screen_reader_hears(page: Path) -> None:
         assert tab.locator("#said").get_attribute("aria-live") == "polite"
 
 
+@pytest.mark.slow
 def test_it_prints_with_all_sections_and_the_picture(page: Path) -> None:
     with browser(color_scheme="dark") as tab:
         open_page(tab, page)
@@ -934,6 +947,7 @@ def test_it_says_so_without_webgl(page: Path, tmp_path: Path) -> None:
         tab.nothing_wrong()
 
 
+@pytest.mark.slow
 def test_it_does_not_move_by_itself_nor_smoothly_where_that_is_not_wanted(page: Path) -> None:
     with browser(reduced_motion="reduce") as tab:
         open_page(tab, page)
@@ -973,6 +987,7 @@ def not_finite(made: Made) -> Made:
     return of_look(one, Trace(two.header, {**two.columns, "xpos": xpos}), look)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [ended, single, same, not_finite])
 def test_other_traces(hold: Made, kind: Callable[[Made], Made], tmp_path: Path) -> None:
     made = kind(hold)
@@ -993,6 +1008,7 @@ def test_other_traces(hold: Made, kind: Callable[[Made], Made], tmp_path: Path) 
         tab.nothing_wrong()
 
 
+@pytest.mark.slow
 def test_timesteps_that_differ_are_drawn_between_and_it_is_said(tmp_path: Path) -> None:
     scenario = SCENARIOS["hold"]
     one = record_scenario(scenario, sm.load(scenario.model, defaults="engine"), defaults="engine")
@@ -1016,6 +1032,7 @@ def test_timesteps_that_differ_are_drawn_between_and_it_is_said(tmp_path: Path) 
         tab.nothing_wrong()
 
 
+@pytest.mark.slow
 def test_without_the_model_there_are_sticks(hold: Made, tmp_path: Path) -> None:
     none = Look(None, "there is no so101/scene.xml here")
     target = write_report(tmp_path / "x.html", page_of(hold, looks=(none, none)))
@@ -1029,6 +1046,7 @@ def test_without_the_model_there_are_sticks(hold: Made, tmp_path: Path) -> None:
         tab.nothing_wrong()
 
 
+@pytest.mark.slow
 def test_without_poses_there_is_no_scene_and_it_is_said(hold: Made, tmp_path: Path) -> None:
     bare = [
         Trace(t.header, {k: v for k, v in t.columns.items() if k not in ("xpos", "xquat")})
@@ -1103,6 +1121,7 @@ def test_bones_reach_from_body_to_body(hold: Made) -> None:
 # The command.
 
 
+@pytest.mark.slow
 def test_the_command_writes_it(cli: Cli, tmp_path: Path) -> None:
     need_engine("pybullet")
     done = cli("compare", "hold", "--no-why", "--html", "out.html")
@@ -1147,6 +1166,7 @@ def test_a_folder_that_cannot_be_written_into(tmp_path: Path, monkeypatch: Any) 
         check_target(tmp_path / "folder.html")
 
 
+@pytest.mark.slow
 def test_traces_make_a_report_without_a_cause(cli: Cli, hold: Made, tmp_path: Path) -> None:
     for name, trace in (("one", hold[1]), ("two", hold[2])):
         write(rows(trace, 120), tmp_path / f"{name}.npz")

@@ -136,6 +136,7 @@ def test_what_is_not_in_the_table_stays_unexplained(arm: Model) -> None:
     assert "none of" in " ".join(report.conclusion(found))
 
 
+@pytest.mark.slow
 def test_leaving_out_the_motion_is_no_explanation() -> None:
     """Of another engine with a heavier arm: what stills the arm closes the gap, and is no cause."""
     with registered("hidden", "tests.hidden_world:load"):
@@ -689,6 +690,7 @@ def test_pages_fit_and_say_what_was_found(attributions: Any) -> None:
         json.loads(dumps(found))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("bullet")
 def test_the_two_ways_to_have_pybullet_end_in_the_same_bits() -> None:
     one, two = quietly("so101/scene"), quietly("so101/scene", defaults="engine")
@@ -710,6 +712,7 @@ def test_two_engines_as_they_come_differ_by_what_was_set() -> None:
 # The command
 
 
+@pytest.mark.slow
 def test_the_command(cli: Cli) -> None:
     need_engine("pybullet")
     done = cli("compare", "hold", "--why", "--seconds", "0.5")

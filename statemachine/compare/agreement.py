@@ -53,6 +53,14 @@ class Agreement:
     verdict: Verdict
     note: str = ""
 
+    @property
+    def tolerances(self) -> float:
+        """How many tolerances the largest difference is; what is no number is beyond all."""
+        if self.max == 0:
+            return 0.0  # the tolerance of what does not move may be zero, too
+        share = self.max / self.tolerance if self.tolerance else np.inf
+        return np.inf if np.isnan(share) else share
+
 
 @dataclass(frozen=True)
 class Side:
@@ -110,13 +118,7 @@ class Comparison:
     @property
     def worst(self) -> Agreement | None:
         """The quantity that is farthest beyond its tolerance; None if nothing was compared."""
-        return max(self.agreements, key=_beyond, default=None)
-
-
-def _beyond(found: Agreement) -> float:
-    """How many tolerances; what is no number is beyond all of them."""
-    share = found.max / found.tolerance
-    return np.inf if np.isnan(share) else share
+        return max(self.agreements, key=lambda found: found.tolerances, default=None)
 
 
 def compare(

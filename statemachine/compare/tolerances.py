@@ -57,7 +57,7 @@ def tolerance_for(
     if kind == "body rotation":
         return Tolerance(_BODY_TURN, "a degree, which moves the rim of a hand's breadth by 1 mm")
     if kind == "energy":
-        range_ = max(float(np.ptp(series.one)), float(np.ptp(series.two)))
+        range_ = max(_range(series.one), _range(series.two))
         return Tolerance(
             max(_ENERGY * range_, 1e-9), f"1 % of the {range_:.3g} J that the run turns over"
         )
@@ -135,6 +135,13 @@ def _mean_acting(force: Array) -> float:
 def _reach(trace: Trace, series: Series) -> float:
     """How far a site gets from where the first jointed body has its origin [m]."""
     positions, _ = trace.site(series.name.partition(",")[0])
-    if "xpos" not in trace or len(trace.header.bodies) < 2:
-        return float(np.linalg.norm(positions, axis=1).max())
-    return float(np.linalg.norm(positions - trace["xpos"][:, 1], axis=1).max())
+    if "xpos" in trace and len(trace.header.bodies) > 1:
+        positions = positions - trace["xpos"][:, 1]
+    lengths = np.linalg.norm(positions, axis=1)
+    return float(lengths[np.isfinite(lengths)].max(initial=0.0))
+
+
+def _range(values: Array) -> float:
+    """From the smallest to the largest of those that are finite; 0 if none is."""
+    finite = values[np.isfinite(values)]
+    return float(np.ptp(finite)) if len(finite) else 0.0

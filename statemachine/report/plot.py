@@ -27,6 +27,7 @@ _SETTINGS = {
     "font.family": ["DejaVu Sans", "sans-serif"],
     "font.size": 6.5,
     "axes.linewidth": 0.5,
+    "text.parse_math": False,  # a name may have a $ in it
     "axes.unicode_minus": True,
     "path.simplify": True,
 }

@@ -129,7 +129,7 @@ def _in_the_end(comparison: Comparison, curves: Sequence[Series]) -> str:
         return ""  # what is no number is neither within its tolerance nor beyond it
     if not still:
         return f"{over}, all of the motion is within its tolerance." if motion else ""
-    most = max(still, key=lambda found: found.settled / found.tolerance)
+    most = max(still, key=lambda found: found.settled / (found.tolerance or 1e-300))
     text = f"{over} {named(most)} is still {quantity(most.settled, most.kind)} apart"
     curve = next((each for each in curves if each.name == most.name), None)
     last = None if curve is None else changing(curve, most)
@@ -195,13 +195,12 @@ def leading(comparison: Comparison) -> Agreement | None:
     """The quantity farthest beyond its tolerance; of the motion if any of that is beyond."""
     beyond = [each for each in comparison.agreements if each.verdict != "agrees"]
     motion = [each for each in beyond if each.kind in MOTION]
-    return max(motion or beyond, key=_tolerances, default=comparison.worst)
+    return max(motion or beyond, key=_finite_first, default=comparison.worst)
 
 
-def _tolerances(found: Agreement) -> float:
+def _finite_first(found: Agreement) -> float:
     """How many tolerances it is beyond; what is no number comes last."""
-    share = found.max / found.tolerance
-    return share if np.isfinite(share) else -1.0
+    return found.tolerances if np.isfinite(found.tolerances) else -1.0
 
 
 def parting(comparison: Comparison) -> float | None:
