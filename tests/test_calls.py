@@ -19,6 +19,7 @@ from statemachine import backends, calls, installed
 from statemachine.backends.mujoco_backend import MujocoData
 from statemachine.calls import CLOSED, NEW, CallRecording, Statement, record, recorded_engines
 from statemachine.calls.recorder import CallRecorder
+from statemachine.cli import main
 from statemachine.errors import BadInputError, UnknownNameError
 from statemachine.page import Page, Table
 from statemachine.report import calls as words
@@ -513,6 +514,16 @@ def test_what_cannot_be_recorded_is_refused() -> None:
         record(SHORT.format(engine="pybullet", code=""), "mujoco")
     nested = 'from statemachine.calls import record\nrecord("", "mujoco")'
     assert "cannot record another" in str(record(nested, "mujoco").error)
+
+
+def test_a_lesson_on_a_backend_whose_calls_nobody_knows(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It is taken, and the page says that the calls are missing."""
+    monkeypatch.setattr(backends, "_BACKENDS", dict(backends._BACKENDS))
+    backends.register("twin", "statemachine.backends.mujoco_backend:load")
+    assert main(("lesson", "forward", "--backend", "twin", "--calls", "--no-questions")) == 0
+    assert "twin: not asked which of its own functions it ran." in capsys.readouterr().out
 
 
 def test_statements_are_those_that_were_typed() -> None:

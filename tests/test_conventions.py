@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import gc
 import json
@@ -17,6 +18,10 @@ import numpy as np
 import pytest
 from rich.cells import cell_len
 
+from statemachine import engines
+from statemachine.calls import record
+from statemachine.cli import main
+from statemachine.compare.models.engines import own_ways
 from statemachine.conventions import (
     NO_ANSWER,
     QUESTIONS,
@@ -723,6 +728,66 @@ def test_a_terminal_without_unicode(cli: Cli, what: str) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout.isascii()
     assert done.stdout.count("?") == (0 if what == "--calls" else 1)  # that of the question
+
+
+# An engine that has no room, or less in it.
+
+
+def test_an_engine_without_a_room_is_not_asked(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """MuJoCo under another name: in the table of engines, and nowhere else."""
+    monkeypatch.setitem(ENGINES, "twin", dataclasses.replace(ENGINES["mujoco"], name="twin"))
+    assert ask("gravity", "twin") is None
+    assert own_ways("twin", "mujoco") == ()
+    for arguments in (("gravity", "write"), ("--calls",)):
+        assert main(("conventions", "--backend", "twin", *arguments)) == 0
+        assert "not asked" in capsys.readouterr().out
+        assert main(("conventions", "--backend", "twin", "--json", *arguments)) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert list(found["versions"]) == ["twin"]
+        assert found.get("engines", {"twin": []}) == {"twin": []}
+        for each in found.get("questions", ()):
+            assert each["findings"] == {"twin": None}
+    assert main(("conventions", "gravity")) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.split() == ["twin", "not", "asked"] for line in lines)
+    assert any(line.split()[:4] == ["mujoco", "0", "0", "-9.81"] for line in lines)
+
+
+def test_a_room_of_another_package_may_have_a_part_of_the_parts(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    room = tmp_path / "their_room"
+    room.mkdir()
+    (room / "__init__.py").touch()
+    (room / "conventions.py").write_text("def gravity(steps): return (0, 0, -steps), (0, 0, -1)")
+    (room / "phrasebook.py").write_text(
+        "from statemachine.engines.phrases import Cell\n"
+        "FILE = ('a.txt', '7')\n"
+        "def close(names): pass\n"
+        "CELLS = {'load': Cell('a = int(open(file).read())', lambda n: n.a == 7)}"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(engines, "_ROOMS", dict(engines._ROOMS))
+    engines.register("theirs", "their_room")
+    assert answers("gravity", "theirs") == {"": "told 0 0 -50, felt 0 0 -1"}
+    assert ask("timestep", "theirs") is None
+    (phrase,) = phrasebook.run(["theirs"]).engines["theirs"]
+    assert phrase == phrasebook.Phrase("load", "a = int(open(file).read())", True, "")
+    with pytest.raises(UnknownNameError, match="calls can be recorded"):
+        record("", "theirs")
+
+
+@pytest.mark.parametrize("room", ["conventions", "calls"])
+def test_who_asks_names_no_engine(room: str) -> None:
+    for file in (ROOT / "statemachine" / room).glob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            assert not (isinstance(node, ast.Constant) and node.value in ENGINES), file
+            named = isinstance(node, (ast.FunctionDef, ast.Attribute, ast.Name))
+            assert not (
+                named and {getattr(node, k, "") for k in ("name", "attr", "id")} & {*ENGINES}
+            )
 
 
 def test_errors_of_the_library() -> None:

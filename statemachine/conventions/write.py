@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..engines.measured import Measurement, Reading
+from ..engines.measured import Measurement, ReadTwice
 from .answers import UNDECIDED, Answers, EngineAnswer, EngineQuestion
 
 QUESTION = EngineQuestion(
@@ -17,12 +17,12 @@ GIVEN = (0.4, 0.01)  # rad, m
 _SAME = 1e-6  # m; PyBullet tells a link's frame in single precision
 
 
-def answer(readings: Sequence[Reading]) -> Answers:
+def answer(readings: Sequence[ReadTwice]) -> Answers:
     """Stale or fresh: how far off is what is read, and what is recomputed then?"""
     return tuple(_answer(reading) for reading in readings)
 
 
-def _answer(reading: Reading) -> EngineAnswer:
+def _answer(reading: ReadTwice) -> EngineAnswer:
     off, again = (
         float(np.linalg.norm(np.subtract(value, reading.true)))
         for value in (reading.read, reading.recomputed)

@@ -87,7 +87,7 @@ class LetGo:
 
 
 @dataclass(frozen=True)
-class Reading:
+class ReadTwice:
     """Something that follows from the state [m], read, and read again once recomputed.
 
     Attributes:
@@ -165,11 +165,11 @@ class ConventionsPart(Protocol):
         """
         ...
 
-    def write(self, angle: float, deep: float) -> Sequence[Reading]:
+    def write(self, angle: float, deep: float) -> Sequence[ReadTwice]:
         """The pendulum's tip after its angle was written, and a ball put into the floor [m]."""
         ...
 
-    def step(self, speed: float, deep: float) -> Sequence[Reading] | Absent:
+    def step(self, speed: float, deep: float) -> Sequence[ReadTwice] | Absent:
         """The same after one step, of a pendulum [rad/s] and a ball [m/s] on their way."""
         ...
 

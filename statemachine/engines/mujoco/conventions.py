@@ -10,7 +10,7 @@ import numpy as np
 
 from ...installed import require
 from ...interface import Array
-from ..measured import Futures, LetGo, Measurement, OneStep, Reading, Sliding
+from ..measured import Futures, LetGo, Measurement, OneStep, ReadTwice, Sliding
 from ..samples import floor, joint_tree, marked, pendulum
 from . import pile
 
@@ -105,24 +105,24 @@ def _depth(data: Any) -> float:
     return max((-float(contact.dist) for contact in data.contact), default=0.0)
 
 
-def write(angle: float, deep: float) -> list[Reading]:
+def write(angle: float, deep: float) -> list[ReadTwice]:
     """Write qpos of a pendulum, then of a ball that is put into the floor."""
     mj, model, data = _loaded(pendulum.MJCF % "")
     mj.mj_forward(model, data)
     data.qpos[0] = angle
     read = np.array(data.site("tip").xpos)
     mj.mj_forward(model, data)
-    tip = Reading("the tip", read, np.array(data.site("tip").xpos), pendulum.tip_at(angle))
+    tip = ReadTwice("the tip", read, np.array(data.site("tip").xpos), pendulum.tip_at(angle))
 
     mj, model, data = _loaded(floor.BALL)
     mj.mj_forward(model, data)
     data.qpos[2] = floor.RADIUS - deep
     depth = _depth(data)
     mj.mj_forward(model, data)
-    return [tip, Reading("the contact", depth, _depth(data), deep)]
+    return [tip, ReadTwice("the contact", depth, _depth(data), deep)]
 
 
-def step(speed: float, deep: float) -> list[Reading]:
+def step(speed: float, deep: float) -> list[ReadTwice]:
     """A pendulum on its way, and a ball on its way out of the floor."""
     mj, model, data = _loaded(pendulum.MJCF % "")
     data.qvel[0] = speed
@@ -130,7 +130,7 @@ def step(speed: float, deep: float) -> list[Reading]:
     read = np.array(data.site("tip").xpos)
     mj.mj_kinematics(model, data)
     true = pendulum.tip_at(data.qpos[0])
-    tip = Reading("the tip", read, np.array(data.site("tip").xpos), true)
+    tip = ReadTwice("the tip", read, np.array(data.site("tip").xpos), true)
 
     mj, model, data = _loaded(floor.BALL)
     data.qpos[2], data.qvel[2] = floor.RADIUS - deep, speed
@@ -138,7 +138,7 @@ def step(speed: float, deep: float) -> list[Reading]:
     depth = _depth(data)
     mj.mj_forward(model, data)
     now = max(floor.RADIUS - float(data.qpos[2]), 0.0)
-    return [tip, Reading("the contact", depth, _depth(data), now)]
+    return [tip, ReadTwice("the contact", depth, _depth(data), now)]
 
 
 def joints() -> dict[str, list[str]]:

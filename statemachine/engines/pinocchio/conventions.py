@@ -11,7 +11,7 @@ import numpy as np
 
 from ...installed import require
 from ...interface import Array
-from ..measured import Absent, LetGo, Measurement, Past, Reading
+from ..measured import Absent, LetGo, Measurement, Past, ReadTwice
 from ..samples import joint_tree, marked, pendulum
 from .names import names_with
 
@@ -92,7 +92,7 @@ def damping(_seconds: float, _fast: float) -> Absent:
     return _absent("step", "simul")
 
 
-def write(angle: float, _deep: float) -> list[Reading]:
+def write(angle: float, _deep: float) -> list[ReadTwice]:
     """Another q, handed to one function after the other."""
     pin = require("pinocchio")
     model = pin.buildModelFromXML(pendulum.URDF)
@@ -104,7 +104,7 @@ def write(angle: float, _deep: float) -> list[Reading]:
     reads["the tip, after forwardKinematics"] = np.array(data.oMf[tip].translation)
     pin.updateFramePlacements(model, data)
     now, true = np.array(data.oMf[tip].translation), pendulum.tip_at(angle)
-    return [Reading(part, read, now, true) for part, read in reads.items()]
+    return [ReadTwice(part, read, now, true) for part, read in reads.items()]
 
 
 def step(_speed: float, _deep: float) -> Absent:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...backends._bullet_client import pb
 from ...interface import Array
-from ..measured import Futures, LetGo, Measurement, OneStep, Reading, Sliding
+from ..measured import Futures, LetGo, Measurement, OneStep, ReadTwice, Sliding
 from ..samples import floor, joint_tree, marked, pendulum
 from . import pile
 from .world import limp, load, put_floor, world
@@ -155,14 +155,14 @@ def _depth(client: int) -> float:
     return max((-point[8] for point in pb.getContactPoints(physicsClientId=client)), default=0.0)
 
 
-def write(angle: float, deep: float) -> list[Reading]:
+def write(angle: float, deep: float) -> list[ReadTwice]:
     """Write by resetJointState to a pendulum, then a ball that is put into the floor."""
     with world() as client:
         body = load(client, pendulum.URDF, fixed=True)
         _tip(client, body, compute=True)
         pb.resetJointState(body, 0, angle, 0, client)
         read = _tip(client, body)
-        tip = Reading("the tip", read, _tip(client, body, compute=True), pendulum.tip_at(angle))
+        tip = ReadTwice("the tip", read, _tip(client, body, compute=True), pendulum.tip_at(angle))
     with world() as client:
         ball = _put_ball(client, 1)
         pb.performCollisionDetection(client)
@@ -170,10 +170,10 @@ def write(angle: float, deep: float) -> list[Reading]:
         pb.resetBasePositionAndOrientation(ball, at, (0, 0, 0, 1), client)
         depth = _depth(client)
         pb.performCollisionDetection(client)
-        return [tip, Reading("the contact", depth, _depth(client), deep)]
+        return [tip, ReadTwice("the contact", depth, _depth(client), deep)]
 
 
-def step(speed: float, deep: float) -> list[Reading]:
+def step(speed: float, deep: float) -> list[ReadTwice]:
     """A limp pendulum on its way, and a ball on its way out of the floor."""
     with world() as client:
         body = load(client, pendulum.URDF, fixed=True)
@@ -182,7 +182,7 @@ def step(speed: float, deep: float) -> list[Reading]:
         pb.stepSimulation(client)
         read, again = _tip(client, body), _tip(client, body, compute=True)
         angle = pb.getJointState(body, 0, client)[0]
-        tip = Reading("the tip", read, again, pendulum.tip_at(angle))
+        tip = ReadTwice("the tip", read, again, pendulum.tip_at(angle))
     with world() as client:
         ball = _put_ball(client, floor.RADIUS - deep)
         pb.resetBaseVelocity(ball, (0, 0, speed), (0, 0, 0), client)
@@ -190,7 +190,7 @@ def step(speed: float, deep: float) -> list[Reading]:
         depth = _depth(client)
         pb.performCollisionDetection(client)
         now = max(floor.RADIUS - pb.getBasePositionAndOrientation(ball, client)[0][2], 0.0)
-        return [tip, Reading("the contact", depth, _depth(client), now)]
+        return [tip, ReadTwice("the contact", depth, _depth(client), now)]
 
 
 def joints() -> dict[str, list[str]]:

@@ -65,7 +65,7 @@ Saved = Callable[[Pile], AbstractContextManager[Callable[[], None]]]
 
 
 @dataclass(frozen=True)
-class Quantity:
+class PileQuantity:
     """Something that decides the future: how it is written, and what shows it.
 
     Attributes:
@@ -116,30 +116,30 @@ def _moved(scene: Pile) -> float:
 
 # Nothing else acts while one of these is looked at; the box is in the air.
 QUANTITIES = {
-    "joint position": Quantity(
+    "joint position": PileQuantity(
         lambda s, x: pb.resetJointState(s.arm, 0, x, _joint(s, 1), s.client),
         lambda s: _joint(s, 0),
     ),
-    "joint velocity": Quantity(
+    "joint velocity": PileQuantity(
         lambda s, x: pb.resetJointState(s.arm, 0, _joint(s, 0), x, s.client),
         lambda s: _joint(s, 1),
     ),
-    "base position": Quantity(
+    "base position": PileQuantity(
         lambda s, x: pb.resetBasePositionAndOrientation(s.box, (x, 0, 1), (0, 0, 0, 1), s.client),
         lambda s: pb.getBasePositionAndOrientation(s.box, s.client)[0][0],
     ),
-    "base velocity": Quantity(
+    "base velocity": PileQuantity(
         lambda s, x: pb.resetBaseVelocity(s.box, (x, 0, 0), (0, 0, 0), s.client),
         _base_velocity,
     ),
-    "motor target": Quantity(_set_target, _stepped(lambda s: _joint(s, 1))),
-    "applied force": Quantity(_push, _stepped(_base_velocity)),
-    "gravity": Quantity(
+    "motor target": PileQuantity(_set_target, _stepped(lambda s: _joint(s, 1))),
+    "applied force": PileQuantity(_push, _stepped(_base_velocity)),
+    "gravity": PileQuantity(
         # As much as makes up this speed in one step.
         lambda s, x: pb.setGravity(240 * x, 0, 0, s.client),
         _stepped(_base_velocity),
     ),
-    "timestep": Quantity(lambda s, x: pb.setTimeStep(x / 100, s.client), _moved),
+    "timestep": PileQuantity(lambda s, x: pb.setTimeStep(x / 100, s.client), _moved),
 }
 
 
