@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..engines import part, rooms_with
-from ..engines.watching import CallsPart
+from ..engines.call_watch import CallsPart
 from ..errors import BadInputError, StateMachineError, unknown_name
 from ..installed import engine_version, require
 from ..interface import Model

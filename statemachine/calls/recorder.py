@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..engines.watching import CallWatch, WatchedObject
+from ..engines.call_watch import CallWatch, WatchedObject
 from ..errors import BadInputError
 
 # What stands in `Call.changed` for something that was not there before, or is no more.

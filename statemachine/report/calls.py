@@ -7,7 +7,7 @@ from itertools import groupby, zip_longest
 
 from ..calls import Call, CallRecording, Statement
 from ..engines import part
-from ..engines.watching import CallWords
+from ..engines.call_watch import CallWords
 from ..interface import DERIVED
 from ..page import Block, Code, Table, Text
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...backends import mujoco_backend
 from ...interface import DERIVED, INPUTS, Data, Model
-from ..watching import FUNCTIONS, CallWatch, CallWords, Contents, WatchedObject, entries, named
+from ..call_watch import FUNCTIONS, CallWatch, CallWords, Contents, WatchedObject, entries, named
 
 WORDS = CallWords(
     shown="the arrays, counts and options of MjData and MjModel",

@@ -16,7 +16,7 @@ from ...backends._bullet_machine import Machine
 from ...backends.pybullet_backend import PybulletData, PybulletModel
 from ...installed import require
 from ...interface import DERIVED, INPUTS
-from ..watching import FUNCTIONS, CallWatch, CallWords, Contents, WatchedObject, entries, named
+from ..call_watch import FUNCTIONS, CallWatch, CallWords, Contents, WatchedObject, entries, named
 
 WORDS = CallWords(
     shown="what its getters tell without computing anything anew",
