@@ -19,7 +19,9 @@ _ROOMS: dict[str, str] = {
     name: f"{__name__}.{name}" for name in ("mujoco", "pybullet", "pinocchio")
 }
 # What a room may have.
-PARTS: dict[str, str] = {}
+PARTS: dict[str, str] = {
+    "audit": "driver(model, seed): the engine by its own functions, to find what its state is",
+}
 
 
 def room_names() -> list[str]:

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 from ..audit import Audited
 from ..audit.conclusions import Conclusion, Missing
-from ..audit.findings import Gap, worst
 from ..audit.look import LOOK
 from ..audit.repeat import AGAIN
+from ..engines.futures import FutureGap, worst
 
 _SAME = "same"
 
@@ -121,7 +121,7 @@ def listed(words: Sequence[str]) -> str:
     return ", ".join(words)
 
 
-def cell(off: Gap) -> str:
+def cell(off: FutureGap) -> str:
     """The larger of angle and length, or that every byte is the same."""
     if off.exact:
         return _SAME
