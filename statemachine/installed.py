@@ -61,6 +61,9 @@ class Engine:
     probe: str  # an attribute that only the right package of that name has
 
 
+DEFAULT = "mujoco"  # what runs where nothing else is asked for; it compiles MJCF for all others
+PAIR = ("mujoco", "pybullet")  # what is compared where nothing else is asked for
+
 ENGINES = {
     engine.name: engine
     for engine in (

@@ -21,6 +21,7 @@ _ROOMS: dict[str, str] = {
 # What a room may have.
 PARTS: dict[str, str] = {
     "audit": "driver(model, seed): the engine by its own functions, to find what its state is",
+    "reading": "read(path, name): the description of what the engine makes of a file",
 }
 
 
@@ -49,6 +50,15 @@ def register(name: str, package: str) -> None:
     _ROOMS[name] = package
 
 
+def rooms_with(name: str) -> list[str]:
+    """Names of the engines whose rooms have a part.
+
+    Args:
+        name: One of `PARTS`.
+    """
+    return [engine for engine in room_names() if _module(engine, name)]
+
+
 def part(engine: str | None, name: str) -> Any | None:
     """A part of an engine's room, imported now; None if the engine has none.
 
@@ -60,6 +70,11 @@ def part(engine: str | None, name: str) -> Any | None:
         raise unknown_name("part of an engine's room", name, PARTS)
     if engine is None or engine not in room_names():
         return None
+    module = _module(engine, name)
+    return importlib.import_module(module) if module else None
+
+
+def _module(engine: str, name: str) -> str | None:
+    """The module of a part, which is not imported; None if there is none."""
     module = f"{_ROOMS[engine]}.{name}"
-    importlib.import_module(_ROOMS[engine])
-    return importlib.import_module(module) if importlib.util.find_spec(module) else None
+    return module if importlib.util.find_spec(module) else None
