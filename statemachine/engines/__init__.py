@@ -22,6 +22,8 @@ _ROOMS: dict[str, str] = {
 PARTS: dict[str, str] = {
     "audit": "driver(model, seed): the engine by its own functions, to find what its state is",
     "reading": "read(path, name): the description of what the engine makes of a file",
+    "energy": "energies(model, qpos, qvel): kinetic and potential energy of states",
+    "rendering": "here(), label(opengl), drawer(files, size, camera): pictures without a screen",
 }
 
 

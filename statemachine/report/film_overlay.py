@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from ..drawing.shots import GHOST
 from ..interface import Array
 from ..rendering import Timing
-from ..rendering.compose import GHOST
 from .figures_of import figure
 from .log_axis import LogAxis
 
