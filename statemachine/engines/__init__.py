@@ -23,6 +23,8 @@ PARTS: dict[str, str] = {
     "audit": "driver(model, seed): the engine by its own functions, to find what its state is",
     "reading": "read(path, name): the description of what the engine makes of a file",
     "energy": "energies(model, qpos, qvel): kinetic and potential energy of states",
+    "mutants": "adapter: the module of the backend that a seeded fault is put into",
+    "watched": "what a student can do with the engine past the interface, and how it is seen",
     "rendering": "here(), label(opengl), drawer(files, size, camera): pictures without a screen",
 }
 
