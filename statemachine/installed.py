@@ -63,6 +63,7 @@ class Engine:
 
 
 DEFAULT = "mujoco"  # what runs where nothing else is asked for; it compiles MJCF for all others
+WITNESS = "pinocchio"  # what computes places independently
 PAIR = ("mujoco", "pybullet")  # what is compared where nothing else is asked for
 
 ENGINES = {

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..experiments import fingertip
+from ..installed import WITNESS
 from ..page import Page, Table, Text, Verdict
 from ._words import differences, millimetres, page_of, vector, where
 
@@ -15,7 +16,7 @@ def page(results: Mapping[str, fingertip.Certificate]) -> Page:
     """Frames first, then the differences."""
     first = next(iter(results.values()))
     seed = first.provenance.seed
-    pinocchio = first.provenance.versions["pinocchio"]
+    pinocchio = first.provenance.versions[WITNESS]
     blocks: list[Any] = [
         Text(
             f"The engine computes where the fingertip ({first.site}) is, by forward; Pinocchio "
