@@ -7,21 +7,22 @@ the arm does; what the Model tells of itself (gravity, gains, friction) stays ri
 from __future__ import annotations
 
 import copy
-import importlib
 import random
 from collections.abc import Callable
 from contextlib import suppress
-from functools import partial
+from functools import cache, partial
+from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol
 
 import numpy as np
 
+from ...backends import load
+from ...engines import part, rooms_with
 from ...errors import MissingEngineError
 from ...installed import require
 from ...interface import INPUTS, Array, Data, JointType, read_only
 from ...rotations import matrix_from_quat, xyzw_from_wxyz
-from . import BACKENDS
 
 
 class Patcher(Protocol):
@@ -39,10 +40,10 @@ Instead = Callable[..., Any]
 def _adapters() -> list[ModuleType]:
     """The modules of the backends whose engine is here."""
     found = []
-    for name in BACKENDS:
+    for name in rooms_with("mutants"):
         with suppress(MissingEngineError):
             require(name)
-            found.append(importlib.import_module(f"statemachine.backends.{name}_backend"))
+            found.append(part(name, "mutants").adapter)
     return found
 
 
@@ -166,9 +167,14 @@ def xyzw(_data: Data, right: Array) -> Array:
 @reading("xpos")
 def com_for_frame(data: Data, right: Array) -> Array:
     """The place that another engine reports for a link."""
-    model: Any = data.model
-    raw = model._shared.raw if data.model.backend == "pybullet" else model.raw
-    return right + np.einsum("bij,bj->bi", matrix_from_quat(data.xquat), raw.body_ipos)
+    centres = _centres(data.model.path)
+    return right + np.einsum("bij,bj->bi", matrix_from_quat(data.xquat), centres)
+
+
+@cache
+def _centres(path: Path) -> Array:
+    """Centres of mass (nbody, 3) of a model's bodies, in their frames [m]."""
+    return np.array(load(path).raw.body_ipos)
 
 
 @hook("_recompute")
