@@ -107,7 +107,7 @@ def test_gravity_prints_the_table_of_the_course(cli: Cli) -> None:
     assert off["forces"]["contact"] / off["forces"]["bias"] > 0.95
     assert abs(off["forces"]["friction"]) < 0.052
     assert 0.5 < min(off["touches"].values()) < 1.0
-    assert off["touching"] == ["fixed_stud_1 (gripper) on floor"]
+    assert off["touching"] == ["gripper on floor (fixed_stud_1)"]
     for run in (found["servos_on"], off):
         assert abs(run["forces"]["total"]) < 1e-5
     assert found["servos_on"]["forces"]["contact"] == 0.0

@@ -22,13 +22,13 @@ import statemachine as sm
 from statemachine.compare import Comparison, compare, series, sides_of
 from statemachine.compare.series import total_forces
 from statemachine.compare.sides import Request
-from statemachine.compare.why import Attribution, Gap, Touch, Trial
+from statemachine.compare.why import Attribution, Deviation, FactorTrial, FirstTouch
+from statemachine.comparison.text import quantity
 from statemachine.drawing import drawing_of
 from statemachine.errors import BadInputError
 from statemachine.experiments.scenarios import SCENARIOS
 from statemachine.page import Page, Verdict
-from statemachine.report.figures_of import quantity
-from statemachine.report.html import Look, check_target, report, write_report
+from statemachine.report.html import SideDrawing, check_target, report, write_report
 from statemachine.report.html.between import shown_series
 from statemachine.report.html.charts import difference_chart, spread
 from statemachine.report.html.finding import headline
@@ -41,15 +41,15 @@ from .browser import Tab, browser
 from .conftest import ROOT, Cli, need_engine
 
 LIMIT = 2_000_000  # bytes
-Made = tuple[Comparison, Trace, Trace, Look]
+Made = tuple[Comparison, Trace, Trace, SideDrawing]
 
 
 def of(one: Trace, two: Trace) -> Made:
     return compare(one, two), one, two, look_of(one)
 
 
-def look_of(trace: Trace) -> Look:
-    return Look(drawing_of(sm.load(trace.header.provenance.model_file)))
+def look_of(trace: Trace) -> SideDrawing:
+    return SideDrawing(drawing_of(sm.load(trace.header.provenance.model_file)))
 
 
 def page_of(made: Made, **more: Any) -> str:
@@ -192,7 +192,7 @@ def test_names_that_are_markup_do_nothing(hold: Made, tmp_path: Path) -> None:
         tab.nothing_wrong()
 
 
-def of_look(one: Trace, two: Trace, look: Look) -> Made:
+def of_look(one: Trace, two: Trace, look: SideDrawing) -> Made:
     return compare(one, two), one, two, look
 
 
@@ -245,7 +245,7 @@ def test_much_to_draw_is_drawn_with_less(hold: Made) -> None:
         vertices=ball.reshape(-1, 3).astype(np.float32),
         faces=faces.astype(np.int32),
     )
-    big = Look(dataclasses.replace(look.drawing, parts=(*look.drawing.parts, part)))
+    big = SideDrawing(dataclasses.replace(look.drawing, parts=(*look.drawing.parts, part)))
     text = page_of(of_look(Trace(one.header, columns), two, big))
     assert len(text.encode()) <= LIMIT
     assert "triangles" in text
@@ -261,7 +261,7 @@ def test_the_headline_is_made_of_the_figures(hold: Made) -> None:
     curves = series(one, two)
     finding = headline(comparison, events_of(comparison, one, two), None, curves)
     wrist = found["wrist_flex"]
-    far, at = quantity(wrist.max, "joint"), f"{wrist.at:.3f} s"
+    far, at = quantity(wrist.max, wrist.unit), f"{wrist.at:.3f} s"
     assert finding.lead.startswith(f"Joint wrist_flex is up to {far} apart")
     assert f", at {at}; " in finding.lead
     since = min(each.since for each in comparison.agreements if each.since is not None)
@@ -295,11 +295,11 @@ def attribution_of(made: Made, quantity: str = "joints", **more: Any) -> Attribu
     """An attribution with figures of our own: a servo law, and contact that hides the rest."""
     comparison, one, two, _ = made
     worst = max((a for a in comparison.agreements if a.kind == "joint"), key=lambda a: a.max)
-    gap = Gap("rad", worst.max, worst.at, worst.rms, worst.settled)
+    gap = Deviation("rad", worst.max, worst.at, worst.rms, worst.settled)
     g = worst.max
 
-    def trial(factor: str, way: Any, after: float, before: float, moved: float) -> Trial:
-        return Trial(
+    def trial(factor: str, way: Any, after: float, before: float, moved: float) -> FactorTrial:
+        return FactorTrial(
             factor, way, ("kp 998.2", "its motors"), "as mujoco" if way == "parity" else "none",
             {}, after * g, before - after, moved,
         )  # fmt: skip
@@ -335,11 +335,11 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
     assert "contact takes 50.0 % of it away*" in found.causes[1]
     assert "a hint, not a proof" in found.causes[1]
     # A proof comes before.
-    touch = Touch(0.27, "finger (gripper) on floor; other", 3e-16, 55)
+    touch = FirstTouch(0.27, "gripper on floor (finger); other", 3e-16, 55)
     found = headline(comparison, [], attribution_of(hold, touch=touch))
-    assert found.causes[0].startswith("Until the first touch, finger (gripper) on floor at 0.270 s")
+    assert found.causes[0].startswith("Until the first touch, gripper on floor (finger) at 0.270 s")
     assert "2e-14° apart" in found.causes[0]
-    late = Touch(0.27, "finger on floor", 0.01, 55)  # they were apart before
+    late = FirstTouch(0.27, "finger on floor", 0.01, 55)  # they were apart before
     assert len(headline(comparison, [], attribution_of(hold, touch=late)).causes) == 2
     # Of another quantity than any that is compared: named as it is.
     other = headline(comparison, [], attribution_of(hold, quantity="box in the hand"))
@@ -405,7 +405,7 @@ def test_who_presses_on_what(hold: Made) -> None:
     assert never == []
     both = f"with {mean:.1f} N (with friction {found.total['gripper on floor']:.1f} N)"
     assert f"gripper presses on floor {both}" in said[0]
-    whole = total_forces(one)["world – gripper"][360:]
+    whole = total_forces(one)["gripper on floor"][360:]
     assert found.total == {"gripper on floor": pytest.approx(whole.mean())}
     assert whole.mean() > mean
     said_under = "it is at most 351 N; the whole force, friction added as vectors, is at most 383 N"
@@ -423,7 +423,7 @@ def test_who_presses_on_what(hold: Made) -> None:
     assert "on pybullet nothing touches at all" in said[0]
     text = page_of(of_look(one, bare, hold[3]))
     assert "On pybullet gripper never touches floor" in text
-    assert "world – gripper normal force over time on both sides" in text
+    assert "gripper on floor normal force over time on both sides" in text
 
 
 def test_names_in_a_list_have_no_comma(hold: Made, page: Path) -> None:
@@ -587,11 +587,11 @@ def test_every_figure_of_the_comparison_is_on_the_page(hold: Made, page: Path) -
         (line,) = [
             row for row in text.splitlines() if row.startswith(found.name.replace(", ", " ") + "\t")
         ]
-        assert quantity(found.tolerance, found.kind) in line
+        assert quantity(found.tolerance, found.unit) in line
         assert found.verdict in line
         if found.kind != "contact":
             for value in (found.max, found.rms, found.settled):
-                assert quantity(value, found.kind) in line
+                assert quantity(value, found.unit) in line
 
 
 def test_it_reads_without_a_script(page: Path) -> None:
@@ -1034,7 +1034,7 @@ def test_timesteps_that_differ_are_drawn_between_and_it_is_said(tmp_path: Path) 
 
 @pytest.mark.slow
 def test_without_the_model_there_are_sticks(hold: Made, tmp_path: Path) -> None:
-    none = Look(None, "there is no so101/scene.xml here")
+    none = SideDrawing(None, "there is no so101/scene.xml here")
     target = write_report(tmp_path / "x.html", page_of(hold, looks=(none, none)))
     with browser(height=1000) as tab:
         open_page(tab, target)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..comparison.text import milliseconds, rounded
 from ..errors import BadInputError, unknown_name
 from ..interface import Array
 from ..traces import Trace
@@ -59,19 +60,20 @@ def tolerance_for(
     if kind == "energy":
         range_ = max(_range(series.one), _range(series.two))
         return Tolerance(
-            max(_ENERGY * range_, 1e-9), f"1 % of the {range_:.3g} J that the run turns over"
+            max(_ENERGY * range_, 1e-9),
+            f"1 % of the {rounded(range_, 'J')} that the run turns over",
         )
     if kind == "force":
         # Not of its peak: that of an impact is its impulse over the timestep, whatever that is.
         acting = max(_mean_acting(values) for values in (series.one, series.two))
         return Tolerance(
             max(_FORCE * acting, 1e-6),
-            f"5 % of {acting:.3g} N, the mean while they touch",
+            f"5 % of {rounded(acting, 'N')}, the mean while they touch",
         )
     longest = max(one.header.timestep, two.header.timestep)
     return Tolerance(
         longest * (1 + 1e-9),
-        f"one timestep, {1000 * longest:.3g} ms: an engine looks at contacts once in a step",
+        f"one timestep, {milliseconds(longest, 3)}: an engine looks at contacts once in a step",
     )
 
 

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..comparison import largest
 from ..engines import part
 from ..engines.parts import AsItComes, WayBack
 from ..errors import BadInputError, UnsupportedError, unknown_name
@@ -187,9 +188,9 @@ def run(
 
 def _broken(way: str, first: Array, other: Array) -> Broken:
     gap = np.abs(first - other).max(axis=1)
-    peak = int(np.argmax(gap))
+    peak, step = largest(gap)
     close = bool(np.allclose(first[-1], other[-1]))
-    return Broken(way, close, float(gap[peak]), peak, float(gap[-1]))
+    return Broken(way, close, peak, step, float(gap[-1]))
 
 
 def _finer(

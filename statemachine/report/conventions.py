@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
+from ..comparison.text import reading, significant
 from ..conventions import Answered, Conventions
 from ..conventions.phrasebook import CONCEPTS, Phrasebook
 from ..engines.measured import Measurement
@@ -12,8 +12,6 @@ from ..page import Block, Page, Table, Text, Verdict
 
 _ZERO = 1e-12
 _NOT_ASKED = "not asked"
-# Units as a reader has them; a result has SI.
-_SHOWN = {"m": (1e3, "mm"), "s": (1e3, "ms"), "rad": (180 / math.pi, "°")}
 
 
 def page(result: Conventions) -> Page:
@@ -70,19 +68,18 @@ def _table(answered: Answered) -> Table:
 
 
 def _number(value: float) -> str:
-    return f"{value + 0:.{3 if abs(value) >= 1e-3 else 2}g}"
+    return significant(value, 3 if abs(value) >= 1e-3 else 2)
 
 
 def _text(figure: Measurement) -> str:
     values = figure.value if isinstance(figure.value, tuple) else (figure.value,)
     numbers = [each for each in values if not isinstance(each, str)]
     most = max(map(abs, numbers), default=0.0)
-    factor, unit = _SHOWN.get(figure.unit, (1, figure.unit))
+    factor, unit = reading(figure.unit)
     words = [
         # Beside a large number, one that is only rounding is nothing.
         each if isinstance(each, str) else _number(factor * each if abs(each) > _ZERO * most else 0)
         for each in values
     ]
     shown = (" " if numbers else ", ").join(words) or "nothing"
-    gap = "" if unit in ("", "°") else " "
-    return f"{figure.name} {shown}{gap}{unit}".strip()
+    return f"{figure.name} {shown}{unit}".strip()

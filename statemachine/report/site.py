@@ -9,6 +9,7 @@ from pathlib import Path
 from ..backends import backend_names, load
 from ..compare import Request, compare, series, sides_of, touches, witness
 from ..compare.why import attribute
+from ..comparison.text import reading
 from ..conventions import phrasebook, probe
 from ..errors import MissingEngineError
 from ..experiments.scenarios import scenario
@@ -20,7 +21,6 @@ from ..traces.whole import replace_file
 from . import compare as comparison
 from . import conventions, why
 from .figures import svg
-from .figures_of import scale_of
 from .markdown import block_as_markdown, markdown
 
 
@@ -95,7 +95,7 @@ def make_comparisons(folder: Path, say: Callable[[str], None] = print) -> list[P
         asked = witness(one, two)
         page = comparison.page(compare(one, two), one.header.says, said, asked, touches(one, two))
         curves = {
-            curve.name: (curve.time.tolist(), (curve.difference * scale_of(curve.kind)[0]).tolist())
+            curve.name: (curve.time.tolist(), (curve.difference * reading(curve.unit)[0]).tolist())
             for curve in series(one, two)
             if curve.kind == "joint"
         }

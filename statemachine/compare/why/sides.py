@@ -8,6 +8,7 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
+from ...comparison.text import milliseconds, rounded, significant
 from ...engines import part
 from ...engines.parts import Dials, DialsPart, Setting
 from ...errors import UnsupportedError
@@ -284,10 +285,10 @@ def _written(model: Model, values: Values) -> Model:
 
 def _in_words(factor: Factor, values: Values) -> str:
     if factor.name == "gravity":
-        return f"{np.linalg.norm(values['gravity']):.3g} m/s²"
+        return rounded(float(np.linalg.norm(values["gravity"])), "m/s²")
     if factor.name == "timestep":
         step, substeps = float(values["timestep"]), int(values["substeps"])
-        return f"{step * 1e3:.3g} ms" + (f" / {substeps}" if substeps > 1 else "")
+        return milliseconds(step, 3) + (f" / {substeps}" if substeps > 1 else "")
     if factor.name in ("armature", "damping", "frictionloss"):
         return _span(values[factor.facts[0]])
     if factor.name == "servo":
@@ -306,4 +307,4 @@ def _span(values: Any) -> str:
     found = np.unique(np.asarray(values)[np.asarray(values) != 0])
     if not found.size:
         return "none"
-    return f"{found[0]:.4g}" + (f" to {found[-1]:.4g}" if found.size > 1 else "")
+    return significant(found[0]) + (f" to {significant(found[-1])}" if found.size > 1 else "")
