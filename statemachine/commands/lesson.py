@@ -7,7 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 from ..errors import BadInputError
-from ..lessons import LESSONS, STATIONS, Lesson
+from ..lessons import LESSONS, STATIONS
+from ..lessons.records import Lesson
 from ._common import (
     PROGRAM,
     SAYS_NO,

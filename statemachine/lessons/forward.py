@@ -22,7 +22,7 @@ from ._words import (
     vector,
     where,
 )
-from .session import Session
+from .records import Session
 
 _WHEN = ("before it", "after it")
 _MOMENTS = ("xpos", "site_xpos", "contacts", "qacc")  # shown of what a step leaves behind

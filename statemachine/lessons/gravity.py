@@ -20,7 +20,7 @@ from ._words import (
     typed,
     where,
 )
-from .session import Session
+from .records import Session
 
 _PARTS = (
     ("gravity (−bias)", "bias"),

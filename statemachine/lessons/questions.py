@@ -8,7 +8,7 @@ from typing import Any
 from ..experiments import questions
 from ..page import Page, Question, Text, Verdict
 from ._words import count, degrees, duration, millimetres, page_of, where
-from .session import Session
+from .records import Session
 
 _Results = Mapping[str, questions.Answers]
 # What is asked, what the run says, and whether that bears out the right choice.

@@ -21,7 +21,7 @@ from ._words import (
     vector,
     where,
 )
-from .session import Session
+from .records import Session
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> replay.Replay:

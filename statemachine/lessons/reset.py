@@ -8,7 +8,7 @@ from typing import Any
 from ..experiments import reset
 from ..page import Page, Question, Table, Text, Verdict
 from ._words import count, differences, emulation, millimetres, page_of, sentence, typed, where
-from .session import Session
+from .records import Session
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> reset.Reset:

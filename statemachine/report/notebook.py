@@ -14,7 +14,8 @@ from typing import Any
 
 from ..backends import load
 from ..errors import MissingEngineError, unknown_name
-from ..lessons import LESSONS, Lesson, module
+from ..lessons import LESSONS, module
+from ..lessons.records import Lesson
 from ..lessons.session import page_of_lesson, take
 from ..page import Code, Page, Picture, Printed, Question, Text
 from .figures import svg
