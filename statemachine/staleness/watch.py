@@ -93,14 +93,14 @@ class Watch:
             raise
         self._begin(age.steps, age.never, state if age.steps == 0 else None)
         self._kind, self._advance = type(data), data._advance
-        object.__setattr__(data, "_advance", self._advancing(self._advance))
-        object.__setattr__(data, "__class__", _guarded(self._kind, self))
+        data._advance = self._advancing(self._advance)
+        data.__class__ = _guarded(self._kind, self)
         return self
 
     def __exit__(self, *exc: object) -> None:
-        object.__setattr__(self._data, "__class__", self._kind)
+        self._data.__class__ = self._kind
         if self._data._advance is not None:  # it was not closed meanwhile
-            object.__setattr__(self._data, "_advance", self._advance)
+            self._data._advance = self._advance
         self._scratch.close()
 
     @contextmanager

@@ -166,9 +166,8 @@ def xyzw(_data: Data, right: Array) -> Array:
 @reading("xpos")
 def com_for_frame(data: Data, right: Array) -> Array:
     """The place that another engine reports for a link."""
-    model: Any = data.model
-    raw = model._shared.raw if data.model.backend == "pybullet" else model.raw
-    return right + np.einsum("bij,bj->bi", matrix_from_quat(data.xquat), raw.body_ipos)
+    offsets = data.model.compiled.body_ipos
+    return right + np.einsum("bij,bj->bi", matrix_from_quat(data.xquat), offsets)
 
 
 @hook("_recompute")
