@@ -22,58 +22,9 @@ MAY_NAME = ("backends/", "engines/", "installed.py", "kinematics.py", "witness_f
 # A backend's file and a room are called after the engine, or after the first half of its name.
 NAMES = frozenset(ENGINES) | {engine.module for engine in ENGINES.values()}
 
-STILL_NAME_AN_ENGINE = {  # all to go with the rooms of conventions, calls and dials
-    "probes/__init__.py",
-    "probes/calls/__init__.py",
-    "probes/calls/_mujoco.py",
-    "probes/calls/_pybullet.py",
-    "probes/conventions/_bullet.py",
-    "probes/conventions/_bullet_scene.py",
-    "probes/conventions/_mujoco_scene.py",
-    "probes/conventions/actuation.py",
-    "probes/conventions/command.py",
-    "probes/conventions/damping.py",
-    "probes/conventions/friction.py",
-    "probes/conventions/future.py",
-    "probes/conventions/gravity.py",
-    "probes/conventions/joints.py",
-    "probes/conventions/quaternion.py",
-    "probes/conventions/reset.py",
-    "probes/conventions/save.py",
-    "probes/conventions/step.py",
-    "probes/conventions/timestep.py",
-    "probes/conventions/velocity.py",
-    "probes/conventions/write.py",
-    "probes/pybullet_dials.py",
-    "probes/pybullet_probe.py",
-    "report/calls.py",
-    "report/site.py",
-}
-STILL_CIRCLES = {
-    frozenset({"compare.agreement", "compare.notes"}),
-    frozenset({"lessons", "lessons.session"}),
-    frozenset({"staleness.look", "staleness.watch"}),
-    frozenset({"traces.checked", "traces.trace"}),
-}
-STILL_TWICE = {
-    "Call",
-    "Dials",
-    "Figure",
-    "Finding",
-    "Gap",
-    "Moment",
-    "Pace",
-    "Pose",
-    "Question",
-    "Recording",
-    "Reset",
-    "Scene",
-    "Session",
-    "Side",
-    "Subject",
-    "Touch",
-    "Watch",
-}
+STILL_NAME_AN_ENGINE: set[str] = set()
+STILL_CIRCLES: set[frozenset[str]] = set()
+STILL_TWICE = {"Side"}
 
 
 @cache
