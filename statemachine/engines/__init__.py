@@ -18,7 +18,8 @@ from ..errors import BadInputError, unknown_name
 _ROOMS: dict[str, str] = {
     name: f"{__name__}.{name}" for name in ("mujoco", "pybullet", "pinocchio")
 }
-# What a room may have.
+# What a room may have. The protocol of a part, and the records that it gives, are in a module of
+# this package: `measured`, `phrases`, `call_watch`, `parts`.
 PARTS: dict[str, str] = {
     "as_it_comes": "what the engine calls things, and a model as its own users load it",
     "conventions": "what it does with tiny models, for the questions of `conventions`",

@@ -75,7 +75,7 @@ def model_digest(path: Path) -> str:
 
 
 @dataclass(frozen=True)
-class Itself:
+class OwnAnswer:
     """What an engine itself does, asked of it alone: a question, a part of it, the answer."""
 
     question: str
@@ -83,12 +83,12 @@ class Itself:
     answer: str
 
 
-def ask_itself(model: Model, *questions: str) -> tuple[Itself, ...]:
+def own_answers(model: Model, *questions: str) -> tuple[OwnAnswer, ...]:
     """Conventions of the engine behind a Model that emulates some of the contract."""
     if part(model.backend, "as_it_comes") is None:  # the interface is the engine's own
         return ()
     return tuple(
-        Itself(question, finding.of, finding.answer)
+        OwnAnswer(question, finding.of, finding.answer)
         for question in questions
         for finding in conventions.ask(question, model.backend) or ()
     )
