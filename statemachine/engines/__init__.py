@@ -13,7 +13,7 @@ import importlib.metadata
 import importlib.util
 from typing import Any
 
-from ..errors import BadInputError, unknown_name
+from ..errors import BadInputError, UnsupportedError, unknown_name
 
 _ROOMS: dict[str, str] = {
     name: f"{__name__}.{name}" for name in ("mujoco", "pybullet", "pinocchio")
@@ -76,6 +76,23 @@ def part(engine: str | None, name: str) -> Any | None:
         return None
     module = _module(engine, name)
     return importlib.import_module(module) if module else None
+
+
+def needed_part(engine: str, name: str) -> Any:
+    """A part that an engine must have for what was asked; else as `part`.
+
+    Raises:
+        UnsupportedError: Its room has none.
+    """
+    found = part(engine, name)
+    if found is None:
+        raise UnsupportedError(
+            f"{engine} has no part {name!r} in its room: {PARTS[name]}",
+            backend=engine,
+            feature=name,
+            reason="not written",
+        )
+    return found
 
 
 def _module(engine: str, name: str) -> str | None:

@@ -101,7 +101,7 @@ class StudentWatch:
         self.runs: list[EngineRun] = []
         self.forwards: list[Inputs] = []
         self.datas: list[Any] = []
-        self._room = part(model.backend, "watched")
+        self._room: Any = part(model.backend, "watched")
         self._origin = self._origin_of(model.raw if self._room else model)
         self._nudge = nudge
         self._current: dict[int, EngineRun] = {}

@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 from typing import Any
 
-from ..engines import part, rooms_with
+from ..engines import needed_part, rooms_with
 from ..errors import MissingEngineError, unknown_name
 from ..installed import DEFAULT, require
 
@@ -30,7 +30,7 @@ class Renderer:
     @property
     def room(self) -> Any:
         """What the engine draws with."""
-        return part(self.name, "rendering")
+        return needed_part(self.name, "rendering")
 
 
 def renderers() -> list[str]:
@@ -55,7 +55,7 @@ def renderer_here(name: str | None = None) -> Renderer:
     reasons: list[MissingEngineError] = []
     for engine in known if name is None else (name,):
         try:
-            return Renderer(engine, part(engine, "rendering").here())
+            return Renderer(engine, needed_part(engine, "rendering").here())
         except MissingEngineError as error:
             reasons.append(error)
     if name is not None:
@@ -68,4 +68,4 @@ def renderer_here(name: str | None = None) -> Renderer:
 
 def environment_of(renderer: Renderer) -> dict[str, str]:
     """The environment of a process that draws; the model is read by the default engine there."""
-    return part(DEFAULT, "rendering").environment(renderer.opengl, dict(os.environ))
+    return needed_part(DEFAULT, "rendering").environment(renderer.opengl, dict(os.environ))

@@ -8,7 +8,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 
-from ..engines import part
+from ..engines import needed_part
 from ..installed import DEFAULT, ENGINES, engine_version, wheel_here
 from ..page import Page, Table, Text, Verdict
 
@@ -94,7 +94,7 @@ def _engine(name: str) -> HealthCheck:
 
 
 def _rendering() -> HealthCheck:
-    works, found, step = part(DEFAULT, "rendering").diagnosis()
+    works, found, step = needed_part(DEFAULT, "rendering").diagnosis()
     return HealthCheck("rendering", works, found, step, optional=True)
 
 

@@ -7,8 +7,9 @@ from typing import Any, Literal
 import numpy as np
 
 from ..backends import on_default
-from ..engines import part
+from ..engines import needed_part
 from ..errors import StateMachineError
+from ..installed import DEFAULT
 from ..interface import Array, Model
 
 
@@ -47,7 +48,7 @@ def energies(
                 yardstick = yardstick.replace(gravity=model.gravity, armature=model.dof_armature)
             elif gravity is not None:
                 yardstick = yardstick.replace(gravity=gravity)
-        found = part(yardstick.backend, "energy").energies(yardstick, qpos, qvel)
+        found = needed_part(DEFAULT, "energy").energies(yardstick, qpos, qvel)
     except StateMachineError:
         return unknown
-    return found, f"{yardstick.backend} {yardstick.engine_version}"
+    return found, f"{DEFAULT} {yardstick.engine_version}"

@@ -18,7 +18,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...backends import load
-from ...engines import part, rooms_with
+from ...engines import needed_part, rooms_with
 from ...errors import MissingEngineError
 from ...installed import require
 from ...interface import INPUTS, Array, Data, JointType, read_only
@@ -43,7 +43,7 @@ def _adapters() -> list[ModuleType]:
     for name in rooms_with("mutants"):
         with suppress(MissingEngineError):
             require(name)
-            found.append(part(name, "mutants").adapter)
+            found.append(needed_part(name, "mutants").adapter)
     return found
 
 
