@@ -1,4 +1,4 @@
-"""The shape of the package: engines in their rooms, no circle, no class name twice.
+"""The shape of the package, from its source alone: rooms, circles, names.
 
 What is known and not yet mended stands in a list here, and a test fails when it is mended: so the
 lists only shrink.

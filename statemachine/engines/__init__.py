@@ -20,6 +20,11 @@ _ROOMS: dict[str, str] = {
 }
 # What a room may have.
 PARTS: dict[str, str] = {
+    "as_it_comes": "what the engine calls things, and a model as its own users load it",
+    "conventions": "what it does with tiny models, for the questions of `conventions`",
+    "phrasebook": "which of its calls does what, as lines to type",
+    "calls": "which of its functions can be watched, and what they change",
+    "dials": "Models between the engine as it comes and the contract",
     "audit": "driver(model, seed): the engine by its own functions, to find what its state is",
     "reading": "read(path, name): the description of what the engine makes of a file",
     "energy": "energies(model, qpos, qvel): kinetic and potential energy of states",
@@ -63,7 +68,7 @@ def rooms_with(name: str) -> list[str]:
     return [engine for engine in room_names() if _module(engine, name)]
 
 
-def part(engine: str | None, name: str) -> Any | None:
+def part(engine: str | None, name: str) -> Any:
     """A part of an engine's room, imported now; None if the engine has none.
 
     Args:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from ..comparison import Gap
+from ..comparison.text import count, few, listed, milliseconds
 from ..errors import UnsupportedError
 from ..interface import (
     DERIVED,
@@ -27,7 +29,7 @@ from ..interface import (
     set_state,
 )
 from ..rotations import times
-from .gaps import Gap, gaps, same
+from .gaps import gaps, same
 from .result import Freshness, Row
 
 if TYPE_CHECKING:
@@ -168,10 +170,10 @@ def stale_row(model: Model, name: str, moment: Moment, found: tuple[Gap, ...]) -
         writes = sum(moment.writes[each] for each in DEPEND[name])
     words = []
     if moment.steps:
-        words.append(_count(moment.steps, "substep" if model.substeps > 1 else "step"))
+        words.append(count(moment.steps, "substep" if model.substeps > 1 else "step"))
     if writes:
-        words.append(_count(writes, "write"))
-    of = " and ".join(words) + " ago" if words else "an earlier state"
+        words.append(count(writes, "write"))
+    of = f"{listed(words)} ago" if words else "an earlier state"
     return Row(name, False, moment.steps, writes, of, found)
 
 
@@ -245,15 +247,6 @@ def _engine_step(model: Model) -> float:
     return model.timestep / model.substeps
 
 
-def _count(number: int, thing: str) -> str:
-    return f"{number} {thing}" + "s" * (number != 1)
-
-
-def _some(names: tuple[str, ...]) -> str:
-    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    return ", ".join(names[:3]) + more
-
-
 def _notes(model: Model, rows: tuple[Row, ...], moment: Moment, touching: bool) -> Iterator[str]:
     behaviours = model.capabilities.behaviours
     stale = [each.name for each in rows if not each.now]
@@ -281,12 +274,12 @@ def _how(model: Model, moment: Moment, poses: bool) -> Iterator[str]:
     if moment.retraced:
         exact = f"to {moment.within:.1e} m" if moment.within else "to the bit"
         yield (
-            f"Found by going back: qpos − h·qvel, h = {1e3 * _engine_step(model):.4g} ms, gives "
-            f"the poses of {_some(moment.retraced)}, {exact}."
+            f"Found by going back: qpos − h·qvel, h = {milliseconds(_engine_step(model))}, gives "
+            f"the poses of {few(moment.retraced)}, {exact}."
         )
         if moment.strays:
             yield (
-                f"Not so {_some(moment.strays)}: qpos or qvel was written since, or the engine "
+                f"Not so {few(moment.strays)}: qpos or qvel was written since, or the engine "
                 "integrates otherwise."
             )
     elif not moment.never and moment.steps is None:
