@@ -25,12 +25,12 @@ PARTS: dict[str, str] = {
     "phrasebook": "which of its calls does what, as lines to type",
     "calls": "which of its functions can be watched, and what they change",
     "dials": "Models between the engine as it comes and the contract",
-    "audit": "driver(model, seed): the engine by its own functions, to find what its state is",
-    "reading": "read(path, name): the description of what the engine makes of a file",
-    "energy": "energies(model, qpos, qvel): kinetic and potential energy of states",
-    "mutants": "adapter: the module of the backend that a seeded fault is put into",
-    "watched": "what a student can do with the engine past the interface, and how it is seen",
-    "rendering": "here(), label(opengl), drawer(files, size, camera): pictures without a screen",
+    "audit": "the engine by its own functions, to find out what its state is",
+    "reading": "what the engine makes of a file, as a description",
+    "energy": "the energies of states, by which all engines are measured",
+    "mutants": "where a seeded fault is put into its backend",
+    "watched": "what a student can do with the engine past the interface",
+    "rendering": "pictures without a screen",
 }
 
 
