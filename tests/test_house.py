@@ -22,12 +22,8 @@ MAY_NAME = ("backends/", "engines/", "installed.py", "kinematics.py", "witness_f
 # A backend's file and a room are called after the engine, or after the first half of its name.
 NAMES = frozenset(ENGINES) | {engine.module for engine in ENGINES.values()}
 
-STILL_CIRCLES = {
-    frozenset({"lessons", "lessons.session"}),
-    frozenset({"staleness.look", "staleness.watch"}),
-    frozenset({"traces.checked", "traces.trace"}),
-}
-STILL_TWICE = {"Moment", "Side"}
+STILL_CIRCLES: set[frozenset[str]] = set()
+STILL_TWICE = {"Side"}
 
 
 @cache

@@ -1,4 +1,7 @@
-"""The backends by name, each loaded when it is first asked for."""
+"""The backends by name, each loaded when it is first asked for.
+
+What a backend for an engine with a world of its own is made from is here, too: `HiddenWorld`.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,21 @@ from ..errors import BadInputError, MissingEngineError, unknown_name
 from ..installed import DEFAULT, raise_if_interrupted, require
 from ..interface import Model
 from ..models import resolve
+from ._hidden_data import HiddenData, HiddenModel
+from ._hidden_world import HiddenWorld, Moment
+
+__all__ = [
+    "Backend",
+    "HiddenData",
+    "HiddenModel",
+    "HiddenWorld",
+    "Loader",
+    "Moment",
+    "backend_engine",
+    "backend_names",
+    "load",
+    "register",
+]
 
 
 class Loader(Protocol):

@@ -8,7 +8,8 @@ from typing import Any
 
 from ..errors import BadInputError
 from ..installed import DEFAULT
-from ..lessons import LESSONS, STATIONS, Lesson
+from ..lessons import LESSONS, STATIONS
+from ..lessons.records import Lesson
 from ._common import (
     PROGRAM,
     SAYS_NO,

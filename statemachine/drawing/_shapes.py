@@ -33,7 +33,7 @@ class Surface:
         for name, kind in (("vertices", np.float32), ("faces", np.int32)):
             array = np.array(getattr(self, name), dtype=kind).reshape(-1, 3)
             array.setflags(write=False)
-            object.__setattr__(self, name, array)
+            vars(self)[name] = array
 
 
 def box(size: Sequence[float]) -> Surface:

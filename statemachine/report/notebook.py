@@ -15,7 +15,8 @@ from typing import Any
 from ..backends import load
 from ..errors import MissingEngineError, unknown_name
 from ..installed import DEFAULT
-from ..lessons import LESSONS, Lesson, module
+from ..lessons import LESSONS, module
+from ..lessons.records import Lesson
 from ..lessons.session import page_of_lesson, take
 from ..page import Code, Page, Picture, Printed, Question, Text
 from .figures import svg

@@ -176,8 +176,8 @@ class _MujocoWatch(CallWatch):
     def _name_model(self, label: str, model: Model) -> None:
         if isinstance(model.raw, self._kinds):
             self._label(model.raw, label)
-        elif (shared := getattr(model, "_shared", None)) is not None:
-            self._label(shared.raw, f"the description of {label}", raw=True)
+        elif isinstance(model.compiled, self._kinds):
+            self._label(model.compiled, f"the description of {label}", raw=True)
 
     def _label(self, thing: Any, label: str, raw: bool = False) -> None:
         watched = self._watched(thing)

@@ -27,7 +27,7 @@ _BEFORE, _AFTER = 10, 100
 @contextmanager
 def _raw(model: Model, gravity: bool = True, damping: bool = True) -> Iterator[World]:
     """The model in a fresh client, as loadURDF leaves it, with the model's gravity."""
-    plan = cast("PybulletModel", model)._shared.plan
+    plan = cast("PybulletModel", model).plan
     if not damping:
         raw = copy.copy(plan.raw)
         raw.dof_damping[:] = 0
@@ -43,7 +43,7 @@ def _raw(model: Model, gravity: bool = True, damping: bool = True) -> Iterator[W
 
 def terms(model: Model) -> tuple[Term, ...]:
     """What the interface's names are on this engine, by looking at a loaded model."""
-    raw = cast("PybulletModel", model)._shared.raw
+    raw = model.compiled
     rows = []
     with _raw(model) as world:
         for tree in world.trees:
@@ -200,7 +200,7 @@ def ways_back(model: Model) -> tuple[WayBack, ...]:
     POSITION_CONTROL, goes on, goes back, and goes on again: are the two futures the same?
     """
     start = model.keyframes[0] if model.keyframes else None
-    qpos = start.qpos if start else cast("PybulletModel", model)._shared.raw.qpos0
+    qpos = start.qpos if start else model.compiled.qpos0
     target = start.ctrl if start else np.zeros(model.nu)
     zero = np.zeros(model.nv)
     touching: list[int] = []

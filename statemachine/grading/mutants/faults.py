@@ -10,15 +10,13 @@ import copy
 import random
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache, partial
-from pathlib import Path
+from functools import partial
 from types import ModuleType
 from typing import Any, Protocol
 
 import numpy as np
 
-from ...backends import load
-from ...engines import needed_part, rooms_with
+from ...engines import part, rooms_with
 from ...errors import MissingEngineError
 from ...installed import require
 from ...interface import INPUTS, Array, Data, JointType, read_only
@@ -43,7 +41,7 @@ def _adapters() -> list[ModuleType]:
     for name in rooms_with("mutants"):
         with suppress(MissingEngineError):
             require(name)
-            found.append(needed_part(name, "mutants").adapter)
+            found.append(part(name, "mutants").adapter)
     return found
 
 
@@ -167,14 +165,8 @@ def xyzw(_data: Data, right: Array) -> Array:
 @reading("xpos")
 def com_for_frame(data: Data, right: Array) -> Array:
     """The place that another engine reports for a link."""
-    centres = _centres(data.model.path)
-    return right + np.einsum("bij,bj->bi", matrix_from_quat(data.xquat), centres)
-
-
-@cache
-def _centres(path: Path) -> Array:
-    """Centres of mass (nbody, 3) of a model's bodies, in their frames [m]."""
-    return np.array(load(path).raw.body_ipos)
+    offsets = data.model.compiled.body_ipos
+    return right + np.einsum("bij,bj->bi", matrix_from_quat(data.xquat), offsets)
 
 
 @hook("_recompute")
