@@ -13,11 +13,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from .. import __version__
+from .. import __version__, conventions
 from ..comparison import ContactNames
+from ..engines import part
 from ..errors import BadInputError, UnsupportedError
 from ..interface import DERIVED, INPUTS, Array, Contacts, Data, JointType, Model
-from ..probes import conventions, probe
 
 Progress = Callable[[float], None]  # told the fraction that is done
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)  # a command to the arm [rad]
@@ -85,12 +85,12 @@ class Itself:
 
 def ask_itself(model: Model, *questions: str) -> tuple[Itself, ...]:
     """Conventions of the engine behind a Model that emulates some of the contract."""
-    if probe(model) is None:  # the interface is the engine's own
+    if part(model.backend, "as_it_comes") is None:  # the interface is the engine's own
         return ()
     return tuple(
         Itself(question, finding.of, finding.answer)
         for question in questions
-        for finding in conventions.ask(question, model.backend)
+        for finding in conventions.ask(question, model.backend) or ()
     )
 
 

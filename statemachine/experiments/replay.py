@@ -10,6 +10,8 @@ from typing import Literal
 import numpy as np
 
 from ..comparison import largest
+from ..engines import part
+from ..engines.parts import AsItComes, WayBack
 from ..errors import BadInputError, UnsupportedError, unknown_name
 from ..interface import (
     Array,
@@ -24,7 +26,6 @@ from ..interface import (
     step,
 )
 from ..interface.checks import as_count
-from ..probes import WayBack, probe
 from ._common import Progress, Provenance, body_pairs, command, part_of, provenance, silent
 
 Break = Literal["extra-step", "late-ctrl"]
@@ -160,7 +161,7 @@ def run(
         if kind == JointType.FREE
     ]
     gap = first - second
-    own = probe(model)
+    own: AsItComes | None = part(model.backend, "as_it_comes")
     hinges = model.jnt_qposadr[model.jnt_type == int(JointType.HINGE)]
     return Replay(
         ctrl=goal,

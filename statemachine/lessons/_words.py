@@ -22,7 +22,8 @@ def origin(results: Mapping[str, Any]) -> str:
     """What a page was computed with: model and engine versions."""
     first = next(iter(results.values())).provenance
     engines = ", ".join(
-        f"{name} {result.provenance.versions[name]}" for name, result in results.items()
+        f"{name} {result.provenance.versions[result.provenance.backend]}"
+        for name, result in results.items()
     )
     return f"{first.model_file} on {engines}, {milliseconds(first.timestep)} a step"
 

@@ -9,9 +9,10 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from ...comparison.text import milliseconds, rounded, significant
+from ...engines import part
+from ...engines.parts import Dials, DialsPart, Setting
 from ...errors import UnsupportedError
 from ...interface import Model
-from ...probes import dials_of, frictionless
 from .factors import FACTORS, Factor
 
 How = Literal["parity", "off"]
@@ -72,7 +73,8 @@ class Side(Protocol):
 
 def side_of(model: Model, options: Mapping[str, Any]) -> Side:
     """The side of a Model, in an experiment with some options."""
-    dials = dials_of(model, options)
+    own: DialsPart | None = part(model.backend, "dials")
+    dials = own.dials(model, options) if own else None
     return EngineSide(model, options, dials) if dials else ModelSide(model, options)
 
 
@@ -109,7 +111,7 @@ class ModelSide:
                 return "the other engine has nothing that corresponds"
             if factor.name == "surfaces":
                 able = _raw(self._as_it_comes, "geom_friction") is not None
-                able = able or frictionless(self._as_it_comes) is not None
+                able = able or part(self._base.backend, "dials") is not None
                 return "" if able else f"{self._base.backend} has no way to set friction"
             if missing:
                 return f"{self._base.backend} cannot leave it out"
@@ -162,7 +164,8 @@ class ModelSide:
         options = {**self._options, **options}
         model = model.replace(**options) if options else model
         smoothed = "surfaces" in changes and changes["surfaces"].how == "off"
-        return (frictionless(model) or model) if smoothed else model
+        dials: DialsPart | None = part(model.backend, "dials") if smoothed else None
+        return dials.frictionless(model) if dials else model
 
     def _off(self, factor: Factor) -> dict[str, Any]:
         if factor.name == "gravity":
@@ -178,17 +181,8 @@ class EngineSide:
     """A Model with `defaults="engine"`: its settings are dials between the engine's and ours."""
 
     fresh = True
-    _WORDS: Mapping[str, str] = {
-        "inertia": "of shapes",
-        "damping": "explicit, +0.04",
-        "armature": "none",
-        "frictionloss": "none",
-        "limits": "hard",
-        "integrator": "its own",
-        "contact": "its own",
-    }
 
-    def __init__(self, model: Model, options: Mapping[str, Any], dials: Any) -> None:
+    def __init__(self, model: Model, options: Mapping[str, Any], dials: Dials) -> None:
         self._dials, self._options = dials, dict(options)
         self._emulated = ModelSide(dials.emulated, {})
         self.label = f"{model.backend} {model.engine_version}, engine defaults"
@@ -212,7 +206,7 @@ class EngineSide:
             return "its motors" if on else "motors hold"
         if factor.name == "surfaces":
             return f"friction {_span(self._dials.frictions)}"
-        return self._WORDS[factor.name]
+        return self._dials.words[factor.name]
 
     def refuses(self, factor: Factor, how: How, values: Values, changes: Changes) -> str:
         if how == "off":
@@ -234,7 +228,9 @@ class EngineSide:
         return {name: change for name, change in changes.items() if name not in gone}
 
     def build(self, changes: Changes) -> Model:
-        settings = {name: "off" if c.how == "off" else "model" for name, c in changes.items()}
+        settings: dict[str, Setting] = {
+            name: "off" if c.how == "off" else "model" for name, c in changes.items()
+        }
         values: dict[str, Any] = {}
         for name, change in changes.items():
             if name == "timestep":
