@@ -91,7 +91,7 @@ class TraceError(StateMachineError, ValueError):
 
 
 class ReadOnlyError(StateMachineError, AttributeError):
-    """Something derived or constant was assigned to."""
+    """Something derived or constant was assigned to, or an input was made read-only."""
 
 
 class StaleReadError(StateMachineError, RuntimeError):

@@ -1,150 +1,121 @@
-"""A backend whose engine hides its world, to show that the interface fits such an engine.
+"""A backend for an engine that keeps a world of its own: the template for one of your own.
 
-Its Data owns arrays that are no memory of the engine's. It moves values in before a step
-and out after it, keeps copies of what was derived, and converts nothing in place. The
-engine behind it is MuJoCo, used as if only functions could reach it.
+The engine is MuJoCo, used as if only functions reached its world. A backend is three things:
+
+- a world (`ExampleWorld`): what the engine does, in the hooks of `HiddenWorld`. `place` puts a
+  state, `command` passes ctrl on, `step` takes one engine step, `read` tells where it is,
+  `derive` what follows from the moment that the step started from, `close` gives it back. The
+  base does the rest: it sees writes, undoes an interrupted step, finds what diverged, keeps
+  derived values apart from writes, takes and restores States.
+- a Model (`ExampleModel`): the facts, and how a world is opened;
+- `load`: from a file to a Model. `statemachine.backends.register` makes it known.
+
+`statemachine.conformance.run` then says what of the contract it keeps.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from statemachine.backends import mujoco_backend
-from statemachine.backends._mjcf import facts
+from statemachine.backends import HiddenModel, HiddenWorld, Moment, mujoco_backend
+from statemachine.backends.compiled import facts
 from statemachine.backends.mujoco_backend import MujocoModel
-from statemachine.errors import DivergedError
-from statemachine.interface import DERIVED, INPUTS, Contacts, Data, Model, State
-from statemachine.interface.checks import check_entries
+from statemachine.interface import DERIVED, Array, forward, make_data, reset, step
 
 
-class HiddenModel(Model):
-    """A Model that compiles with MuJoCo, and gives every Data a world of its own."""
+class ExampleWorld(HiddenWorld):
+    """A world that `step` alone moves."""
 
-    def __init__(self, inner: MujocoModel) -> None:
-        names = ("engine_version", "path", "raw", "capabilities", "timestep", "substeps")
-        super().__init__(
-            backend="hidden", **facts(inner.raw), **{name: getattr(inner, name) for name in names}
-        )
-        object.__setattr__(self, "inner", inner)
+    engine = "MuJoCo"
+
+    def __init__(self, model: MujocoModel) -> None:
+        self._model, self._data = model, make_data(model)
+        self.raw, self.timestep, self.qpos0 = self._data.raw, model.timestep, model.raw.qpos0
+        # What decides the future beside the inputs: where the solver of contacts starts.
+        self.memory_layout = (("warmstart", model.nv),)
+        self._ctrl = np.zeros(model.nu)
+
+    def place(self, qpos: Array, qvel: Array, memory: Array) -> None:
+        """Reset, so that nothing of before is left; the command stays."""
+        reset(self._model, self._data)
+        self._data.qpos, self._data.qvel, self._data.ctrl = qpos, qvel, self._ctrl
+        self.raw.qacc_warmstart[:] = memory
+
+    def command(self, ctrl: Array) -> None:
+        """Once for all steps until the next command."""
+        self._ctrl = self._data.ctrl = ctrl.copy()
+
+    def step(self) -> None:
+        """One step of the engine."""
+        step(self._model, self._data)
+
+    def read(self) -> tuple[Array, Array]:
+        """Copies: the engine's memory changes with the next step."""
+        return self._data.qpos.copy(), self._data.qvel.copy()
+
+    def look(self, moment: Moment) -> None:
+        """This engine can compute what is derived without a step."""
+        self.place(moment.qpos, moment.qvel, moment.memory)
+        self.command(moment.ctrl)
+        forward(self._model, self._data)
+
+    def derive(self, name: str, moment: Moment, read: Any) -> dict[str, Any]:
+        """All at once; a dearer engine computes what was asked for."""
+        values = {name: np.array(getattr(self._data, name)) for name in DERIVED}
+        return {**values, "contacts": self._data.contacts}
+
+    def close(self) -> None:
+        """Once is enough, more often does no harm."""
+        self._data.close()
+
+    @property
+    def memory(self) -> Array:
+        """Of the last step."""
+        return self.raw.qacc_warmstart.copy()
+
+    @property
+    def blank(self) -> Array:
+        """Of none."""
+        return np.zeros(self._model.nv)
+
+    def packed(self, memory: Array) -> Sequence[Array]:
+        """As a State has it."""
+        return (memory,)
+
+    def unpacked(self, parts: Sequence[Array]) -> Array:
+        """From a State."""
+        return parts[0].copy()
+
+
+class ExampleModel(HiddenModel):
+    """Facts of a compiled model, for worlds of the example."""
 
     inner: MujocoModel
 
-    def _make_data(self) -> HiddenData:
-        return HiddenData(self)
+    def __init__(self, inner: MujocoModel) -> None:
+        timestep = float(inner.raw.opt.timestep)  # of the engine, not of our step
+        engine = inner
+        if inner.substeps > 1:
+            engine = cast("MujocoModel", inner.replace(substeps=1, timestep=timestep))
+        names = ("engine_version", "path", "raw", "capabilities", "timestep", "substeps")
+        super().__init__(
+            partial(ExampleWorld, engine),
+            backend="hidden",
+            **facts(inner.raw),
+            **{name: getattr(inner, name) for name in names},
+            inner=inner,
+        )
 
-    def _replace(self, options: dict[str, Any]) -> HiddenModel:
-        return HiddenModel(self.inner._replace(options))
-
-
-class HiddenData(Data):
-    """Arrays beside a world that only `_push` and `_pull` reach."""
-
-    __slots__ = ("_derived", "_world")
-
-    _world: Any
-    _derived: dict[str, Any]
-
-    def __init__(self, model: HiddenModel) -> None:
-        sizes = {"qpos": model.nq, "qvel": model.nv, "ctrl": model.nu}
-        object.__setattr__(self, "_world", model.inner._make_data())
-        object.__setattr__(self, "_derived", {})
-        inputs = {name: np.zeros(size) for name, size in sizes.items()}
-        super().__init__(model, self._run, inputs)
-        self._pull()
-        self._keep()
-
-    @property
-    def raw(self) -> Any:
-        self._refuse_if_troubled()
-        return self._world.raw
-
-    @property
-    def time(self) -> float:
-        if self._trouble == "closed":
-            self._refuse_if_troubled()
-        return self._world.time
-
-    def _derive(self, name: str) -> Any:
-        self._refuse_if_troubled()
-        return self._derived[name]
-
-    def _find_contacts(self) -> Contacts:
-        return self._derived["contacts"]
-
-    def _push(self) -> None:
-        for name in INPUTS:
-            getattr(self._world, name)[:] = getattr(self, name)
-
-    def _pull(self) -> None:
-        for name in INPUTS:
-            getattr(self, name)[:] = getattr(self._world, name)
-
-    def _keep(self) -> None:
-        for name in (*DERIVED, "contacts"):
-            value = getattr(self._world, name)
-            if isinstance(value, np.ndarray):
-                value = value.copy()
-                value.setflags(write=False)
-            self._derived[name] = value
-
-    def _run(self, nstep: int = 1) -> None:
-        # Array contents are checked before such an engine sees them.
-        for name in INPUTS:
-            check_entries(np.clip(getattr(self, name), -1e9, 1e9), name)
-        self._home._check_quaternions(self.qpos)
-        self._push()
-        try:
-            try:
-                self._world._advance(nstep)
-                self._world._attend()
-            except Exception as error:
-                self._world._failed(error)
-                raise
-        except DivergedError as error:
-            self._give_up(str(error))
-            raise
-        self._pull()
-        self._keep()
-
-    def _recompute(self) -> None:
-        self._push()
-        self._world._recompute()
-        self._keep()
-
-    def _reset(self, key: int | None) -> None:
-        self._world._reset(key)
-        self._world._recover()
-        self._pull()
-        self._keep()
-
-    def _get_state(self) -> State:
-        self._push()
-        inner = self._world._get_state()
-        fingerprint, layout = self._state_layout()
-        return State("hidden", inner.engine_version, fingerprint, layout, inner.blob)
-
-    def _set_state(self, state: State) -> None:
-        self._world._set_state(state)
-        self._world._recover()
-        self._pull()
-        self._keep()
-
-    def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
-        fingerprint, layout = self._world._state_layout()
-        return f"hidden {fingerprint}", layout
-
-    def _set_time(self, time: float) -> None:
-        self._world._set_time(time)
-
-    def _close(self) -> None:
-        self._world.close()
-        object.__setattr__(self, "_world", None)
+    def _replace(self, options: dict[str, Any]) -> ExampleModel:
+        return ExampleModel(self.inner._replace(options))
 
 
-def load(path: str | os.PathLike[str], defaults: str = "model") -> HiddenModel:
+def load(path: str | os.PathLike[str], defaults: str = "model") -> ExampleModel:
     """Compile a file."""
-    return HiddenModel(mujoco_backend.load(Path(path)))
+    return ExampleModel(mujoco_backend.load(Path(path)))

@@ -25,9 +25,9 @@ from statemachine.errors import (
 from statemachine.interface import DERIVED, POSES, Data, Model
 from statemachine.report.as_json import plain
 from statemachine.rotations import matrix_from_quat
-from statemachine.staleness import look
+from statemachine.staleness import age
+from statemachine.staleness.age import Scratch, back, readings
 from statemachine.staleness.gaps import gaps, told
-from statemachine.staleness.look import Scratch, back, readings
 from statemachine.staleness.result import table
 
 from .conftest import ROOT, need_engine
@@ -332,7 +332,7 @@ def test_every_scratch_is_closed(backend: str, monkeypatch: pytest.MonkeyPatch) 
         made.append(sm.make_data(model))
         return made[-1]
 
-    monkeypatch.setattr(look, "make_data", make_data)
+    monkeypatch.setattr(age, "make_data", make_data)
     model = sm.load("so101", backend=backend)
     with sm.make_data(model) as data:
         sm.freshness(model, data)

@@ -21,7 +21,8 @@ from rich.cells import cell_len
 import statemachine as sm
 from statemachine.experiments.in_turns import Ratio
 from statemachine.lessons import LESSONS, STATIONS, module
-from statemachine.lessons.session import Session, Taken, load_line, page_of_lesson, play, take
+from statemachine.lessons.records import Session
+from statemachine.lessons.session import Taken, load_line, page_of_lesson, play, take
 from statemachine.page import Code, Page, Printed, Question, Text, Verdict
 from statemachine.report import quiz
 

@@ -35,16 +35,19 @@ def _parts() -> Any:
     """The modules of the backend, which need the engine to be imported."""
     from statemachine.backends import (
         _bullet_arm,
+        _bullet_driven,
         _bullet_law,
-        _bullet_machine,
         _bullet_plan,
         _bullet_shared,
         _bullet_world,
+        _hidden_data,
+        _hidden_world,
         pybullet_backend,
     )
 
     class Parts:
-        machine, plan, shared = _bullet_machine, _bullet_plan, _bullet_shared
+        data, hidden, driven = _hidden_data, _hidden_world, _bullet_driven
+        plan, shared = _bullet_plan, _bullet_shared
         arm, law, world = _bullet_arm, _bullet_law, _bullet_world
         backend, pb = pybullet_backend, _bullet_world.pb
 
@@ -55,7 +58,7 @@ def around(where: str, name: str) -> Callable[[Callable[..., Any]], Patch]:
     """A fault that puts a function around another: it gets the right one, then its arguments.
 
     Args:
-        where: Path of the owner from `_parts`, as "machine.Shared".
+        where: Path of the owner from `_parts`, as "shared.Shared".
         name: The function's name there.
     """
 
@@ -124,16 +127,15 @@ def friction_of_contacts_the_other_way(right: Any, self: Any) -> Any:
     return [(*p[:10], -p[10], p[11], -p[12], p[13]) for p in right(self)]
 
 
-@around("machine.Machine", "_compute")
+@around("data.Machine", "_compute")
 def forward_steps_the_world_itself(right: Any, self: Any, name: str) -> Any:
-    moment = self._moment
-    if moment is None or name in POSES or self._lives or self._mirror is None:
+    moment = self.moment
+    if moment is None or name in POSES or self._lives:
         return right(self, name)
-    kept = self.time, *(array.copy() for array in (self.qpos, self.qvel, self.ctrl))
-    observed = self.present.observed
-    found = self.look(moment)
-    self.restart(*kept, observed)
-    self._moment = moment
+    present = self.present()
+    found = _parts().hidden.looked_at(self.world, moment)
+    self.restart(self.time, present)
+    self.moment = moment
     return found
 
 
@@ -175,11 +177,9 @@ def ghost_has_the_padding(right: Any, self: Any, root: int, kind: str) -> str:
     return right(self, root, "stepped" if kind == "ghost" else kind)
 
 
-@around("backend.PybulletData", "_set_state")
-def state_forgets_what_was_observed(right: Any, self: Any, state: Any) -> None:
-    right(self, state)
-    machine = self._machine
-    machine.restart(machine.time, machine.qpos, machine.qvel, machine.ctrl)
+@around("driven.DrivenWorld", "unpacked")
+def state_forgets_what_was_observed(right: Any, self: Any, parts: Any) -> Any:
+    return self.blank
 
 
 @around("pb", "setGravity")

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from statemachine import conformance
-from statemachine.backends import _mjcf
+from statemachine.backends import compiled
 from statemachine.backends._mujoco_alarms import Alarms
 from statemachine.backends.mujoco_backend import MujocoData, MujocoModel
 from statemachine.grading.mutants import faults as mutants
@@ -120,7 +120,7 @@ def options_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def replace_in_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_mjcf.copy, "copy", lambda raw: raw)
+    monkeypatch.setattr(compiled.copy, "copy", lambda raw: raw)
 
 
 def fresh_arrays_each_time(monkeypatch: pytest.MonkeyPatch) -> None:

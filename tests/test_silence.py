@@ -149,13 +149,14 @@ def test_a_fork_while_a_world_is_used_does_not_hang() -> None:
     code = """
 import os, threading
 import statemachine as sm
+from statemachine.backends import HiddenWorld
 
 model = sm.load("so101/scene", backend="pybullet")
 data = sm.make_data(model)
 begun, ended = threading.Event(), threading.Event()
 
 def work():
-    with model._shared.lock:
+    with HiddenWorld.lock:
         begun.set()
         ended.wait(20)
 

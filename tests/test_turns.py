@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import linecache
+import os
 import subprocess
 import sys
 import threading
@@ -307,3 +308,53 @@ def test_a_closed_data_says_so_in_every_thread() -> None:
         thread.start()
         thread.join()
     assert [type(error) for error in caught] == [ClosedDataError] * 4
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+@pytest.mark.parametrize("held", ["the Data", "the lock"])
+def test_what_another_thread_holds_at_a_fork_is_free_in_the_child(held: str) -> None:
+    """It has no such thread; what was half done there is overwritten."""
+    code = f"""
+import os, threading
+import statemachine as sm
+from statemachine.interface.turns import Turn
+
+model = sm.load("so101/scene_box")
+data, other = sm.make_data(model), sm.make_data(model)
+advance, begun, ended = data._advance, threading.Event(), threading.Event()
+
+def wait(*nstep):
+    begun.set()
+    ended.wait(20)
+
+def hold():
+    with Turn.lock:
+        wait()
+
+data._advance = wait
+use = {{"the Data": lambda: sm.step(model, data), "the lock": hold}}[{held!r}]
+thread = threading.Thread(target=use)
+thread.start()
+begun.wait(10)
+child = os.fork()
+if not child:
+    data._advance = advance
+    del other._turn.free  # as where a verb was interrupted: the lock is needed
+    for each in (data, other):
+        sm.reset(model, each, 0)
+        sm.step(model, each, 5)
+    os._exit(sm.get_state(model, data) != sm.get_state(model, other))
+_, status = os.waitpid(child, 0)
+ended.set()
+thread.join()
+raise SystemExit(status)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=False,
+        timeout=60,
+    )
+    assert done.returncode == 0, done.stderr[-300:]

@@ -181,14 +181,14 @@ def load_stubborn(path: str, defaults: str = "model") -> Model:
     """An engine that takes its armature from the file, which has another one."""
     from statemachine.interface import Capabilities
 
-    from .hidden_world import HiddenModel, load
+    from .hidden_world import ExampleModel, load
 
     model = load(path).replace(armature=0.04)
     known = model.capabilities
     options = tuple(name for name in known.options if name != "armature")
     fewer = Capabilities(options, known.integrators, known.behaviours, False, True)
     object.__setattr__(model, "capabilities", fewer)
-    object.__setattr__(cast("HiddenModel", model).inner, "capabilities", fewer)
+    object.__setattr__(cast("ExampleModel", model).inner, "capabilities", fewer)
     return model
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-import threading
 from functools import cached_property
 from typing import Any, Literal
 
@@ -16,7 +14,8 @@ from ..rotations import matrix_from_quat, times, wxyz_from_xyzw
 from . import _dense as dense
 from ._bullet_plan import Plan
 from ._bullet_world import World
-from ._mjcf import gravity
+from ._hidden_world import HiddenWorld
+from .compiled import gravity
 
 _INVERSE = np.array([1.0, -1.0, -1.0, -1.0])  # of a unit quaternion
 
@@ -27,16 +26,13 @@ class Shared:
     Attributes:
         plan: What every world is made from; raw: its compiled model.
         kind: "stepped" for the emulated contract, "engine" for PyBullet as it comes.
-        lock: Held while one of the shared worlds is used. One for all Models: PyBullet
-            takes one call at a time anyway.
+        made_ghost: The `ghost`, if it was needed already.
     """
-
-    lock = threading.RLock()
 
     def __init__(self, plan: Plan, kind: Literal["stepped", "engine"]) -> None:
         self.plan, self.raw = plan, plan.raw
         self.kind: Literal["stepped", "engine"] = kind
-        self._ghost: World | None = None
+        self.made_ghost: World | None = None
         self._still_joints = np.zeros(plan.raw.nv)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -45,10 +41,10 @@ class Shared:
     @property
     def ghost(self) -> World:
         """The true arm in a client that is never stepped: kinematics and dynamics."""
-        with self.lock:  # for two threads that make the first Data at once
-            if self._ghost is None:
-                self._ghost = World(self.plan, "ghost")
-            return self._ghost
+        with HiddenWorld.lock:  # for two threads that make the first Data at once
+            if self.made_ghost is None:
+                self.made_ghost = World(self.plan, "ghost")
+            return self.made_ghost
 
     @cached_property
     def still(self) -> tuple[Array, Array, Array, Array]:
@@ -67,7 +63,7 @@ class Shared:
         xpos, xquat, site_xpos, site_xmat = (array.copy() for array in self.still)
         for tree in self.ghost.trees:
             bodies, sites = list(tree.links), list(tree.tips)
-            with self.lock:
+            with HiddenWorld.lock:
                 self.ghost.put(qpos, self._still_joints)
                 states = self.ghost.link_states(tree)
             where, turned = (np.array(part) for part in zip(*states, strict=True))
@@ -90,15 +86,6 @@ class Shared:
                 own = matrix_from_quat(raw.site_quat[site])
                 site_xmat[site] = dense.product(turn, own).ravel()
         return dict(zip(POSES, (xpos, xquat, site_xpos, site_xmat), strict=True))
-
-
-def _renew() -> None:
-    """Start anew in the child of a fork: another thread may have held the lock."""
-    Shared.lock = threading.RLock()
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_renew)
 
 
 def free_dynamics(raw: mujoco.MjModel, body: int, turn: Array, qvel: Array) -> tuple[Array, Array]:

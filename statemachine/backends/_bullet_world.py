@@ -23,7 +23,7 @@ from . import _dense as dense
 from ._bullet_client import Quat, as_file, connect, disconnect, pb, times, turned
 from ._bullet_plan import Plan, floats
 from ._bullet_surfaces import Solid
-from ._mjcf import gravity
+from .compiled import gravity
 
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 _AWAY = 1000.0  # [m] between bodies that a reset has set apart
@@ -136,6 +136,11 @@ class World:
     def close(self) -> None:
         """Give the client back."""
         self._end()
+
+    @property
+    def closed(self) -> bool:
+        """Whether the client was given back; its number may be another's by now."""
+        return not self._end.alive
 
     def _load(self, root: int, kind: str) -> None:
         raw = self._raw

@@ -31,8 +31,8 @@ from ..interface import (
     State,
 )
 from ..interface.checks import TINY, check_finite
-from ._mjcf import compile_file, edited, facts, heard, step_length, with_fingerprint
 from ._mujoco_alarms import AlarmError, Alarms, pass_on
+from .compiled import compile_file, compiler_warnings, edited, facts, step_length
 
 _DISABLE = mujoco.mjtDisableBit
 # Not RK4: after its step the derived values are neither of the state before nor after.
@@ -109,7 +109,7 @@ def load(
     Raises:
         ModelError: MuJoCo cannot compile the file; with its reason.
     """
-    with heard() as texts:
+    with compiler_warnings() as texts:
         raw = compile_file(path)
     if defaults == "model":
         raw.opt.disableflags |= int(_DISABLE.mjDSBL_AUTORESET)
@@ -133,6 +133,10 @@ class MujocoModel(Model):
             substeps=substeps,
             **facts(raw),
         )
+
+    @property
+    def compiled(self) -> mujoco.MjModel:
+        return self.raw
 
     def _make_data(self) -> MujocoData:
         try:
@@ -158,7 +162,7 @@ class MujocoData(Data):
     __slots__ = ("_alarms", "_layout", "_raw", "_views")
 
     _raw: mujoco.MjData | None
-    _alarms: Alarms
+    _alarms: Any  # Alarms; None once closed
     _views: dict[str, Array]
     _layout: tuple[str, tuple[tuple[str, int], ...]]
 
@@ -169,9 +173,8 @@ class MujocoData(Data):
         views = {name: getattr(raw, name).view() for name in (*POSES, "qacc", *FORCES)}
         for view in views.values():
             view.setflags(write=False)
-        facts = {"_raw": raw, "_views": views, "_layout": _layout(model), "_alarms": alarms}
-        for name, value in facts.items():
-            object.__setattr__(self, name, value)
+        self._raw, self._views, self._alarms = raw, views, alarms
+        self._layout = _layout(model)
         inputs = {name: getattr(raw, name).view() for name in INPUTS}
         super().__init__(model, _transition(model, raw), inputs, (alarms.now, alarms.seen))
 
@@ -248,8 +251,7 @@ class MujocoData(Data):
         self.raw.time = time
 
     def _close(self) -> None:
-        for name in ("_raw", "_alarms"):
-            object.__setattr__(self, name, None)
+        self._raw = self._alarms = None
         self._views.clear()
 
     def _attend(self) -> None:
@@ -320,4 +322,4 @@ def _layout(model: MujocoModel) -> tuple[str, tuple[tuple[str, int], ...]]:
     }
     kept = ("time", *INPUTS)  # even where they are empty
     layout = tuple((name, size) for name, size in sizes.items() if size or name in kept)
-    return with_fingerprint(model, layout)
+    return model._with_fingerprint(layout)

@@ -9,34 +9,28 @@ from __future__ import annotations
 
 import os
 import warnings
+from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
-import numpy as np
+import mujoco
 
-from ..errors import DivergedError, EngineError, EngineWarning
+from ..errors import EngineWarning
 from ..installed import engine_version
 from ..interface import (
     BEHAVIOURS,
-    INPUTS,
     OPTIONS,
-    Array,
     Behaviour,
     Capabilities,
-    Contacts,
-    Data,
-    Model,
-    State,
 )
-from ..interface.checks import check_entries
 from . import _bullet_urdf as urdf
-from ._bullet_client import pb
-from ._bullet_machine import Machine, Mirror
+from ._bullet_driven import DrivenWorld
 from ._bullet_plan import Plan
 from ._bullet_scope import check, ignored
 from ._bullet_shared import Shared
 from ._bullet_world import ENGINE_TIMESTEP, World
-from ._mjcf import compile_file, edited, facts, heard, step_length, with_fingerprint
+from ._hidden_data import HiddenData, HiddenModel
+from .compiled import compile_file, compiler_warnings, edited, facts, step_length
 
 _EMULATED = {
     "stale after a write": "by copies of the adapter; the engine's own values follow a write",
@@ -64,7 +58,6 @@ _RESTORE = (
     "two restores of one State have the same future, bit by bit, but not that of the run it was "
     "taken from: the engine's memory of contacts cannot be read"
 )
-_TOLD = ("qfrc_bias", "qfrc_actuator")  # of the forces, under defaults="engine"
 _AS_IT_COMES = {
     "position servo": Behaviour(
         "native",
@@ -112,7 +105,7 @@ def load(
         ModelError: It cannot be compiled, or PyBullet cannot read what was written.
         UnsupportedError: It has something that PyBullet has no counterpart for.
     """
-    with heard() as texts:
+    with compiler_warnings() as texts:
         raw = compile_file(path)
     for text in texts:
         warnings.warn(f"MuJoCo, which compiles {path}: {text}", EngineWarning, stacklevel=3)
@@ -129,14 +122,19 @@ def load(
     return model
 
 
-class PybulletModel(Model):
+class PybulletModel(HiddenModel):
     """The description that every Data's world is made from.
 
     `raw` is what PyBullet reads: the text of a URDF by the name of its root body.
+
+    Attributes:
+        plan: The compiled model, and what follows from it for every world.
+        defaults: As `load` was told: "engine" for PyBullet as it comes.
     """
 
+    plan: Plan
+    defaults: Literal["model", "engine"]
     _shared: Shared
-    _mirror: Mirror
 
     def __init__(
         self,
@@ -148,6 +146,7 @@ class PybulletModel(Model):
         as_it_comes, raw = defaults == "engine", plan.raw
         shared = Shared(plan, "engine" if as_it_comes else "stepped")
         super().__init__(
+            partial(DrivenWorld, shared),
             backend="pybullet",
             engine_version=engine_version("pybullet"),
             path=path,
@@ -159,117 +158,37 @@ class PybulletModel(Model):
             timestep=float(raw.opt.timestep) * substeps,
             substeps=substeps,
             **facts(raw),
+            plan=plan,
+            defaults=defaults,
             _shared=shared,
-            _mirror=Mirror(shared),
         )
+
+    @property
+    def compiled(self) -> mujoco.MjModel:
+        return self.plan.raw
+
+    @property
+    def shared_worlds(self) -> dict[str, World]:
+        """Worlds that its Data share, of those that were needed so far, by what they are."""
+        ahead = cast("DrivenWorld | None", self._look_ahead.world)
+        worlds = {"still copy": self._shared.made_ghost, "look-ahead": ahead and ahead.raw}
+        return {name: world for name, world in worlds.items() if world is not None}
 
     def _make_data(self) -> PybulletData:
         return PybulletData(self)
 
     def _replace(self, options: dict[str, Any]) -> PybulletModel:
-        raw = edited(self._shared.raw, options)
+        raw = edited(self.plan.raw, options)
         substeps = options.get("substeps", self.substeps)
         raw.opt.timestep = step_length(self.timestep, substeps, options)
-        defaults = "engine" if self._shared.kind == "engine" else "model"
         plan = Plan(raw)
         check(plan, "pybullet", None)
-        return PybulletModel(plan, self.path, substeps, defaults)
+        return PybulletModel(plan, self.path, substeps, self.defaults)
 
 
-class PybulletData(Data):
-    """A machine around one client."""
+class PybulletData(HiddenData):
+    """A Data around one client; `raw` is that client and the ids in it."""
 
-    __slots__ = ("_layout", "_machine")
+    __slots__ = ()
 
-    _machine: Machine
-    _layout: tuple[str, tuple[tuple[str, int], ...]]
     _home: PybulletModel  # pyright: ignore[reportIncompatibleVariableOverride]
-
-    def __init__(self, model: PybulletModel) -> None:
-        machine = Machine(
-            model._shared,
-            model._mirror,
-            model._check_quaternions,
-            model._coordinate_name,
-            model.substeps,
-        )
-        for name, value in (("_machine", machine), ("_layout", _layout(model))):
-            object.__setattr__(self, name, value)
-        inputs = {name: getattr(machine, name) for name in INPUTS}
-        super().__init__(model, machine.run, inputs)
-
-    @property
-    def raw(self) -> World:
-        """The client and the ids in it; read from it, and write through qpos and qvel."""
-        if self._trouble == "closed":
-            self._refuse_if_troubled()
-        return self._machine.world
-
-    @property
-    def time(self) -> float:
-        if self._trouble == "closed":
-            self._refuse_if_troubled()
-        return self._machine.time
-
-    def _derive(self, name: str) -> Array:
-        if self._trouble:
-            self._refuse_if_troubled()
-        if name.startswith("q") and self._home._shared.kind == "engine" and name not in _TOLD:
-            raise self._home._unsupported("forces by part")
-        return self._machine.derive(name)
-
-    def _find_contacts(self) -> Contacts:
-        return self._machine.derive("contacts")
-
-    def _recompute(self) -> None:
-        self._machine.forward()
-
-    def _reset(self, key: int | None) -> None:
-        model = self._home
-        if key is None:
-            qpos0 = model._shared.raw.qpos0
-            self._machine.restart(0.0, qpos0, np.zeros(model.nv), np.zeros(model.nu))
-        else:
-            frame = model.keyframes[key]
-            self._machine.restart(frame.time, frame.qpos, frame.qvel, frame.ctrl)
-
-    def _get_state(self) -> State:
-        now = self._machine.present
-        fingerprint, layout = self._layout
-        parts = [np.array([self._machine.time]), now.qpos, now.qvel, now.ctrl]
-        if len(layout) > len(parts):
-            parts += self._machine.gathered(now.observed)
-        blob = np.concatenate(parts).tobytes()
-        return State("pybullet", self._home.engine_version, fingerprint, layout, blob)
-
-    def _set_state(self, state: State) -> None:
-        parts = [state[name] for name, _ in self._layout[1]]
-        for name, part in zip(INPUTS, parts[1:4], strict=True):
-            check_entries(part, name, self._home._coordinate_name)
-        self._home._check_quaternions(parts[1])
-        observed = self._machine.parted(*parts[4:]) if parts[4:] else None
-        qpos, qvel, ctrl = parts[1:4]
-        self._machine.restart(float(parts[0][0]), qpos, qvel, ctrl, observed)
-
-    def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
-        return self._layout
-
-    def _set_time(self, time: float) -> None:
-        self._machine.time = time
-
-    def _close(self) -> None:
-        self._machine.close()
-
-    def _failed(self, error: Exception) -> None:
-        if isinstance(error, DivergedError):
-            self._give_up(f"{error.quantity}[{error.index}] was not finite at {error.time:g} s")
-        elif isinstance(error, pb.error):
-            self._give_up(f"PyBullet gave up: {error}")
-            raise EngineError(f"PyBullet gave up: {error}") from error
-
-
-def _layout(model: PybulletModel) -> tuple[str, tuple[tuple[str, int], ...]]:
-    layout = [("time", 1), ("qpos", model.nq), ("qvel", model.nv), ("ctrl", model.nu)]
-    if model._shared.kind == "stepped":
-        layout += [("contact", model.nv), ("friction", model.nv)]
-    return with_fingerprint(model, tuple(layout))

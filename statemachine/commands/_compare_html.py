@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError, MissingEngineError, StateMachineError
+from ..installed import PAIR
 from ._common import PROGRAM
 
 
@@ -149,7 +150,7 @@ def _typed(options: argparse.Namespace, request: Any) -> str:
     from ..comparison.text import command
 
     words = [PROGRAM, "compare", *(Path(word).name for word in request.what)]
-    if tuple(request.backends) != ("mujoco", "pybullet"):
+    if tuple(request.backends) != PAIR:
         words += ["--backends", *request.backends]
     return command(
         words,

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError
+from ..installed import DEFAULT
 from . import _compare_pictures as pictures
 from ._common import (
     PROGRAM,
@@ -301,7 +302,7 @@ def _typed(options: argparse.Namespace) -> str:
     return one_line(
         command(
             words,
-            ("--backend", options.backend, "mujoco"),
+            ("--backend", options.backend, DEFAULT),
             ("--defaults", options.defaults, "model"),
             ("--keyframe", options.keyframe, None),
             ("--model", options.model and Path(options.model).name, None),

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import BadInputError, shown, unknown_name
+from ..errors import BadInputError, ReadOnlyError, shown, unknown_name
 from .records import Array
 
 # MuJoCo calls a coordinate beyond this "huge" and the simulation unstable (mjMAXVAL).
@@ -99,6 +99,15 @@ def check_finite(array: Array, name: str) -> None:
     if not np.isfinite(array).all():
         index = int(np.flatnonzero(~np.isfinite(array))[0])
         raise BadInputError(f"{name}[{index}] = {array[index]} is not a finite number")
+
+
+def check_writable(array: Array, name: str) -> None:
+    """Raise ReadOnlyError if the caller took the flag of an input away with `setflags`."""
+    if not array.flags.writeable:
+        raise ReadOnlyError(
+            f"{name} was made read-only, so that the engine has nowhere to write to: "
+            f"call data.{name}.setflags(write=True)"
+        )
 
 
 def index_of(kind: str, name: str, names: Sequence[str]) -> int:

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 from numpy.typing import ArrayLike
 
 from ..errors import ClosedDataError, DivergedError, ReadOnlyError
-from .checks import as_scalar, as_vector
+from .checks import as_scalar, as_vector, check_writable
 from .model import Model
 from .records import INPUTS, Array, Contacts, State, read_only
-from .turns import HOLDERS, LOCK, Turn, in_use_here
+from .turns import HOLDERS, Turn, in_use_here
 
 T = TypeVar("T")
 # By name, so that type checkers take the inputs for the descriptors below.
@@ -70,7 +70,7 @@ class Data(ABC):
     _home: Model  # the owner
     _turn: Turn
     _trouble: str  # why the Data refuses; "" if it does not
-    _advance: Callable[..., None]  # the engine's own step: (nstep=1)
+    _advance: Any  # the engine's own step: (nstep=1); None once closed
     _warned: Any  # differs from `_told` when the engine has something to say
     _told: Any
     if TYPE_CHECKING:
@@ -102,13 +102,10 @@ class Data(ABC):
             warnings: Two things of the engine's; when they differ after a step, the verb
                 calls `_attend`.
         """
-        object.__setattr__(self, "_home", model)
-        object.__setattr__(self, "_advance", advance)
-        object.__setattr__(self, "_turn", Turn(model))
-        object.__setattr__(self, "_warned", warnings[0])
-        object.__setattr__(self, "_told", warnings[1])
+        self._home, self._advance, self._turn = model, advance, Turn(model)
+        self._warned, self._told = warnings
         for name in INPUTS:
-            object.__setattr__(self, name, inputs[name])
+            super().__setattr__(name, inputs[name])
         self._recover()
 
     @property
@@ -205,10 +202,9 @@ class Data(ABC):
             # The last values stay readable, apart from the engine's memory, which a view
             # would keep alive; a view that the caller kept can no longer be written into.
             view = getattr(self, name)
-            object.__setattr__(self, name, read_only(view))
+            super().__setattr__(name, read_only(view))
             view.setflags(write=False)
-        for name in ("_advance", "_warned", "_told"):
-            object.__setattr__(self, name, None)
+        self._advance = self._warned = self._told = None
         self._close()
 
     def __enter__(self) -> Data:
@@ -229,6 +225,8 @@ class Data(ABC):
         elif name == "time":
             self._refuse_if_troubled()
             self._set_time(as_scalar(value, "time"))
+        elif name.startswith("_"):  # what a backend keeps, and Python its class
+            super().__setattr__(name, value)
         elif hasattr(type(self), name):
             raise ReadOnlyError(
                 f"{name!r} is read-only: it is derived; write qpos, qvel or ctrl and call forward"
@@ -257,18 +255,14 @@ class Data(ABC):
     def _check_writable(self) -> None:
         """Raise ReadOnlyError where the caller made an input read-only."""
         for name in INPUTS:
-            if not getattr(self, name).flags.writeable:
-                raise ReadOnlyError(
-                    f"{name} was made read-only, so that the engine has nowhere to write to: "
-                    f"call data.{name}.setflags(write=True)"
-                )
+            check_writable(getattr(self, name), name)
 
     def _give_up(self, why: str) -> None:
         """Refuse everything but `reset` and `set_state`, once the verb that runs has ended."""
-        object.__setattr__(self, "_trouble", why)
+        self._trouble = why
 
     def _recover(self) -> None:
-        object.__setattr__(self, "_trouble", "")
+        self._trouble = ""
 
     def _attend(self) -> None:  # noqa: B027  (optional hook)
         """Raise, or pass on, what the engine warned of since the last time."""
@@ -338,7 +332,7 @@ def alone(
         if not held:
             if not even_troubled:
                 data._refuse_if_troubled()
-            with LOCK:
+            with Turn.lock:
                 if not in_use_here(data):
                     if not even_troubled:  # once more: another thread may have ended just now
                         data._refuse_if_troubled()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -94,10 +95,9 @@ class Model(ABC):
         if missing:
             raise TypeError(f"a backend must give its Model: {', '.join(sorted(missing))}")
         for name, value in facts.items():
-            constant = read_only(value) if isinstance(value, np.ndarray) else value
-            object.__setattr__(self, name, constant)
+            vars(self)[name] = read_only(value) if isinstance(value, np.ndarray) else value
         # Once: NumPy swallows a Ctrl-C that falls into a comparison with an enum.
-        object.__setattr__(self, "_quaternions", _quaternions(self.jnt_type, self.jnt_qposadr))
+        vars(self)["_quaternions"] = _quaternions(self.jnt_type, self.jnt_qposadr)
 
     def __setattr__(self, name: str, value: object) -> NoReturn:
         raise ReadOnlyError(
@@ -113,6 +113,14 @@ class Model(ABC):
             f"<Model {self.path.stem} on {self.backend} {self.engine_version.partition(' ')[0]}: "
             f"nq={self.nq} nv={self.nv} nu={self.nu}, {self.timestep:g} s a step>"
         )
+
+    @property
+    def compiled(self) -> Any:
+        """The mjModel that the file was compiled to, where the backend starts from one.
+
+        It is not to be written to. None where there is none.
+        """
+        return None
 
     def body_id(self, name: str) -> int:
         """Id of a body."""
@@ -227,6 +235,20 @@ class Model(ABC):
         scalar = np.isin(self.jnt_type, (JointType.SLIDE, JointType.HINGE))
         values[self.jnt_dofadr[scalar]] = given
         return values
+
+    def _with_fingerprint(
+        self, layout: tuple[tuple[str, int], ...]
+    ) -> tuple[str, tuple[tuple[str, int], ...]]:
+        """The layout of this Model's States, after a digest of it and of what it belongs to."""
+        identity = (
+            self.backend,
+            layout,
+            self.joint_names,
+            self.jnt_type.tolist(),
+            self.jnt_qposadr.tolist(),
+            self.actuator_names,
+        )
+        return hashlib.sha256(repr(identity).encode()).hexdigest()[:16], layout
 
     @abstractmethod
     def _make_data(self) -> Any:

@@ -115,7 +115,7 @@ class Keyframe:
 
     def __post_init__(self) -> None:
         for name in INPUTS:
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+            vars(self)[name] = read_only(getattr(self, name))
 
     def __reduce__(self) -> tuple[Any, ...]:
         # A pickle forgets that an array was read-only; making it anew does not.

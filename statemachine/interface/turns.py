@@ -3,10 +3,14 @@
 Each Data has a `Turn`. To delete what is in it is to take the Data, which only one thread
 can do; a second one finds nothing. So a step learns from one attribute that the Data belongs
 to the Model, that it is usable, and that nobody else uses it.
+
+In the child of a fork there is no other thread. What one was doing with a Data is left half
+done there: such a Data is free, and to be reset or set to a State.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 import threading
 from types import CodeType
@@ -26,6 +30,7 @@ class Turn:
     __slots__ = ("free",)
 
     free: object
+    lock = threading.Lock()  # held while it is found out who uses a Data that is not free
 
     def __init__(self, free: object) -> None:
         self.free = free
@@ -57,6 +62,13 @@ def in_use_here(data: object) -> bool:
     return False
 
 
-LOCK = threading.Lock()
+def _renew() -> None:
+    """Start anew in the child of a fork: another thread may have held the lock."""
+    Turn.lock = threading.Lock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_renew)
+
 # Of the functions that take a Data: each has the locals `data` and `held`.
 HOLDERS: set[CodeType] = set()

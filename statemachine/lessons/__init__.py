@@ -9,58 +9,9 @@ and notebook are made from the same three.
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import cast
 
-if TYPE_CHECKING:
-    from ..page import Page
-    from .session import Session
-
-
-@dataclass(frozen=True)
-class Option:
-    """An option of a lesson: a flag of the command line, a key of `options`."""
-
-    flag: str
-    default: Any
-    help: str
-    kind: type = str
-    choices: tuple[str, ...] | None = None
-    many: bool = False
-
-    @property
-    def key(self) -> str:
-        """Its key in `options`."""
-        return self.flag.removeprefix("--").replace("-", "_")
-
-
-@dataclass(frozen=True)
-class Lesson:
-    """An entry of the table of lessons."""
-
-    name: str
-    question: str
-    model: str
-    options: tuple[Option, ...] = ()
-    station: bool = True  # of the path
-
-
-class Module(Protocol):
-    """What a lesson's module offers."""
-
-    def run(self, model: Any, options: Mapping[str, Any], progress: Any) -> Any:
-        """Compute the lesson's result on one backend."""
-        ...
-
-    def code(self, options: Mapping[str, Any], load: str) -> str:
-        """The code as a student would type it; `load` is the call that loads the model."""
-        ...
-
-    def page(self, results: Mapping[str, Any], session: Session) -> Page:
-        """Say what the results, by backend, mean; `session` is the code and what it printed."""
-        ...
-
+from .records import Lesson, Module, Option
 
 _JOINT = Option("--joint", "shoulder_lift", "joint to write")
 _VALUE = Option("--value", 0.8, "what to write [rad]", float)

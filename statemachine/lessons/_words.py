@@ -7,7 +7,7 @@ from typing import Any
 
 from ..comparison.text import capital, milliseconds
 from ..page import Code, Page, Printed, Question, Table, Text
-from .session import Session
+from .records import Session
 
 WORDS = (
     "A few words first. A model file says what a robot is made of. A body is a rigid piece of "

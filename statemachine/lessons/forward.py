@@ -11,7 +11,7 @@ from ..comparison.text import count, millimetres, short_time, vector
 from ..experiments import forward
 from ..page import Page, Pipeline, Question, Table, Text, Traces, Verdict
 from ._words import differences, emulation, itself, page_of, sentence, typed, where
-from .session import Session
+from .records import Session
 
 _WHEN = ("before it", "after it")
 _MOMENTS = ("xpos", "site_xpos", "contacts", "qacc")  # shown of what a step leaves behind

@@ -13,7 +13,7 @@ from ..experiments import gravity
 from ..page import Page, Question, Table, Text, Verdict
 from ._fall import longer, longer_apart
 from ._words import differences, emulation, page_of, typed, where
-from .session import Session
+from .records import Session
 
 _PARTS = (
     ("gravity (−bias)", "bias"),

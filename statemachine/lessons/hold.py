@@ -13,7 +13,7 @@ from ..experiments import hold
 from ..interface import Array
 from ..page import Page, Question, Table, Text, Traces
 from ._words import differences, page_of, typed, where
-from .session import Session
+from .records import Session
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
 _THERE = np.radians(0.1)  # rad, or m

@@ -9,7 +9,7 @@ from ..comparison.text import count, duration
 from ..experiments import objects
 from ..page import Page, Question, Table, Text, Verdict
 from ._words import WORDS, differences, page_of, sentence, typed, where
-from .session import Session
+from .records import Session
 
 _CHEAP = 5  # times; a Data that is not cheaper than that is no bargain
 

@@ -9,7 +9,7 @@ from ..comparison.text import count, degrees, duration, millimetres
 from ..experiments import questions
 from ..page import Page, Question, Text, Verdict
 from ._words import page_of, where
-from .session import Session
+from .records import Session
 
 _Results = Mapping[str, questions.Answers]
 # What is asked, what the run says, and whether that bears out the right choice.

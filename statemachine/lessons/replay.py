@@ -13,7 +13,7 @@ from ..experiments import replay
 from ..page import Page, Question, Table, Text, Verdict
 from ._broken import BROKEN, course, growth, in_short, traces
 from ._words import differences, page_of, sentence, typed, where
-from .session import Session
+from .records import Session
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> replay.Replay:

@@ -9,7 +9,7 @@ from ..comparison.text import count, millimetres
 from ..experiments import reset
 from ..page import Page, Question, Table, Text, Verdict
 from ._words import differences, emulation, page_of, sentence, typed, where
-from .session import Session
+from .records import Session
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> reset.Reset:

@@ -13,17 +13,10 @@ from ..backends import backend_engine
 from ..calls import CallRecording, record, recorded_engines
 from ..interface import Model
 from ..page import Page
-from . import Lesson, module
+from . import module
+from .records import Lesson, Session
 
 _NAME = "<lesson>"
-
-
-@dataclass(frozen=True)
-class Session:
-    """Code as one types it, for the first of the engines, and what it printed on each."""
-
-    code: str
-    printed: Mapping[str, str]
 
 
 @dataclass(frozen=True)

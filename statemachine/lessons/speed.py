@@ -10,7 +10,7 @@ from ..experiments import speed
 from ..experiments.in_turns import FEWEST, Ratio
 from ..page import Page, Question, Table, Text
 from ._words import differences, page_of, sentence, typed
-from .session import Session
+from .records import Session
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> speed.Speed:

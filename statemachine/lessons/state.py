@@ -8,7 +8,7 @@ from typing import Any
 from ..experiments import state
 from ..page import Page, Question, Slots, Table, Text
 from ._words import differences, page_of, typed
-from .session import Session
+from .records import Session
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> state.Layout:

@@ -10,7 +10,7 @@ from ..errors import BadInputError
 from ..experiments import pace
 from ..page import Page, Question, Table, Text, Verdict
 from ._words import page_of, typed, where
-from .session import Session
+from .records import Session
 
 _BEFORE = "A simulation, a pause of the program, and the time on the simulator's own clock."
 _BRIEF, _WATCHED = 0.5, 4.0  # simulated seconds, without and with --realtime

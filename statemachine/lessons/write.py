@@ -9,7 +9,7 @@ from ..comparison.text import count, position
 from ..experiments import write
 from ..page import Page, Question, Table, Text, Verdict
 from ._words import emulation, page_of, sentence, typed, where
-from .session import Session
+from .records import Session
 
 
 def run(model: Any, options: Mapping[str, Any], progress: Any) -> write.Write:

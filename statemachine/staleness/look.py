@@ -2,99 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping
-from contextlib import nullcontext, suppress
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, cast
+from collections.abc import Iterator
+from contextlib import nullcontext
+from typing import cast
 
-import numpy as np
-
-from ..comparison import Gap
-from ..comparison.text import count, few, listed, milliseconds
-from ..errors import UnsupportedError
-from ..interface import (
-    DERIVED,
-    INPUTS,
-    POSES,
-    Array,
-    Contacts,
-    Data,
-    JointType,
-    Model,
-    State,
-    forward,
-    get_state,
-    make_data,
-    set_state,
-)
-from ..rotations import times
-from .gaps import gaps, same
+from ..comparison.text import few, milliseconds
+from ..interface import DERIVED, POSES, Contacts, Data, Model, get_state
+from .age import Age, Scratch, age_of, engine_step, readings, row
 from .result import Freshness, Row
+from .watch import Watch
 
-if TYPE_CHECKING:
-    from .watch import Watch
-
-Readings = Mapping[str, "Array | Contacts"]
-# The inputs that each is computed from; a write to another is no reason why it is stale.
-DEPEND = dict.fromkeys(DERIVED, INPUTS) | {"contacts": INPUTS}
-DEPEND |= dict.fromkeys(POSES, INPUTS[:1])
-DEPEND |= dict.fromkeys(("qfrc_bias", "qfrc_passive"), INPUTS[:2])
 _REMEMBERED = {"contacts", "qacc", "qfrc_constraint", "qfrc_contact"}
-_ROUNDING = 1e-12  # of poses that are equal but for the order of additions [m, and 1]
-
-
-@dataclass(frozen=True)
-class Moment:
-    """The state that derived values belong to, as far as it is known.
-
-    Attributes:
-        steps: Engine steps since; None if that is not known.
-        writes: Changes of each input since; None if nobody counted.
-        never: Whether nothing was derived since the Data was made, reset or set.
-        written: Entries of the inputs that are others now; known only while watching.
-        retraced: Bodies that are where one step back has them, within `within` [m, and of
-            quaternions 1], where that is how the number of steps was found; strays: bodies
-            that are not of now and not there either.
-    """
-
-    steps: int | None = None
-    writes: Mapping[str, int] | None = None
-    never: bool = False
-    written: tuple[str, ...] = ()
-    retraced: tuple[str, ...] = ()
-    strays: tuple[str, ...] = ()
-    within: float = 0.0
-
-
-class Scratch:
-    """Another Data of a Model, in which the present of any Data of it is computed."""
-
-    def __init__(self, model: Model) -> None:
-        self._model = model
-        self._data = make_data(model)
-
-    def now(self, state: State) -> Readings:
-        """All that `forward` would compute in a state."""
-        set_state(self._model, self._data, state)
-        forward(self._model, self._data)
-        return readings(self._data, copied=True)
-
-    def one_step_back(self, state: State) -> Array:
-        """The poses (nbody, 7) of the bodies in the state that a step led to this one from.
-
-        The engines integrate semi-implicitly: the new velocity moves the old position, and
-        moves the new one back. The velocity of that state cannot be found so.
-        """
-        model, data = self._model, self._data
-        set_state(model, data, state)
-        data.qpos[:] = back(model, state["qpos"], state["qvel"], _engine_step(model))
-        forward(model, data)
-        return np.hstack((data.xpos, data.xquat))
-
-    def close(self) -> None:
-        """Give the Data back."""
-        self._data.close()
 
 
 def freshness(model: Model, data: Data) -> Freshness:
@@ -120,134 +38,28 @@ def freshness(model: Model, data: Data) -> Freshness:
     with nullcontext() if watch is None else watch.aside():
         held = readings(data)
     if watch is not None:
-        now, moment = watch.now(state), watch.moment()
+        now, age = watch.now(state), watch.age()
     else:
         scratch = Scratch(model)
         try:
             now = scratch.now(state)
-            moment = find(model, state, held, now, scratch)
+            age = age_of(model, state, held, now, scratch)
         finally:
             scratch.close()
     touching = any(len(cast("Contacts", found["contacts"])) for found in (held, now))
-    rows = tuple(row(model, name, held[name], now[name], moment) for name in held)
+    rows = tuple(row(model, name, held[name], now[name], age) for name in held)
     return Freshness(
         backend=model.backend,
         engine_version=model.engine_version,
         model=model.path.stem,
         time=state.time,
         rows=rows,
-        written=moment.written,
-        notes=tuple(_notes(model, rows, moment, touching)),
+        written=age.written,
+        notes=tuple(_notes(model, rows, age, touching)),
     )
 
 
-def readings(data: Data, copied: bool = False) -> Readings:
-    """Everything derived that the backend of a Data yields."""
-    found: dict[str, Array | Contacts] = {}
-    for name in DERIVED:
-        with suppress(UnsupportedError):
-            array = getattr(data, name)
-            found[name] = np.array(array) if copied else array
-    found["contacts"] = data.contacts
-    return found
-
-
-def row(
-    model: Model, name: str, held: Array | Contacts, now: Array | Contacts, moment: Moment
-) -> Row:
-    """What is to be told of one array."""
-    if same(held, now):
-        return Row(name, True, 0, 0, "now", ())
-    return stale_row(model, name, moment, gaps(model, name, held, now))
-
-
-def stale_row(model: Model, name: str, moment: Moment, found: tuple[Gap, ...]) -> Row:
-    """What is to be told of an array that is not of now, and off by `found`."""
-    if moment.never:
-        return Row(name, False, None, None, "never computed", found)
-    writes = None
-    if moment.writes is not None:
-        writes = sum(moment.writes[each] for each in DEPEND[name])
-    words = []
-    if moment.steps:
-        words.append(count(moment.steps, "substep" if model.substeps > 1 else "step"))
-    if writes:
-        words.append(count(writes, "write"))
-    of = f"{listed(words)} ago" if words else "an earlier state"
-    return Row(name, False, moment.steps, writes, of, found)
-
-
-def find(model: Model, state: State, held: Readings, now: Readings, scratch: Scratch) -> Moment:
-    """The moment that derived values belong to, from nothing but their values.
-
-    Args:
-        model: Of the Data.
-        state: What the Data is in now.
-        held: What it says.
-        now: What it would say now.
-        scratch: Where other states are tried.
-    """
-    if all(same(held[name], now[name]) for name in held):
-        return Moment(steps=0)
-    if not _array(held, "xquat").any():  # a rotation is never zero
-        return Moment(never=True)
-    poses = np.hstack((_array(held, "xpos"), _array(held, "xquat")))
-    lag = np.abs(np.hstack((_array(now, "xpos"), _array(now, "xquat"))) - poses).max(axis=1)
-    if not lag.any():  # the poses, which alone can be retraced, are of now
-        return Moment()
-    off = np.abs(scratch.one_step_back(state) - poses).max(axis=1)
-    # Nearer than rounding makes them, and much nearer than those of now. One body is enough:
-    # what else is not there was written since.
-    moved = lag > 0
-    there = moved & (off <= _ROUNDING * (1 + np.abs(poses).max())) & (off <= lag / 100)
-    if not there.any():
-        return Moment()
-
-    def names(chosen: Any) -> tuple[str, ...]:
-        return tuple(model.body_names[b] or f"body {b}" for b in np.flatnonzero(chosen).tolist())
-
-    return Moment(
-        steps=1,
-        retraced=names(there),
-        strays=names(moved & ~there),
-        within=float(off[there].max()),
-    )
-
-
-def back(model: Model, qpos: Array, qvel: Array, seconds: float) -> Array:
-    """Positions (nq,) that would move to `qpos` in a time, at the velocities `qvel` (nv,).
-
-    The inverse of `mj_integratePos`: a quaternion turns about an axis of the body.
-    """
-    found = np.array(qpos)
-    for joint, kind in enumerate(model.jnt_type.tolist()):
-        place, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
-        if kind in (JointType.HINGE, JointType.SLIDE):
-            found[place] -= seconds * qvel[dof]
-            continue
-        if kind == JointType.FREE:
-            found[place : place + 3] -= seconds * qvel[dof : dof + 3]
-            place, dof = place + 3, dof + 3
-        spin = qvel[dof : dof + 3]
-        speed = float(np.linalg.norm(spin))
-        if speed:
-            half = -seconds * speed / 2
-            turn = np.array([math.cos(half), *(math.sin(half) * spin / speed)])
-            found[place : place + 4] = times(qpos[place : place + 4], turn)
-    return found
-
-
-def _array(found: Readings, name: str) -> Array:
-    array = found[name]
-    assert isinstance(array, np.ndarray)
-    return array
-
-
-def _engine_step(model: Model) -> float:
-    return model.timestep / model.substeps
-
-
-def _notes(model: Model, rows: tuple[Row, ...], moment: Moment, touching: bool) -> Iterator[str]:
+def _notes(model: Model, rows: tuple[Row, ...], age: Age, touching: bool) -> Iterator[str]:
     behaviours = model.capabilities.behaviours
     stale = [each.name for each in rows if not each.now]
     untold = [name for name in DERIVED if name not in {each.name for each in rows}]
@@ -256,9 +68,9 @@ def _notes(model: Model, rows: tuple[Row, ...], moment: Moment, touching: bool) 
     if not stale:
         yield "All are of now."
         return
-    yield from _how(model, moment, not set(POSES).isdisjoint(stale))
-    if moment.written:
-        yield f"Written since: {', '.join(moment.written)}."
+    yield from _how(model, age, not set(POSES).isdisjoint(stale))
+    if age.written:
+        yield f"Written since: {', '.join(age.written)}."
     if behaviours["stale after a step"].support == "unsupported":
         yield f"After a step: {behaviours['stale after a step'].note}."
     if touching and not model.capabilities.exact_restore and not _REMEMBERED.isdisjoint(stale):
@@ -269,20 +81,20 @@ def _notes(model: Model, rows: tuple[Row, ...], moment: Moment, touching: bool) 
     yield "sm.forward(model, data) makes all of them of now."
 
 
-def _how(model: Model, moment: Moment, poses: bool) -> Iterator[str]:
+def _how(model: Model, age: Age, poses: bool) -> Iterator[str]:
     """How the moment was found, or what stood in the way."""
-    if moment.retraced:
-        exact = f"to {moment.within:.1e} m" if moment.within else "to the bit"
+    if age.retraced:
+        exact = f"to {age.within:.1e} m" if age.within else "to the bit"
         yield (
-            f"Found by going back: qpos − h·qvel, h = {milliseconds(_engine_step(model))}, gives "
-            f"the poses of {few(moment.retraced)}, {exact}."
+            f"Found by going back: qpos − h·qvel, h = {milliseconds(engine_step(model))}, gives "
+            f"the poses of {few(age.retraced)}, {exact}."
         )
-        if moment.strays:
+        if age.strays:
             yield (
-                f"Not so {few(moment.strays)}: qpos or qvel was written since, or the engine "
+                f"Not so {few(age.strays)}: qpos or qvel was written since, or the engine "
                 "integrates otherwise."
             )
-    elif not moment.never and moment.steps is None:
+    elif not age.never and age.steps is None:
         if poses:
             yield "Going back one step, to qpos − h·qvel, does not lead to these poses."
         yield "Writes are not recorded, unless sm.watch_freshness(model, data) does."

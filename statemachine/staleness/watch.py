@@ -19,8 +19,8 @@ from ..comparison import Gap
 from ..comparison.text import few
 from ..errors import BadInputError, StaleReadError
 from ..interface import INPUTS, Array, Contacts, Data, Model, State, get_state
+from .age import DEPEND, Age, Readings, Scratch, age_of, readings, row, stale_row
 from .gaps import told
-from .look import DEPEND, Moment, Readings, Scratch, find, readings, row, stale_row
 from .result import Row, StaleRead, table
 
 _PACKAGE = str(Path(os.path.abspath(__file__)).parent.parent) + os.sep
@@ -89,20 +89,20 @@ class Watch:
         self._scratch = Scratch(model)
         self._present: tuple[bytes, Readings] | None = None
         try:
-            found = find(model, state, readings(data), self.now(state), self._scratch)
+            age = age_of(model, state, readings(data), self.now(state), self._scratch)
         except BaseException:
             self._scratch.close()
             raise
-        self._begin(found.steps, found.never, state if found.steps == 0 else None)
+        self._begin(age.steps, age.never, state if age.steps == 0 else None)
         self._kind, self._advance = type(data), data._advance
-        object.__setattr__(data, "_advance", self._advancing(self._advance))
-        object.__setattr__(data, "__class__", _guarded(self._kind, self))
+        data._advance = self._advancing(self._advance)
+        data.__class__ = _guarded(self._kind, self)
         return self
 
     def __exit__(self, *exc: object) -> None:
-        object.__setattr__(self._data, "__class__", self._kind)
+        self._data.__class__ = self._kind
         if self._data._advance is not None:  # it was not closed meanwhile
-            object.__setattr__(self._data, "_advance", self._advance)
+            self._data._advance = self._advance
         self._scratch.close()
 
     @contextmanager
@@ -120,10 +120,10 @@ class Watch:
             self._present = state.blob, self._scratch.now(state)
         return self._present[1]
 
-    def moment(self) -> Moment:
-        """The moment that derived values belong to, as counted."""
+    def age(self) -> Age:
+        """How old derived values are, as counted."""
         self.touch()
-        return Moment(
+        return Age(
             self._steps,
             None if self._steps is None else dict(self._writes),
             self._never,
@@ -158,13 +158,13 @@ class Watch:
         self._found[name, place, found.of] = StaleRead(name, place, count + 1, found.of, worst)
 
     def _row(self, name: str, held: Array | Contacts) -> Row | None:
-        moment = self.moment()
+        age = self.age()
         state = self._state()
         if state is None:
-            return stale_row(self._model, name, moment, ())
+            return stale_row(self._model, name, age, ())
         if self._fresh is not None and self._fresh == state.blob:
             return None
-        return row(self._model, name, held, self.now(state)[name], moment)
+        return row(self._model, name, held, self.now(state)[name], age)
 
     def _state(self) -> State | None:
         """The present state; None where what was written is no number: there is no now."""

@@ -11,10 +11,11 @@ from __future__ import annotations
 
 from .csv_files import export_csv
 from .files import read, write
+from .header import COLUMNS, CONTACTS, Header
 from .models import model_file
 from .recorder import play, record, record_scenario
 from .shipped import shipped, shipped_names
-from .trace import COLUMNS, CONTACTS, Header, Trace
+from .trace import Trace
 
 __all__ = [
     "COLUMNS",

@@ -12,7 +12,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..interface import JointType
-from .trace import COLUMNS, Header, Trace
+from .header import COLUMNS, Header
+from .trace import Trace
 from .whole import beside, fill_file
 
 

@@ -8,9 +8,10 @@ import os
 from pathlib import Path
 
 from ..errors import BadInputError, MissingEngineError, TraceError
+from .header import Header
 from .npz_files import read_npz, write_npz
 from .parquet_files import read_parquet, require_pyarrow, write_parquet
-from .trace import Header, Trace
+from .trace import Trace
 from .whole import replace_file
 
 SUFFIXES = (".npz", ".parquet")

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..errors import ModelFileError, StateMachineError
 from ..experiments._common import model_digest
 from ..models import resolve
-from .trace import Header
+from .header import Header
 
 
 def model_file(

@@ -11,7 +11,8 @@ from numpy.lib import format as npy
 
 from ..errors import TraceError
 from .checked import WHOLE, as_column, check_size
-from .trace import INPUTS, Header, Trace, check_shapes
+from .header import INPUTS, Header
+from .trace import Trace, check_shapes
 
 _HEADER_MOST = 2**24  # bytes of a header
 

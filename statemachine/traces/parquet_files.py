@@ -11,7 +11,8 @@ import numpy as np
 
 from ..errors import MissingEngineError, TraceError
 from .checked import as_column, check_size
-from .trace import COLUMNS, CONTACTS, Header, Trace
+from .header import COLUMNS, CONTACTS, Header
+from .trace import Trace
 
 # Of the header in the metadata: a digest of header and columns, then the header. Parquet
 # has no checksum of its own that every reader looks at.

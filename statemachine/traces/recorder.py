@@ -18,7 +18,8 @@ from ..experiments.scenarios import Controller, Scenario
 from ..interface import Array, Data, Model, State, make_data, reset, set_state, step
 from .derived import derived
 from .energy import energies
-from .trace import Header, Trace
+from .header import Header
+from .trace import Trace
 
 
 def record(

@@ -10,9 +10,9 @@ import marshal
 import types
 import weakref
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
-from ...backends._bullet_machine import Machine
+from ...backends._hidden_data import Machine
 from ...backends.pybullet_backend import PybulletData, PybulletModel
 from ...installed import require
 from ...interface import DERIVED, INPUTS
@@ -112,7 +112,7 @@ class _World(WatchedObject):
                 ):
                     kept.append(values)
                 links.append(pb.getLinkStates(body, numbers, 0, 0, client))
-        found = {
+        contents = {
             _BODIES: bodies,
             **dict(zip(_JOINT, joints, strict=True)),
             "base poses": poses,
@@ -122,8 +122,8 @@ class _World(WatchedObject):
             "masses, frictions and dampings": dynamics,
             "constraints": pb.getNumConstraints(client),
         }
-        found |= pb.getPhysicsEngineParameters(client)
-        return {name: marshal.dumps(value, 2) for name, value in found.items()}
+        contents |= pb.getPhysicsEngineParameters(client)
+        return {name: marshal.dumps(value, 2) for name, value in contents.items()}
 
     def differing(self, before: Contents, now: Contents) -> list[str]:
         # Another body makes every list a longer one: that is not what changed.
@@ -139,7 +139,7 @@ class _Arrays(WatchedObject):
     def __init__(self, machine: Machine, label: str) -> None:
         super().__init__("a Data", label)
         self._machine = weakref.ref(machine)  # a Data ends when the code lets go of it
-        self._moment = machine._moment
+        self._moment = machine.moment
 
     @property
     def gone(self) -> bool:
@@ -149,14 +149,14 @@ class _Arrays(WatchedObject):
         machine = self._machine()
         if machine is None:
             return None
-        found = {name: getattr(machine, name).tobytes() for name in INPUTS}
-        found["time"] = marshal.dumps(machine.time, 2)
+        contents = {name: getattr(machine, name).tobytes() for name in INPUTS}
+        contents["time"] = marshal.dumps(machine.time, 2)
         # Not by asking the Data, which would compute what nobody has read.
-        for name, value in machine._derived.items():
+        for name, value in machine.derived.items():
             whole = name in DERIVED
             parts = [value] if whole else [value.geom, value.dist, value.pos, value.force]
-            found[name] = b"".join(part.tobytes() for part in parts)
-        return found
+            contents[name] = b"".join(part.tobytes() for part in parts)
+        return contents
 
     def differing(self, before: Contents, now: Contents) -> list[str]:
         # What was never read is what a fresh Data says: zeros.
@@ -164,10 +164,10 @@ class _Arrays(WatchedObject):
 
     def due(self) -> bool:
         machine = self._machine()
-        if machine is None or machine._moment is self._moment:
+        if machine is None or machine.moment is self._moment:
             return False
-        self._moment = machine._moment
-        return not machine._derived
+        self._moment = machine.moment
+        return not machine.derived
 
     def entry(self, field: str, before: bytes, after: bytes) -> str:
         return entries(field, before, after, 8) if field in INPUTS else field
@@ -215,9 +215,9 @@ class _BulletWatch(CallWatch):
             if isinstance(value, PybulletModel):
                 self._name_model(label, value)
             elif isinstance(value, PybulletData):
-                self._name_model(f"{label}.model", value._home)
-                self._label(value._machine.world, f"the world of {label}")
-                machine = value._machine
+                self._name_model(f"{label}.model", cast("PybulletModel", value.model))
+                self._label(value.machine.world.raw, f"the world of {label}")
+                machine = value.machine
                 if machine not in arrays:
                     kept = self._arrays.get(machine) or _Arrays(machine, label)
                     kept.label, kept.named = label, True
@@ -225,15 +225,12 @@ class _BulletWatch(CallWatch):
         self._arrays = arrays  # the others no variable leads to
 
     def _name_model(self, label: str, model: PybulletModel) -> None:
-        # Neither is made before it is needed, and looking must not make it.
-        self._label(model._shared._ghost, f"the still copy of {label}")
-        mirror = vars(model._mirror).get("_machine")
-        if mirror is not None:
-            self._label(mirror.world, f"the look-ahead of {label}")
+        for name, world in model.shared_worlds.items():
+            self._label(world, f"the {name} of {label}")
 
     def _label(self, world: Any, label: str) -> None:
         # Of one that is closed the number may be another's by now.
-        if world is None or not world._end.alive:
+        if world.closed:
             return
         known = self._worlds.get(world.client)
         if known is not None and not known.named:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property, partial
+from pathlib import Path
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -82,7 +83,7 @@ class PybulletDials:
         return self._with_law(dials, values)
 
     def _with_motors(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
-        raw = self.model._shared.raw
+        raw = self.model.compiled
         model = self.model.replace(**_world_options(dials, values))
         acts: list[Act] = []
         if "inertia" in dials:
@@ -93,14 +94,14 @@ class PybulletDials:
         if "limits" in dials:
             acts.append(partial(_set_limits, ranges=None))
         if "surfaces" in dials:
-            acts.append(partial(_set_frictions, surfaces=self.emulated._shared.plan.surfaces))
+            acts.append(partial(_set_frictions, surfaces=self.emulated.plan.surfaces))
         if "contact" in dials:
             acts.append(_touch_nothing)
         return _dialled(model, acts)
 
     def _with_law(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
         own, options, acts = self.emulated, dict[str, Any](), list[Act]()
-        fresh = self.model._shared.raw
+        fresh = self.model.compiled
         for name in ("gravity", "timestep"):
             if name not in dials:
                 options[name] = getattr(self.model, name)
@@ -116,7 +117,7 @@ class PybulletDials:
         if "limits" not in dials:
             acts.append(partial(_set_limits, ranges=_ranges(self.model)))
         if "surfaces" not in dials:
-            acts.append(partial(_fresh_surfaces, plan=own._shared.plan))
+            acts.append(partial(_fresh_surfaces, plan=own.plan))
         if "contact" in dials:
             options["contacts"] = False
         # An option that changes nothing may still change the last bit of what follows from it.
@@ -124,7 +125,7 @@ class PybulletDials:
         model = cast("PybulletModel", own.replace(**changing)) if changing else own
         plan = None
         if "inertia" not in dials:
-            raw = copy.copy(model._shared.raw)
+            raw = copy.copy(model.compiled)
             raw.body_inertia[:] = self.shapes
             plan = Plan(raw)
         return _dialled(model, acts, plan) if acts or plan else model
@@ -132,13 +133,13 @@ class PybulletDials:
     @property
     def shapes(self) -> np.ndarray:
         """(nbody, 3) inertias that the engine takes from the shapes, in the file's axes."""
-        raw = self.model._shared.raw
-        found = np.array(raw.body_inertia)
+        raw = self.model.compiled
+        inertias = np.array(raw.body_inertia)
         with cast("PybulletData", self.model._make_data()) as data:
             world = data.raw
             for body, link, b in _links(world):
-                found[b] = pb.getDynamicsInfo(body, link, world.client)[2]
-        return found
+                inertias[b] = pb.getDynamicsInfo(body, link, world.client)[2]
+        return inertias
 
     @cached_property
     def frictions(self) -> np.ndarray:
@@ -151,8 +152,8 @@ class PybulletDials:
 
 def dials(model: Model, options: Mapping[str, Any]) -> PybulletDials | None:
     """The dials of a Model of PyBullet as it comes; None of any other."""
-    kind = getattr(getattr(model, "_shared", None), "kind", None)
-    return PybulletDials(model, options) if kind == "engine" else None
+    as_it_comes = isinstance(model, PybulletModel) and model.defaults == "engine"
+    return PybulletDials(model, options) if as_it_comes else None
 
 
 def frictionless(model: Model) -> Model:
@@ -164,6 +165,17 @@ class DialledModel(PybulletModel):
     """A Model whose every world is given some settings before anything is done in it."""
 
     _acts: tuple[Act, ...]
+
+    def __init__(
+        self,
+        plan: Plan,
+        path: Path,
+        substeps: int,
+        defaults: Literal["model", "engine"],
+        acts: tuple[Act, ...],
+    ) -> None:
+        super().__init__(plan, path, substeps, defaults)
+        vars(self)["_acts"] = acts
 
     def _make_data(self) -> PybulletData:
         return DialledData(self)
@@ -178,15 +190,15 @@ class DialledData(PybulletData):
 
     def __init__(self, model: DialledModel) -> None:
         super().__init__(model)
-        object.__setattr__(self, "_dialled", -1)
+        self._dialled = -1
         self._dial()
 
     def _dial(self) -> None:
-        world = self._machine.world
+        world = self.raw
         if world.client != self._dialled:
             for act in cast("DialledModel", self._home)._acts:
                 act(world)
-            object.__setattr__(self, "_dialled", world.client)
+            self._dialled = world.client
 
     def _reset(self, key: int | None) -> None:
         super()._reset(key)
@@ -201,11 +213,7 @@ def _dialled(model: Model, acts: list[Act], plan: Plan | None = None) -> Model:
     if not acts and plan is None:
         return model
     own = cast("PybulletModel", model)
-    shared = own._shared
-    defaults: Literal["engine", "model"] = "engine" if shared.kind == "engine" else "model"
-    made = DialledModel(plan or shared.plan, own.path, own.substeps, defaults)
-    object.__setattr__(made, "_acts", tuple(acts))
-    return made
+    return DialledModel(plan or own.plan, own.path, own.substeps, own.defaults, tuple(acts))
 
 
 def _world_options(dials: Mapping[str, Setting], values: Mapping[str, Any]) -> dict[str, Any]:
@@ -284,7 +292,7 @@ def _set_limits(world: World, ranges: Mapping[int, tuple[float, float]] | None) 
 
 def _set_frictions(world: World, surfaces: Surfaces) -> None:
     for k, (body, link, _) in enumerate(world.solids()):
-        wanted = [float(each[k]) for each in (surfaces.slide, surfaces.roll, surfaces.spin)]
+        wanted = [float(friction[k]) for friction in (surfaces.slide, surfaces.roll, surfaces.spin)]
         _rub(world, body, link, wanted)
 
 
@@ -306,9 +314,9 @@ def _fresh_surfaces(world: World, plan: Plan) -> None:
     for body, link, _ in solids:
         _rub(world, body, link, [FRICTION, 0.0, 0.0])
     for (i, j), meet in plan.surfaces.pairs.items():
-        (body, link, one), (other, other_link, two) = solids[i], solids[j]
+        (body, link, solid), (other, other_link, other_solid) = solids[i], solids[j]
         # What never moves does not meet what never moves; of the rest, all that are two bodies.
-        moves = any(plan.raw.body_weldid[solid.body] for solid in (one, two))
+        moves = any(plan.raw.body_weldid[s.body] for s in (solid, other_solid))
         wanted = moves and body != other
         if wanted != meet:
             pb.setCollisionFilterPair(

@@ -1,9 +1,18 @@
-"""A compiled MJCF as the facts of a Model: read by every backend that starts from one."""
+"""From a file to a compiled description, and from that to what `Model.__init__` wants.
+
+MuJoCo's compiler reads MJCF, URDF and MJB. A backend of any engine may start from its result,
+an `mjModel`, and give its Model the facts that every other backend gives:
+
+    with compiler_warnings() as texts:
+        raw = compile_file(path)
+    model = MyModel(raw=..., backend="mine", ..., **facts(raw))
+
+`replace` edits a copy (`edited`), and gives the engine's timestep (`step_length`).
+"""
 
 from __future__ import annotations
 
 import copy
-import hashlib
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,7 +22,7 @@ import mujoco
 import numpy as np
 
 from ..errors import BadInputError, ModelError
-from ..interface import Array, Keyframe, Model
+from ..interface import Array, Keyframe
 from ._mjb import check_binary
 
 _DISABLE = mujoco.mjtDisableBit
@@ -39,8 +48,12 @@ _NEVER_NEGATIVE = {"dof_armature", "dof_frictionloss"}
 
 
 @contextmanager
-def heard() -> Iterator[list[str]]:
-    """What MuJoCo warns of meanwhile; else it goes into a log file and to the terminal."""
+def compiler_warnings() -> Iterator[list[str]]:
+    """What MuJoCo warns of meanwhile; else it goes into a log file and to the terminal.
+
+    Yields:
+        A list of texts that is complete when the `with` block ends.
+    """
     texts: list[str] = []
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(texts.append)  # in C: no Ctrl-C has to cross MuJoCo
@@ -53,7 +66,10 @@ def heard() -> Iterator[list[str]]:
 
 
 def compile_file(path: str | os.PathLike[str]) -> mujoco.MjModel:
-    """Compile an MJCF, URDF or MJB file.
+    """Compile an MJCF, URDF or MJB file; the suffix ".mjb" says that it is binary.
+
+    Args:
+        path: The file. Meshes are looked for beside it, as the file says.
 
     Raises:
         ModelError: MuJoCo cannot compile the file, with its reason; or it compiles one
@@ -111,7 +127,14 @@ def _owner(raw: mujoco.MjModel, name: str, row: Array) -> str:
 
 
 def edited(raw: mujoco.MjModel, options: dict[str, Any]) -> mujoco.MjModel:
-    """A copy with checked options of `Model.replace`; timestep and integrator apart."""
+    """A copy with options of `Model.replace`, which has checked them.
+
+    Args:
+        raw: Stays as it is.
+        options: actuation, contacts, limits: bool; gravity: (3,) [m/s²]; armature [kg·m² or
+            kg], damping [N·m·s/rad or N·s/m], frictionloss [N·m or N]: (nv,). Others,
+            `timestep`, `substeps` and `integrator` among them, are left to the backend.
+    """
     raw = copy.copy(raw)
     for name, value in options.items():
         for flag in _HINDRANCES.get(name, ()):  # else the option would be without effect
@@ -131,6 +154,11 @@ def edited(raw: mujoco.MjModel, options: dict[str, Any]) -> mujoco.MjModel:
 def step_length(timestep: float, substeps: int, options: dict[str, Any]) -> float:
     """What one engine step takes [s] after `replace`.
 
+    Args:
+        timestep: Of the Model before [s].
+        substeps: Of the Model after.
+        options: What `Model.replace` has checked; its "timestep" comes before the first one.
+
     Raises:
         BadInputError: So many substeps leave nothing of a timestep.
     """
@@ -146,7 +174,11 @@ def gravity(m: mujoco.MjModel) -> Array:
 
 
 def facts(m: mujoco.MjModel) -> dict[str, Any]:
-    """What `Model.__init__` wants of a compiled model, but for what a backend adds."""
+    """What `Model.__init__` wants of a compiled model; see there for shapes and units.
+
+    A backend adds `backend`, `engine_version`, `path`, `raw`, `capabilities`, `timestep` and
+    `substeps`.
+    """
     on_joint = m.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
     servo = (
         (m.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_FIXED))
@@ -194,21 +226,6 @@ def facts(m: mujoco.MjModel) -> dict[str, Any]:
             for i in range(m.nkey)
         ),
     }
-
-
-def with_fingerprint(
-    model: Model, layout: tuple[tuple[str, int], ...]
-) -> tuple[str, tuple[tuple[str, int], ...]]:
-    """The layout of a Model's States, after a digest of it and of what it belongs to."""
-    identity = (
-        model.backend,
-        layout,
-        model.joint_names,
-        model.jnt_type.tolist(),
-        model.jnt_qposadr.tolist(),
-        model.actuator_names,
-    )
-    return hashlib.sha256(repr(identity).encode()).hexdigest()[:16], layout
 
 
 def _ranges(ranges: Array, limited: Any) -> Array:

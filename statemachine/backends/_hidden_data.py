@@ -1,0 +1,304 @@
+"""Model and Data of an engine that keeps a world of its own.
+
+The arrays of the Data lie beside the world. What is written into them reaches the world with
+the next step; what the engine does reaches them at its end. What is derived is computed when it
+is read, from a copy of the moment that it belongs to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..errors import BadInputError, DivergedError, EngineError
+from ..interface import DERIVED, INPUTS, POSES, Array, Contacts, Data, Model, State
+from ..interface.checks import HUGE, check_entries, check_writable
+from ._hidden_world import HiddenWorld, LookAhead, Moment, bounded
+
+
+class HiddenModel(Model):
+    """A Model whose every Data has a world of its own."""
+
+    _open_world: Callable[[], HiddenWorld]
+    _look_ahead: LookAhead
+
+    def __init__(self, open_world: Callable[[], HiddenWorld], **facts: Any) -> None:
+        """Fill in the facts.
+
+        Args:
+            open_world: Opens a world; to be pickled with the Model.
+            **facts: What `Model.__init__` wants.
+        """
+        super().__init__(_open_world=open_world, _look_ahead=LookAhead(open_world), **facts)
+
+    def _make_data(self) -> HiddenData:
+        return HiddenData(self)
+
+
+class Machine:
+    """The state of one Data, and the step that advances it.
+
+    A step is all of it or nothing, also when it is interrupted. A write is seen by its bytes.
+
+    Attributes:
+        qpos, qvel, ctrl: The Data's arrays.
+        time: Simulated time [s].
+        world: Where the engine is; another one after some resets.
+        moment: What is derived belongs to it; None on a fresh or reset Data.
+        derived: What was read of that so far, by name.
+    """
+
+    def __init__(self, model: HiddenModel) -> None:
+        self._model, self._substeps = model, model.substeps
+        self.world = model._open_world()
+        self.qpos, self.qvel = np.zeros(model.nq), np.zeros(model.nv)
+        self.ctrl = np.zeros(model.nu)
+        self._used = False
+        self.reset(None)
+
+    def reset(self, key: int | None) -> None:
+        """Be in the default state, or in a keyframe's."""
+        if key is None:
+            still, silent = np.zeros(len(self.qvel)), np.zeros(len(self.ctrl))
+            self.restart(0.0, Moment(self.world.qpos0, still, silent, self.world.blank))
+        else:
+            frame = self._model.keyframes[key]
+            start = Moment(frame.qpos, frame.qvel, frame.ctrl, self.world.blank)
+            self.restart(frame.time, start)
+
+    def restart(self, time: float, start: Moment) -> None:
+        """Take a state whole; nothing of before has any part in what follows."""
+        if self._used:
+            self.world = self.world.renewed()
+            self._used = False
+        self.time = time
+        self.qpos[:], self.qvel[:], self.ctrl[:] = start.qpos, start.qvel, start.ctrl
+        self._place(start.memory)
+        self._command()
+        self.moment: Moment | None = None
+        self._lives = False
+        self.derived: dict[str, Any] = {}
+
+    def _place(self, memory: Any) -> None:
+        # Until all is in its place the world is astray, and `_memory` says what it is to know.
+        self._astray, self._lives, self._memory = True, False, memory
+        qpos, qvel = self.qpos.copy(), self.qvel.copy()
+        self.world.place(qpos, qvel, memory)
+        # What the arrays were left at, and its bytes, by which a write is seen.
+        self._left = qpos, qvel, qpos.tobytes(), qvel.tobytes()
+        self._astray = False
+
+    def _command(self) -> None:
+        """Pass the command on as it is now."""
+        self._commanded = b"?"  # until the world has taken it
+        self._ctrl = self.ctrl.copy()
+        self.world.command(self._ctrl)
+        self._commanded = self._ctrl.tobytes()
+
+    def run(self, nstep: int = 1) -> None:
+        """Advance by `nstep` timesteps; all of it or, if anything is raised, nothing."""
+        steps = nstep * self._substeps
+        if steps >= 2**31:
+            raise BadInputError(f"nstep {nstep} × {self._substeps} substeps is too large")
+        check_writable(self.qpos, "qpos")
+        check_writable(self.qvel, "qvel")
+        world = self.world
+        if self.ctrl.tobytes() != self._commanded:
+            reached = self.ctrl.copy()  # by the actuators: what is infinite may end at a limit
+            world.clamp(reached)
+            check_entries(reached, "ctrl", self._model._coordinate_name)
+            self._command()
+        if self._written:
+            check_entries(self.qpos, "qpos", self._model._coordinate_name)
+            check_entries(self.qvel, "qvel", self._model._coordinate_name)
+            self._model._check_quaternions(self.qpos)
+            self._place(world.blank)
+        elif self._astray:
+            self._place(self._memory)
+        self._used, start = True, world.memory
+        kept = self.moment, self.derived
+        try:
+            time = self._several(steps - 1, self.time)
+            before = world.read() if steps > 1 else self._left[:2]
+            memory = start if steps == 1 else world.memory
+            moment = Moment(*before, self._ctrl, memory)
+            time = self._several(1, time)
+            qpos, qvel = world.read()
+            if not world.looks_at_all and not bounded(qpos, qvel):
+                self._diverge(time)
+            left = qpos, qvel, qpos.tobytes(), qvel.tobytes()
+            self.moment, self._lives, self.derived = moment, True, {}
+            # Nothing can interrupt this line, and no other moves the Data.
+            self.qpos[:], self.qvel[:], self.time, self._left = qpos, qvel, time, left
+        except BaseException:
+            # The engine is elsewhere now; the arrays are not, nor is what else is known.
+            self._astray, self._lives, self._memory = True, False, start
+            self.moment, self.derived = kept
+            raise
+
+    def _several(self, steps: int, time: float) -> float:
+        """Take engine steps; returns the time after them."""
+        world = self.world
+        for _ in range(steps):
+            world.step()
+            time += world.timestep
+            if world.diverging():
+                self._diverge(time)
+        return time
+
+    def _diverge(self, time: float) -> None:
+        """Raise DivergedError for the first coordinate that is not finite, or is huge."""
+        for name, array in zip(INPUTS, self.world.read(), strict=False):
+            bad = np.flatnonzero(~(np.abs(array) <= HUGE))
+            if len(bad):
+                index = int(bad[0])
+                label = self._model._coordinate_name(name, index)
+                raise DivergedError(
+                    f"{name}[{index}]{label} became NaN, infinite or huge at "
+                    f"time {time:g} s. This Data now takes only reset and set_state",
+                    quantity=name,
+                    index=index,
+                    time=time,
+                )
+
+    @property
+    def _written(self) -> bool:
+        """Whether qpos or qvel is no longer what it was left at."""
+        return self._left[2:] != (self.qpos.tobytes(), self.qvel.tobytes())
+
+    def present(self) -> Moment:
+        """All that decides the future but the time."""
+        if self._written:  # what the world remembers belongs to another state
+            memory = self.world.blank
+        else:
+            memory = self._memory if self._astray else self.world.memory
+        return Moment(self.qpos.copy(), self.qvel.copy(), self.ctrl.copy(), memory)
+
+    def forward(self) -> None:
+        """Let everything derived belong to the present."""
+        self.moment, self._lives, self.derived = self.present(), False, {}
+
+    def derive(self, name: str) -> Any:
+        """An array of `records.DERIVED`, or "contacts"; computed at the first reading."""
+        if name not in self.derived:
+            values = self._compute(name)
+            for value in values.values():
+                if isinstance(value, np.ndarray):
+                    value.setflags(write=False)
+            self.derived |= values
+        return self.derived[name]
+
+    def _compute(self, name: str) -> Mapping[str, Any]:
+        moment = self.moment
+        if moment is None:
+            return _nothing(self._model)
+        if name in POSES and (poses := self.world.kinematics(moment.qpos)):
+            return poses
+        if self._lives:  # the world is still where the step that ends there left it
+            return self.world.derive(name, moment, self.derive)
+        return self._model._look_ahead.at(moment)
+
+
+class HiddenData(Data):
+    """A Machine as a Data."""
+
+    __slots__ = ("_layout", "_machine")
+
+    _machine: Machine
+    _layout: tuple[str, tuple[tuple[str, int], ...]]
+
+    def __init__(self, model: HiddenModel) -> None:
+        self._machine = machine = Machine(model)
+        sizes = {"time": 1, "qpos": model.nq, "qvel": model.nv, "ctrl": model.nu}
+        self._layout = model._with_fingerprint((*sizes.items(), *machine.world.memory_layout))
+        inputs = {name: getattr(machine, name) for name in INPUTS}
+        super().__init__(model, machine.run, inputs)
+
+    @property
+    def machine(self) -> Machine:
+        """What lies beside the world; to be looked at only."""
+        return self._machine
+
+    @property
+    def raw(self) -> Any:
+        """The engine's own object; read from it, and write through qpos and qvel."""
+        if self._trouble == "closed":
+            self._refuse_if_troubled()
+        return self._machine.world.raw
+
+    @property
+    def time(self) -> float:
+        if self._trouble == "closed":
+            self._refuse_if_troubled()
+        return self._machine.time
+
+    def _derive(self, name: str) -> Array:
+        if self._trouble:
+            self._refuse_if_troubled()
+        if name in self._machine.world.untold:
+            raise self._home._unsupported("forces by part")
+        return self._machine.derive(name)
+
+    def _find_contacts(self) -> Contacts:
+        return self._machine.derive("contacts")
+
+    def _recompute(self) -> None:
+        self._machine.forward()
+
+    def _reset(self, key: int | None) -> None:
+        self._machine.reset(key)
+
+    def _get_state(self) -> State:
+        now, world = self._machine.present(), self._machine.world
+        parts = [[self._machine.time], now.qpos, now.qvel, now.ctrl, *world.packed(now.memory)]
+        blob = np.concatenate(parts).tobytes()
+        model, (fingerprint, layout) = self._home, self._layout
+        return State(model.backend, model.engine_version, fingerprint, layout, blob)
+
+    def _set_state(self, state: State) -> None:
+        for name in INPUTS:
+            check_entries(state[name], name, self._home._coordinate_name)
+        self._home._check_quaternions(state["qpos"])
+        world = self._machine.world
+        memory = world.unpacked([state[name] for name, _ in world.memory_layout])
+        start = Moment(state["qpos"], state["qvel"], state["ctrl"], memory)
+        self._machine.restart(state.time, start)
+
+    def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
+        return self._layout
+
+    def _set_time(self, time: float) -> None:
+        self._machine.time = time
+
+    def _close(self) -> None:
+        self._machine.world.close()
+
+    def _failed(self, error: Exception) -> None:
+        world = self._machine.world
+        if isinstance(error, DivergedError):
+            self._give_up(f"{error.quantity}[{error.index}] was not finite at {error.time:g} s")
+        elif isinstance(error, world.errors):
+            self._give_up(f"{world.engine} gave up: {error}")
+            raise EngineError(f"{world.engine} gave up: {error}") from error
+
+
+def _nothing(model: Model) -> dict[str, Any]:
+    """What a fresh Data says: zeros, and no contacts."""
+    shapes = {
+        "xpos": (model.nbody, 3),
+        "xquat": (model.nbody, 4),
+        "site_xpos": (model.nsite, 3),
+        "site_xmat": (model.nsite, 9),
+    }
+    values: dict[str, Any] = {name: np.zeros(shapes.get(name, (model.nv,))) for name in DERIVED}
+    values["contacts"] = Contacts(
+        geom=np.zeros((0, 2), dtype=np.int64),
+        dist=np.zeros(0),
+        pos=np.zeros((0, 3)),
+        frame=np.zeros((0, 3, 3)),
+        force=np.zeros((0, 3)),
+        torque=np.zeros((0, 3)),
+    )
+    return values

@@ -1,0 +1,216 @@
+"""What a backend says of an engine that keeps a world of its own: a `HiddenWorld`.
+
+MuJoCo lets its caller own the state. Most engines do not: functions reach a world inside. A
+`HiddenData` has arrays beside such a world. A backend is then what its engine does differently,
+in the hooks of a `HiddenWorld`; `tests/hidden_world.py` is a short one to start from.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..interface import DERIVED, POSES, Array
+from ..interface.checks import HUGE
+
+_MANY = HUGE * HUGE
+Read = Callable[[str], Any]
+
+
+@dataclass(slots=True)
+class Moment:
+    """All that what is derived at one moment depends on.
+
+    Attributes:
+        qpos, qvel, ctrl: (nq,), (nv,) and (nu,), as in a Data.
+        memory: What the world knew of the step before; see `HiddenWorld.memory`.
+    """
+
+    qpos: Array
+    qvel: Array
+    ctrl: Array
+    memory: Any
+
+
+class HiddenWorld(ABC):
+    """One world of an engine, and all that is the engine's own about it.
+
+    Arrays that a hook is given are not written to, and not kept; those that it returns are new.
+
+    Attributes:
+        engine: Name of the engine, for messages.
+        errors: What the engine raises when it gives up.
+        untold: Names of `records.DERIVED` that this engine does not tell.
+        memory_layout: Name and length of each array of `packed`, which a State then has.
+        timestep: Simulated time of one engine step [s].
+        qpos0: (nq,) positions of the default state.
+        raw: The engine's own object, which `Data.raw` gives.
+        looks_at_all: Whether `diverging` looks at every coordinate; else all are looked at
+            at the end of a call.
+    """
+
+    engine: str
+    errors: tuple[type[Exception], ...] = ()
+    untold: frozenset[str] = frozenset()
+    memory_layout: tuple[tuple[str, int], ...] = ()
+    timestep: float
+    qpos0: Array
+    raw: Any
+    looks_at_all: bool = True
+    # Held while a world that several Data share is used. One for all Models.
+    lock = threading.RLock()
+
+    @abstractmethod
+    def place(self, qpos: Array, qvel: Array, memory: Any) -> None:
+        """Take a state, so that what follows depends on nothing that was before.
+
+        The command stays. What a call that was interrupted left behind is undone here.
+
+        Args:
+            qpos: (nq,) [rad or m], MuJoCo's conventions; finite, no quaternion is zero.
+            qvel: (nv,) [rad/s or m/s].
+            memory: Of the step before that state.
+        """
+
+    @abstractmethod
+    def command(self, ctrl: Array) -> None:
+        """Take a command (nu,) [unit of the actuator] that is in force until the next one."""
+
+    @abstractmethod
+    def step(self) -> None:
+        """Take one engine step."""
+
+    @abstractmethod
+    def read(self) -> tuple[Array, Array]:
+        """Where the engine is: qpos (nq,) and qvel (nv,), MuJoCo's conventions."""
+
+    @abstractmethod
+    def derive(self, name: str, moment: Moment, read: Read) -> Mapping[str, Any]:
+        """What the last step, or `look`, shows of the moment that it started from.
+
+        Args:
+            name: Of `records.DERIVED`, or "contacts".
+            moment: Where that step started.
+            read: Gives another value of that moment, by name.
+
+        Returns:
+            Arrays of the contract's shapes by name, and "contacts": `name` at least, and what
+            else comes with it.
+        """
+
+    @abstractmethod
+    def close(self) -> None:
+        """Give the world back. Idempotent."""
+
+    def look(self, moment: Moment) -> None:
+        """Be where `derive` tells of a moment itself; only called where no Data steps.
+
+        By default one step is taken from it.
+        """
+        self.place(moment.qpos, moment.qvel, moment.memory)
+        self.command(moment.ctrl)
+        self.step()
+
+    def kinematics(self, qpos: Array) -> Mapping[str, Array]:
+        """xpos, xquat, site_xpos and site_xmat at `qpos` (nq,), where that needs no step.
+
+        Empty by default: `derive` gives them.
+        """
+        return {}
+
+    def diverging(self) -> bool:
+        """A quick look after each engine step: may a coordinate be NaN or beyond `HUGE`?
+
+        If so, all are read, and the first that is raises DivergedError.
+        """
+        return not bounded(*self.read())
+
+    def clamp(self, ctrl: Array) -> None:  # noqa: B027  (optional hook)
+        """Bring a command (nu,) within its ranges, in place.
+
+        What is then not finite is refused, so without this every infinite command is.
+        """
+
+    def renewed(self) -> HiddenWorld:
+        """The world in which the state is overwritten: another, where `place` leaves traces.
+
+        Then this one is closed.
+        """
+        return self
+
+    @property
+    def memory(self) -> Any:
+        """What the engine remembers of its last step, beside qpos, qvel and ctrl."""
+        return None
+
+    @property
+    def blank(self) -> Any:
+        """That of a state without a step before it: fresh, or written to."""
+        return None
+
+    def packed(self, memory: Any) -> Sequence[Array]:
+        """A memory as arrays of `memory_layout`."""
+        return ()
+
+    def unpacked(self, parts: Sequence[Array]) -> Any:
+        """The other way round."""
+        return None
+
+
+def _renew() -> None:
+    """Start anew in the child of a fork: another thread may have held the lock."""
+    HiddenWorld.lock = threading.RLock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_renew)
+
+
+class LookAhead:
+    """A world that the Data of a Model share, in which what is derived of a moment is computed.
+
+    Attributes:
+        world: None until the first use.
+    """
+
+    def __init__(self, open_world: Callable[[], HiddenWorld]) -> None:
+        self._open = open_world
+        self.world: HiddenWorld | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return LookAhead, (self._open,)
+
+    def at(self, moment: Moment) -> dict[str, Any]:
+        """Contacts and forces of a moment."""
+        with HiddenWorld.lock:
+            self.world = self._open() if self.world is None else self.world.renewed()
+            return looked_at(self.world, moment)
+
+
+def looked_at(world: HiddenWorld, moment: Moment) -> dict[str, Any]:
+    """What a world tells of a moment, but for what kinematics alone gives."""
+    world.look(moment)
+    poses, values = dict[str, Any](), dict[str, Any]()
+
+    def read(name: str) -> Any:
+        if name in POSES and not poses:
+            poses.update(world.kinematics(moment.qpos))
+        if name in poses:
+            return poses[name]
+        if name not in values:
+            values.update(world.derive(name, moment, read))
+        return values[name]
+
+    for name in ("contacts", *DERIVED):
+        if name not in world.untold:
+            read(name)
+    return values
+
+
+def bounded(qpos: Array, qvel: Array) -> bool:
+    """Whether no coordinate is NaN or beyond `HUGE`, by a cheap sufficient condition."""
+    return bool(qpos.dot(qpos) + qvel.dot(qvel) < _MANY)

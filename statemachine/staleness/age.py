@@ -1,0 +1,197 @@
+"""How old the derived values of a Data are, from their values alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..comparison import Gap
+from ..comparison.text import count, listed
+from ..errors import UnsupportedError
+from ..interface import (
+    DERIVED,
+    INPUTS,
+    POSES,
+    Array,
+    Contacts,
+    Data,
+    JointType,
+    Model,
+    State,
+    forward,
+    make_data,
+    set_state,
+)
+from ..rotations import times
+from .gaps import gaps, same
+from .result import Row
+
+Readings = Mapping[str, "Array | Contacts"]
+# The inputs that each is computed from; a write to another is no reason why it is stale.
+DEPEND = dict.fromkeys(DERIVED, INPUTS) | {"contacts": INPUTS}
+DEPEND |= dict.fromkeys(POSES, INPUTS[:1])
+DEPEND |= dict.fromkeys(("qfrc_bias", "qfrc_passive"), INPUTS[:2])
+_ROUNDING = 1e-12  # of poses that are equal but for the order of additions [m, and 1]
+
+
+@dataclass(frozen=True)
+class Age:
+    """How old derived values are, as far as it is known.
+
+    Attributes:
+        steps: Engine steps since; None if that is not known.
+        writes: Changes of each input since; None if nobody counted.
+        never: Whether nothing was derived since the Data was made, reset or set.
+        written: Entries of the inputs that are others now; known only while watching.
+        retraced: Bodies that are where one step back has them, within `within` [m, and of
+            quaternions 1], where that is how the number of steps was found; strays: bodies
+            that are not of now and not there either.
+    """
+
+    steps: int | None = None
+    writes: Mapping[str, int] | None = None
+    never: bool = False
+    written: tuple[str, ...] = ()
+    retraced: tuple[str, ...] = ()
+    strays: tuple[str, ...] = ()
+    within: float = 0.0
+
+
+class Scratch:
+    """Another Data of a Model, in which the present of any Data of it is computed."""
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        self._data = make_data(model)
+
+    def now(self, state: State) -> Readings:
+        """All that `forward` would compute in a state."""
+        set_state(self._model, self._data, state)
+        forward(self._model, self._data)
+        return readings(self._data, copied=True)
+
+    def one_step_back(self, state: State) -> Array:
+        """The poses (nbody, 7) of the bodies in the state that a step led to this one from.
+
+        The engines integrate semi-implicitly: the new velocity moves the old position, and
+        moves the new one back. The velocity of that state cannot be found so.
+        """
+        model, data = self._model, self._data
+        set_state(model, data, state)
+        data.qpos[:] = back(model, state["qpos"], state["qvel"], engine_step(model))
+        forward(model, data)
+        return np.hstack((data.xpos, data.xquat))
+
+    def close(self) -> None:
+        """Give the Data back."""
+        self._data.close()
+
+
+def readings(data: Data, copied: bool = False) -> Readings:
+    """Everything derived that the backend of a Data yields."""
+    found: dict[str, Array | Contacts] = {}
+    for name in DERIVED:
+        with suppress(UnsupportedError):
+            array = getattr(data, name)
+            found[name] = np.array(array) if copied else array
+    found["contacts"] = data.contacts
+    return found
+
+
+def row(model: Model, name: str, held: Array | Contacts, now: Array | Contacts, age: Age) -> Row:
+    """What is to be told of one array."""
+    if same(held, now):
+        return Row(name, True, 0, 0, "now", ())
+    return stale_row(model, name, age, gaps(model, name, held, now))
+
+
+def stale_row(model: Model, name: str, age: Age, found: tuple[Gap, ...]) -> Row:
+    """What is to be told of an array that is not of now, and off by `found`."""
+    if age.never:
+        return Row(name, False, None, None, "never computed", found)
+    writes = None
+    if age.writes is not None:
+        writes = sum(age.writes[each] for each in DEPEND[name])
+    words = []
+    if age.steps:
+        words.append(count(age.steps, "substep" if model.substeps > 1 else "step"))
+    if writes:
+        words.append(count(writes, "write"))
+    of = f"{listed(words)} ago" if words else "an earlier state"
+    return Row(name, False, age.steps, writes, of, found)
+
+
+def age_of(model: Model, state: State, held: Readings, now: Readings, scratch: Scratch) -> Age:
+    """How old derived values are, from nothing but their values.
+
+    Args:
+        model: Of the Data.
+        state: What the Data is in now.
+        held: What it says.
+        now: What it would say now.
+        scratch: Where other states are tried.
+    """
+    if all(same(held[name], now[name]) for name in held):
+        return Age(steps=0)
+    if not _array(held, "xquat").any():  # a rotation is never zero
+        return Age(never=True)
+    poses = np.hstack((_array(held, "xpos"), _array(held, "xquat")))
+    lag = np.abs(np.hstack((_array(now, "xpos"), _array(now, "xquat"))) - poses).max(axis=1)
+    if not lag.any():  # the poses, which alone can be retraced, are of now
+        return Age()
+    off = np.abs(scratch.one_step_back(state) - poses).max(axis=1)
+    # Nearer than rounding makes them, and much nearer than those of now. One body is enough:
+    # what else is not there was written since.
+    moved = lag > 0
+    there = moved & (off <= _ROUNDING * (1 + np.abs(poses).max())) & (off <= lag / 100)
+    if not there.any():
+        return Age()
+
+    def names(chosen: Any) -> tuple[str, ...]:
+        return tuple(model.body_names[b] or f"body {b}" for b in np.flatnonzero(chosen).tolist())
+
+    return Age(
+        steps=1,
+        retraced=names(there),
+        strays=names(moved & ~there),
+        within=float(off[there].max()),
+    )
+
+
+def back(model: Model, qpos: Array, qvel: Array, seconds: float) -> Array:
+    """Positions (nq,) that would move to `qpos` in a time, at the velocities `qvel` (nv,).
+
+    The inverse of `mj_integratePos`: a quaternion turns about an axis of the body.
+    """
+    found = np.array(qpos)
+    for joint, kind in enumerate(model.jnt_type.tolist()):
+        place, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+        if kind in (JointType.HINGE, JointType.SLIDE):
+            found[place] -= seconds * qvel[dof]
+            continue
+        if kind == JointType.FREE:
+            found[place : place + 3] -= seconds * qvel[dof : dof + 3]
+            place, dof = place + 3, dof + 3
+        spin = qvel[dof : dof + 3]
+        speed = float(np.linalg.norm(spin))
+        if speed:
+            half = -seconds * speed / 2
+            turn = np.array([math.cos(half), *(math.sin(half) * spin / speed)])
+            found[place : place + 4] = times(qpos[place : place + 4], turn)
+    return found
+
+
+def _array(found: Readings, name: str) -> Array:
+    array = found[name]
+    assert isinstance(array, np.ndarray)
+    return array
+
+
+def engine_step(model: Model) -> float:
+    """Simulated time of one step of the engine [s]."""
+    return model.timestep / model.substeps

@@ -1,0 +1,317 @@
+"""What a trace is of, and what made it; and whether that can be believed."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..errors import TraceError
+from ..experiments._common import Provenance
+from ..interface import OPTIONS, JointType
+from ..interface.checks import HUGE
+
+SCHEMA = 1
+# Columns of numbers, one row for each moment; widths are numbers or counts of the header.
+COLUMNS: dict[str, tuple[str | int, ...]] = {
+    "time": (),
+    "qpos": ("nq",),
+    "qvel": ("nv",),
+    "ctrl": ("nu",),
+    "xpos": ("nbody", 3),
+    "xquat": ("nbody", 4),
+    "site_xpos": ("nsite", 3),
+    "site_xmat": ("nsite", 9),
+    "qfrc_bias": ("nv",),
+    "qfrc_actuator": ("nv",),
+    "qfrc_passive": ("nv",),
+    "qfrc_constraint": ("nv",),
+    "qfrc_contact": ("nv",),
+    "energy": (2,),
+}
+INPUTS = ("time", "qpos", "qvel", "ctrl")
+# Contacts, one row for each contact of a moment; in order of `contact_row`.
+CONTACTS: dict[str, tuple[int, ...]] = {
+    "contact_row": (),
+    "contact_geom": (2,),
+    "contact_dist": (),
+    "contact_pos": (3,),
+    "contact_frame": (9,),
+    "contact_force": (3,),
+}
+_LONGEST = 1000  # characters of a name or a sentence
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a trace is of, and what made it.
+
+    Attributes:
+        schema: Version of the columns.
+        experiment: Name of what was done.
+        says: What happens in it, in a sentence.
+        command: The command that makes it again, or "".
+        provenance: Engine, versions, the model's file and digest, seed.
+        defaults: "model", or "engine" for the engine as its own users meet it.
+        options: What `Model.replace` was given.
+        keyframe: Where it started; None for the default state, or one that was given.
+        timestep: Simulated time between rows [s]; substeps: engine steps within it.
+        gravity: (3,) [m/s²], as the engine had it.
+        nq, nv, nu: Lengths of qpos, qvel and ctrl.
+        joints, sites, bodies, geoms, actuators: Names by id.
+        jnt_type, jnt_qposadr, jnt_dofadr: As in a Model.
+        geom_bodyid, body_parentid, actuator_jntid: As in a Model.
+        ctrlrange: (nu, 2), infinite where unlimited.
+        energy_by: The engine that computed the energies, or "".
+        rewritten: Rows whose state is not what the step before left: the controller wrote it
+            (or the engine does not give the same bits twice).
+        ended: Why the run ended before its time, or "".
+        single: Whether an npz file of it keeps all but the inputs in single precision.
+        recorded: Whether this was read from a file: nothing ran here.
+    """
+
+    experiment: str
+    says: str
+    command: str
+    provenance: Provenance
+    defaults: str
+    options: dict[str, Any]
+    keyframe: str | None
+    timestep: float
+    substeps: int
+    gravity: tuple[float, ...]
+    nq: int
+    nv: int
+    nu: int
+    joints: tuple[str, ...]
+    sites: tuple[str, ...]
+    bodies: tuple[str, ...]
+    geoms: tuple[str, ...]
+    actuators: tuple[str, ...]
+    jnt_type: tuple[int, ...]
+    jnt_qposadr: tuple[int, ...]
+    jnt_dofadr: tuple[int, ...]
+    geom_bodyid: tuple[int, ...]
+    body_parentid: tuple[int, ...]
+    actuator_jntid: tuple[int, ...]
+    ctrlrange: tuple[tuple[float, ...], ...]
+    energy_by: str = ""
+    rewritten: int = 0
+    ended: str = ""
+    single: bool = False
+    recorded: bool = False
+    schema: int = SCHEMA
+
+    @property
+    def backend(self) -> str:
+        """Name of the backend that ran it."""
+        return self.provenance.backend
+
+    @property
+    def label(self) -> str:
+        """The backend and its version, and what is unusual about them."""
+        text = f"{self.backend} {self.provenance.versions.get(self.backend, '')}".strip()
+        if self.defaults == "engine":
+            text += ", engine defaults"
+        return text + (", recorded" if self.recorded else "")
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """The lengths that `COLUMNS` speaks of."""
+        return {
+            "nq": self.nq,
+            "nv": self.nv,
+            "nu": self.nu,
+            "nbody": len(self.bodies),
+            "nsite": len(self.sites),
+        }
+
+    def shape(self, column: str) -> tuple[int, ...]:
+        """Shape of one row of a column."""
+        if column in CONTACTS:
+            return CONTACTS[column]
+        counts = self.counts
+        return tuple(counts[w] if isinstance(w, str) else w for w in COLUMNS[column])
+
+    def as_json(self) -> str:
+        """The header as text."""
+        return json.dumps(dataclasses.asdict(self), ensure_ascii=False, allow_nan=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> Header:
+        """The header that `as_json` wrote.
+
+        Raises:
+            TraceError: It is none, or of a schema that this version does not know.
+        """
+        try:
+            facts = json.loads(text)
+            if facts.get("schema") != SCHEMA:
+                given = repr(facts.get("schema"))[:20]
+                raise TraceError(f"this trace has schema {given}; this version reads {SCHEMA}")
+            known = {field.name for field in dataclasses.fields(Provenance)}
+            by = {key: _frozen(value) for key, value in _known(facts["provenance"], known).items()}
+            facts["provenance"] = Provenance(**by)
+            known = {field.name for field in dataclasses.fields(cls)}
+            header = cls(**{name: _frozen(value) for name, value in _known(facts, known).items()})
+            header._check()
+        except TraceError:
+            raise
+        except (ValueError, TypeError, AttributeError, KeyError, RecursionError) as error:
+            raise TraceError(f"this is no header of a trace: {error}") from None
+        return header
+
+    @property
+    def joint_labels(self) -> tuple[str, ...]:
+        """A name for each joint: its own, or "joint 0" by its number."""
+        return tuple(name or f"joint {k}" for k, name in enumerate(self.joints))
+
+    def _check(self) -> None:
+        _check_fields(self)
+        for name in ("nq", "nv", "nu", "substeps"):
+            value = getattr(self, name)
+            if not isinstance(value, int) or not 0 <= value < 10**6:
+                raise TraceError(f"{name} = {str(value)[:40]} of the trace is no count")
+        if not isinstance(self.timestep, float) or not 0 < self.timestep < 1e6:
+            raise TraceError(f"timestep = {self.timestep!r} of the trace is no time")
+        lengths = {
+            "jnt_type": len(self.joints),
+            "jnt_qposadr": len(self.joints),
+            "jnt_dofadr": len(self.joints),
+            "geom_bodyid": len(self.geoms),
+            "body_parentid": len(self.bodies),
+            "actuator_jntid": self.nu,
+            "actuators": self.nu,
+            "ctrlrange": self.nu,
+        }
+        for name, length in lengths.items():
+            if len(getattr(self, name)) != length:
+                raise TraceError(f"{name} of the trace has {len(getattr(self, name))} entries")
+        _check_places(self)
+
+
+def _known(facts: Mapping[str, Any], names: set[str]) -> dict[str, Any]:
+    return {name: value for name, value in facts.items() if name in names}
+
+
+def _frozen(value: Any) -> Any:
+    """Lists of JSON as tuples."""
+    return tuple(_frozen(item) for item in value) if isinstance(value, list) else value
+
+
+def _text(value: Any) -> bool:
+    if not isinstance(value, str) or len(value) > _LONGEST:
+        return False
+    # Half of a surrogate pair is no text: it can be written nowhere.
+    return not any("\ud800" <= character <= "\udfff" for character in value)
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, float) or _whole(value)
+
+
+def _finite(value: Any) -> bool:
+    return _number(value) and math.isfinite(value) and abs(value) <= HUGE
+
+
+def _whole(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63
+
+
+def _each(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    return lambda value: isinstance(value, tuple) and all(map(fits, value))
+
+
+def _words(value: Any) -> bool:
+    return isinstance(value, dict) and all(map(_text, (*value, *value.values())))
+
+
+def _option(name: str, value: Any) -> bool:
+    """Whether `Model.replace` might take this; it looks closer."""
+    known = isinstance(value, bool) or _text(value) or _finite(value) or _each(_finite)(value)
+    return name in OPTIONS and known
+
+
+_KINDS: dict[str, Callable[[Any], bool]] = {
+    "experiment": _text,
+    "says": _text,
+    "command": _text,
+    "defaults": lambda value: value in ("model", "engine"),
+    "options": lambda value: (
+        isinstance(value, dict) and all(_option(name, each) for name, each in value.items())
+    ),
+    "keyframe": lambda value: value is None or _text(value),
+    "gravity": lambda value: _each(_finite)(value) and len(value) == 3,
+    "joints": _each(_text),
+    "sites": _each(_text),
+    "bodies": _each(_text),
+    "geoms": _each(_text),
+    "actuators": _each(_text),
+    "jnt_type": _each(_whole),
+    "jnt_qposadr": _each(_whole),
+    "jnt_dofadr": _each(_whole),
+    "geom_bodyid": _each(_whole),
+    "body_parentid": _each(_whole),
+    "actuator_jntid": _each(_whole),
+    "ctrlrange": _each(lambda row: _each(_number)(row) and len(row) == 2),
+    "energy_by": _text,
+    "rewritten": _whole,
+    "ended": _text,
+    "single": lambda value: isinstance(value, bool),
+}
+_OF_PROVENANCE: dict[str, Callable[[Any], bool]] = {
+    "backend": _text,
+    "versions": _words,
+    "model_file": _text,
+    "model_sha256": _text,
+    "timestep": _number,
+    "emulated": _each(_text),
+    "seed": lambda value: value is None or _whole(value),
+}
+
+
+def _check_fields(header: Header) -> None:
+    """Every field is of its kind, and no name stands twice.
+
+    Raises:
+        TraceError: One is not.
+    """
+    for owner, kinds in ((header, _KINDS), (header.provenance, _OF_PROVENANCE)):
+        for name, fits in kinds.items():
+            value = getattr(owner, name)
+            if not fits(value):
+                raise TraceError(f"{name} = {str(value)[:40]!r} of the trace is not what it may be")
+    for what in ("joints", "sites", "bodies", "actuators"):
+        names = Counter(name for name in getattr(header, what) if name)
+        if names and (most := names.most_common(1)[0])[1] > 1:
+            raise TraceError(f"two {what} of the trace are called {most[0][:40]!r}")
+
+
+def _check_places(header: Header) -> None:
+    """Every number that says where something is says a place that there is.
+
+    Raises:
+        TraceError: One does not.
+    """
+    known = {int(kind) for kind in JointType}
+    for name, kind, qpos, dof in zip(
+        header.joint_labels, header.jnt_type, header.jnt_qposadr, header.jnt_dofadr, strict=True
+    ):
+        if kind not in known:
+            raise TraceError(f"{name} of the trace is a joint of no known kind: {kind}")
+        of = JointType(kind)
+        if not (0 <= qpos <= header.nq - of.nq and 0 <= dof <= header.nv - of.nv):
+            raise TraceError(f"{name} of the trace has no place in qpos and qvel")
+    bodies, joints = len(header.bodies), len(header.joints)
+    for name, most in (
+        ("geom_bodyid", bodies),
+        ("body_parentid", bodies),
+        ("actuator_jntid", joints),
+    ):
+        least = -1 if name == "actuator_jntid" else 0
+        if not all(least <= number < most for number in getattr(header, name)):
+            raise TraceError(f"{name} of the trace names one that is not there")
