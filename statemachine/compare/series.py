@@ -85,11 +85,11 @@ def default_tip(*headers: Header) -> str:
 
 def normal_forces(trace: Trace) -> dict[str, Array]:
     """Sum of the normal contact forces (n,) [N] between each pair of bodies."""
-    found = {}
-    for pair, places in trace.contact_pairs().items():
-        found[pair] = np.zeros(len(trace))
-        np.add.at(found[pair], trace["contact_row"][places], trace["contact_force"][places, 0])
-    return found
+    sums = {}
+    for pair, places in trace.contact_pairs.items():
+        sums[pair] = np.zeros(len(trace))
+        np.add.at(sums[pair], trace["contact_row"][places], trace["contact_force"][places, 0])
+    return sums
 
 
 def total_forces(trace: Trace) -> dict[str, Array]:
@@ -98,14 +98,14 @@ def total_forces(trace: Trace) -> dict[str, Array]:
     Friction and all, added as vectors in world axes: neither at least nor at most the sum of
     the normal forces.
     """
-    found = {}
-    pairs = trace.contact_pairs()
+    lengths = {}
+    pairs = trace.contact_pairs
     forces = world_forces(trace) if pairs else np.empty((0, 3))
     for pair, places in pairs.items():
         total = np.zeros((len(trace), 3))
         np.add.at(total, trace["contact_row"][places], forces[places])
-        found[pair] = np.linalg.norm(total, axis=1)
-    return found
+        lengths[pair] = np.linalg.norm(total, axis=1)
+    return lengths
 
 
 def world_forces(trace: Trace) -> Array:

@@ -75,7 +75,7 @@ def parse_tolerances(words: Iterable[str]) -> dict[str, float]:
         BadInputError: A word is none.
         UnknownNameError: There is no such kind of quantity.
     """
-    found = {}
+    tolerances = {}
     for word in words:
         kind, _, text = word.partition("=")
         kind = kind.replace("-", " ")
@@ -96,8 +96,8 @@ def parse_tolerances(words: Iterable[str]) -> dict[str, float]:
             value = float("nan")
         if not (np.isfinite(value) and value > 0):
             raise BadInputError(f"a tolerance reads like joint=0.5deg or tip=2mm; got {word!r}")
-        found[kind] = value
-    return found
+        tolerances[kind] = value
+    return tolerances
 
 
 def _units(unit: str) -> str:

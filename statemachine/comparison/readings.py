@@ -20,10 +20,10 @@ def readings(data: Data, copied: bool = False) -> dict[str, Array | Contacts]:
         data: Read, and not touched.
         copied: Whether the arrays stay as they are when the Data goes on.
     """
-    found: dict[str, Array | Contacts] = {}
+    derived: dict[str, Array | Contacts] = {}
     for name in DERIVED:
         with suppress(UnsupportedError):
             array = getattr(data, name)
-            found[name] = np.array(array) if copied else array
-    found["contacts"] = data.contacts
-    return found
+            derived[name] = np.array(array) if copied else array
+    derived["contacts"] = data.contacts
+    return derived
