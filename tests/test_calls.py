@@ -15,13 +15,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from statemachine import backends, installed
+from statemachine import backends, calls, installed
 from statemachine.backends.mujoco_backend import MujocoData
+from statemachine.calls import CLOSED, NEW, CallRecording, Statement, record, recorded_engines
+from statemachine.calls.recorder import CallRecorder
+from statemachine.cli import main
 from statemachine.errors import BadInputError, UnknownNameError
 from statemachine.page import Page, Table
-from statemachine.probes import calls
-from statemachine.probes.calls import CLOSED, NEW, Recording, Statement, record
-from statemachine.probes.calls._recorder import Recorder
 from statemachine.report import calls as words
 from statemachine.report import terminal
 from statemachine.report.as_json import dumps
@@ -59,7 +59,7 @@ data = sm.make_data(model)
 """
 
 
-@pytest.fixture(params=calls.RECORDED)
+@pytest.fixture(params=recorded_engines())
 def engine(request: pytest.FixtureRequest) -> str:
     need_engine(request.param)
     return request.param
@@ -72,7 +72,7 @@ def short(engine: str, code: str) -> list[Statement]:
     return list(recording.statements[3:])
 
 
-def counts(recording: Recording, engine: str | None = None) -> Counter[str]:
+def counts(recording: CallRecording, engine: str | None = None) -> Counter[str]:
     found: Counter[str] = Counter()
     for statement in recording.statements:
         for call in statement.calls:
@@ -155,7 +155,7 @@ def test_no_call_goes_round_the_recorder(engine: str) -> None:
 
     def heard(frame: Any, name: str) -> None:
         ours = Path(frame.f_code.co_filename).parent == Path(calls.__file__).parent
-        if Recorder._active and not ours:  # at its end, Data are collected
+        if CallRecorder._active and not ours:  # at its end, Data are collected
             around.add(name)
 
     with profiled(engine, heard):
@@ -171,7 +171,7 @@ def test_early_hold_of_a_function_is_noticed(monkeypatch: pytest.MonkeyPatch) ->
 
     def heard(frame: Any, name: str) -> None:
         ours = Path(frame.f_code.co_filename).parent == Path(calls.__file__).parent
-        if Recorder._active and not ours:  # at its end, Data are collected
+        if CallRecorder._active and not ours:  # at its end, Data are collected
             around.add(name)
 
     with profiled("mujoco", heard):
@@ -391,7 +391,7 @@ def test_the_still_copy_is_never_stepped() -> None:
 
 def test_the_client_of_a_call_is_found_where_it_is_given() -> None:
     need_engine("pybullet")
-    from statemachine.probes.calls import _pybullet as watched
+    from statemachine.engines.pybullet import calls as watched
 
     found = watched.client_of
     assert found("stepSimulation", (7,), {}) == 7
@@ -418,7 +418,7 @@ def test_the_client_of_a_call_is_found_where_it_is_given() -> None:
 
 def test_every_call_of_the_backend_says_its_client() -> None:
     need_engine("pybullet")
-    from statemachine.probes.calls import _pybullet as watched
+    from statemachine.engines.pybullet import calls as watched
 
     folder = Path(backends.__file__).parent
     seen = 0
@@ -512,8 +512,18 @@ def test_what_cannot_be_recorded_is_refused() -> None:
     need_engine("pybullet")
     with pytest.raises(BadInputError, match="on pybullet"):
         record(SHORT.format(engine="pybullet", code=""), "mujoco")
-    nested = 'from statemachine.probes.calls import record\nrecord("", "mujoco")'
+    nested = 'from statemachine.calls import record\nrecord("", "mujoco")'
     assert "cannot record another" in str(record(nested, "mujoco").error)
+
+
+def test_a_lesson_on_a_backend_whose_calls_nobody_knows(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It is taken, and the page says that the calls are missing."""
+    monkeypatch.setattr(backends, "_BACKENDS", dict(backends._BACKENDS))
+    backends.register("twin", "statemachine.backends.mujoco_backend:load")
+    assert main(("lesson", "forward", "--backend", "twin", "--calls", "--no-questions")) == 0
+    assert "twin: not asked which of its own functions it ran." in capsys.readouterr().out
 
 
 def test_statements_are_those_that_were_typed() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import gc
 import json
@@ -17,20 +18,25 @@ import numpy as np
 import pytest
 from rich.cells import cell_len
 
-from statemachine.errors import BadInputError, MissingEngineError, UnknownNameError
-from statemachine.installed import ENGINES, require
-from statemachine.probes import phrasebook
-from statemachine.probes.conventions import (
+from statemachine import engines
+from statemachine.calls import record
+from statemachine.cli import main
+from statemachine.compare.models.engines import own_ways
+from statemachine.conventions import (
     NO_ANSWER,
     QUESTIONS,
     UNDECIDED,
-    _mujoco_scene,
-    _pendulum,
     ask,
-    closest,
     joints,
+    phrasebook,
     probe,
 )
+from statemachine.conventions.answers import closest
+from statemachine.engines import part
+from statemachine.engines.mujoco import pile
+from statemachine.engines.samples import pendulum
+from statemachine.errors import BadInputError, MissingEngineError, UnknownNameError
+from statemachine.installed import ENGINES, require
 from statemachine.report import conventions as report
 
 from .conftest import ROOT, Cli, need_engine
@@ -169,11 +175,11 @@ FACTS = {
 
 
 def answers(question: str, engine: str) -> dict[str, str]:
-    return {finding.of: finding.answer for finding in ask(question, engine)}
+    return {finding.of: finding.answer for finding in ask(question, engine) or ()}
 
 
 def figures(question: str, engine: str, of: str = "") -> dict[str, Any]:
-    finding = next(each for each in ask(question, engine) if each.of == of)
+    finding = next(each for each in ask(question, engine) or () if each.of == of)
     return {figure.name: figure.value for figure in finding.figures}
 
 
@@ -230,6 +236,7 @@ def test_the_figures_are_those_of_closed_forms(mj: ModuleType, pb: Any) -> None:
     assert all(slope == pytest.approx(0.75, rel=0.05) for slope in slopes)
 
 
+@pytest.mark.slow
 def test_a_second_look_sees_the_same() -> None:
     """Bit by bit: nothing is random, and no probe leaves a trace in the next."""
     found = [name for name in ENGINES if not _is_missing(name)]
@@ -248,9 +255,9 @@ def test_the_limp_pendulum_keeps_its_energy() -> None:
     """Half I ω² is what gravity gave; ω by a difference of two angles."""
     h = 1e-4
     for seconds in (0.1, 0.25, 0.4):
-        rate = (_pendulum.limp(seconds + h) - _pendulum.limp(seconds - h)) / (2 * h)
-        fallen = -_pendulum.tip_at(_pendulum.limp(seconds))[2] / _pendulum.TIP
-        assert rate**2 == pytest.approx(2 * _pendulum.RATE * fallen, rel=1e-5)
+        rate = (pendulum.limp(seconds + h) - pendulum.limp(seconds - h)) / (2 * h)
+        fallen = -pendulum.tip_at(pendulum.limp(seconds))[2] / pendulum.TIP
+        assert rate**2 == pytest.approx(2 * pendulum.RATE * fallen, rel=1e-5)
 
 
 def test_no_two_orders_of_the_joints_are_the_same() -> None:
@@ -495,8 +502,8 @@ def test_a_restore_that_loses_the_warm_start(mj: Any, monkeypatch: pytest.Monkey
 def test_an_engine_without_a_warm_start(monkeypatch: pytest.MonkeyPatch) -> None:
     """Then positions and velocities are all that there is."""
     flag = '<option><flag warmstart="disable"/></option><worldbody>'
-    text = _mujoco_scene.MJCF.replace("<worldbody>", flag)
-    monkeypatch.setattr(_mujoco_scene, "MJCF", text)
+    text = pile.MJCF.replace("<worldbody>", flag)
+    monkeypatch.setattr(pile, "MJCF", text)
     assert set(answers("future", "mujoco").values()) == {"exact"}
 
 
@@ -566,7 +573,7 @@ def test_every_call_works(engine: str) -> None:
 
 def test_the_cells_of_an_engine_are_a_program(engine: str, tmp_path: Path) -> None:
     """As a reader would type them, with nothing of ours."""
-    module = __import__(f"statemachine.probes.phrasebook.{engine}_calls", fromlist=["CELLS"])
+    module: Any = part(engine, "phrasebook")
     file = tmp_path / module.FILE[0]
     file.write_text(module.FILE[1])
     lines = [f"file = {str(file)!r}", *(module.CELLS[name].code for name in phrasebook.CONCEPTS)]
@@ -585,7 +592,7 @@ def test_the_cells_of_an_engine_are_a_program(engine: str, tmp_path: Path) -> No
 def test_a_cell_that_does_nothing_is_found_out(
     engine: str, concept: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    module = __import__(f"statemachine.probes.phrasebook.{engine}_calls", fromlist=["CELLS"])
+    module: Any = part(engine, "phrasebook")
     monkeypatch.setitem(
         module.CELLS, concept, dataclasses.replace(module.CELLS[concept], code="pass")
     )
@@ -600,6 +607,7 @@ def test_a_cell_that_does_nothing_is_found_out(
 # The command.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", [(), ("--calls",)])
 def test_the_page_reads_well_piped(cli: Cli, arguments: tuple[str, ...]) -> None:
     for name in ENGINES:
@@ -720,6 +728,66 @@ def test_a_terminal_without_unicode(cli: Cli, what: str) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout.isascii()
     assert done.stdout.count("?") == (0 if what == "--calls" else 1)  # that of the question
+
+
+# An engine that has no room, or less in it.
+
+
+def test_an_engine_without_a_room_is_not_asked(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """MuJoCo under another name: in the table of engines, and nowhere else."""
+    monkeypatch.setitem(ENGINES, "twin", dataclasses.replace(ENGINES["mujoco"], name="twin"))
+    assert ask("gravity", "twin") is None
+    assert own_ways("twin", "mujoco") == ()
+    for arguments in (("gravity", "write"), ("--calls",)):
+        assert main(("conventions", "--backend", "twin", *arguments)) == 0
+        assert "not asked" in capsys.readouterr().out
+        assert main(("conventions", "--backend", "twin", "--json", *arguments)) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert list(found["versions"]) == ["twin"]
+        assert found.get("engines", {"twin": []}) == {"twin": []}
+        for each in found.get("questions", ()):
+            assert each["findings"] == {"twin": None}
+    assert main(("conventions", "gravity")) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.split() == ["twin", "not", "asked"] for line in lines)
+    assert any(line.split()[:4] == ["mujoco", "0", "0", "-9.81"] for line in lines)
+
+
+def test_a_room_of_another_package_may_have_a_part_of_the_parts(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    room = tmp_path / "their_room"
+    room.mkdir()
+    (room / "__init__.py").touch()
+    (room / "conventions.py").write_text("def gravity(steps): return (0, 0, -steps), (0, 0, -1)")
+    (room / "phrasebook.py").write_text(
+        "from statemachine.engines.phrases import Cell\n"
+        "FILE = ('a.txt', '7')\n"
+        "def close(names): pass\n"
+        "CELLS = {'load': Cell('a = int(open(file).read())', lambda n: n.a == 7)}"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(engines, "_ROOMS", dict(engines._ROOMS))
+    engines.register("theirs", "their_room")
+    assert answers("gravity", "theirs") == {"": "told 0 0 -50, felt 0 0 -1"}
+    assert ask("timestep", "theirs") is None
+    (phrase,) = phrasebook.run(["theirs"]).engines["theirs"]
+    assert phrase == phrasebook.Phrase("load", "a = int(open(file).read())", True, "")
+    with pytest.raises(UnknownNameError, match="calls can be recorded"):
+        record("", "theirs")
+
+
+@pytest.mark.parametrize("room", ["conventions", "calls"])
+def test_who_asks_names_no_engine(room: str) -> None:
+    for file in (ROOT / "statemachine" / room).glob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            assert not (isinstance(node, ast.Constant) and node.value in ENGINES), file
+            named = isinstance(node, (ast.FunctionDef, ast.Attribute, ast.Name))
+            assert not (
+                named and {getattr(node, k, "") for k in ("name", "attr", "id")} & {*ENGINES}
+            )
 
 
 def test_errors_of_the_library() -> None:

@@ -140,6 +140,7 @@ def _sources() -> Iterator[str]:
         yield "".join(cell["source"])
 
 
+@pytest.mark.slow
 def test_the_notebook_is_what_the_lessons_make() -> None:
     assert _NOTEBOOK.read_text(encoding="utf-8") == build(), "run: make notebook"
 

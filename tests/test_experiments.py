@@ -58,7 +58,7 @@ def test_gravity_is_read_at_the_moment_of_the_end() -> None:
         sm.forward(model, data)
         assert found.servos_on.forces.actuator == data.qfrc_actuator[1]
         assert found.servos_on.qpos.tolist() == data.qpos.tolist()
-    touch = found.servos_off.touches["fixed_stud_1 (gripper) on floor"]
+    touch = found.servos_off.touches["gripper on floor (fixed_stud_1)"]
     limp = model.replace(actuation=False)
     with sm.make_data(limp) as data:
         while data.time < touch - 1e-9:

@@ -14,6 +14,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.backends.mujoco_backend import MujocoData
+from statemachine.comparison import Gap
 from statemachine.errors import (
     BadInputError,
     ClosedDataError,
@@ -26,7 +27,7 @@ from statemachine.report.as_json import plain
 from statemachine.rotations import matrix_from_quat
 from statemachine.staleness import age
 from statemachine.staleness.age import Scratch, back, readings
-from statemachine.staleness.gaps import Gap, gaps, told
+from statemachine.staleness.gaps import gaps, told
 from statemachine.staleness.result import table
 
 from .conftest import ROOT, need_engine
@@ -505,7 +506,7 @@ def test_contacts_are_matched_by_what_touches() -> None:
     assert sizes(gaps(model, "contacts", part([3, 1, 0, 2]), now)) == {}  # another order
     less = gaps(model, "contacts", part([0, 1, 2]), now)
     assert sizes(less) == {"appears": 1.0}
-    assert less[0].where == "floor – box"
+    assert less[0].where == "box on floor"
     assert sizes(gaps(model, "contacts", now, part([0, 1]))) == {"vanishes": 2.0}
     assert sizes(gaps(model, "contacts", part([0, 1, 2, 3], shift=1e-3), now)) == {
         "m": pytest.approx(1e-3)

@@ -72,6 +72,7 @@ def test_the_code_is_typed_run_and_questioned(name: str, backend: str) -> None:
     assert page.holds
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [lesson.name for lesson in STATIONS if lesson.name not in _TIMED])
 def test_what_is_shown_is_what_a_student_would_see(name: str, tmp_path: Path) -> None:
     _, taken = _take(name, "mujoco")
@@ -216,6 +217,7 @@ def test_an_answer_that_its_run_belies_is_none(part: str, change: Change) -> Non
     assert len(wrong) == 1
 
 
+@pytest.mark.slow
 def test_what_catches_the_falling_arm() -> None:
     """Against the course's text: the floor does, and the arm does not settle on it."""
     found = _take("gravity", "mujoco", longer=100.0)[1].result.longer
@@ -257,6 +259,7 @@ def test_what_keyframe_0_of_the_public_scene_is(cli: Cli, menagerie: Path) -> No
     assert "is mistaken" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "body",
     ["", "<body><freejoint/><geom size='.1'/></body>", "<body><joint/><geom size='.1'/></body>"],
@@ -269,6 +272,7 @@ def test_a_reset_of_a_model_that_lacks_something(cli: Cli, tmp_path: Path, body:
         assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_calls_beside_a_lesson(cli: Cli, backend: str) -> None:
     done = cli("lesson", "forward", "--backend", backend, "--calls")
     assert done.returncode == 0, done.stderr
@@ -278,6 +282,7 @@ def test_calls_beside_a_lesson(cli: Cli, backend: str) -> None:
     assert "own words" not in cli("lesson", "questions", "--calls").stdout
 
 
+@pytest.mark.slow
 def test_our_keyframe_holds_the_box(backend: str) -> None:
     held, pickup = _take("reset", backend)[1].result.scenes
     assert held.held
@@ -369,6 +374,7 @@ def test_a_prediction_is_asked_for_before_the_answer() -> None:
     assert "Your prediction" not in _at_a_terminal("lesson", "state", "--no-questions", typed=[])
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 def test_the_path_waits_for_its_reader() -> None:
     typed = [

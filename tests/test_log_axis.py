@@ -17,7 +17,7 @@ from statemachine.report.film_overlay import Overlay, Strip
 from statemachine.report.html.charts import difference_chart
 from statemachine.report.log_axis import LogAxis
 from statemachine.report.plot_draw import draw
-from statemachine.report.plot_panels import Figure, Panel
+from statemachine.report.plot_panels import Panel, Plot
 
 TIME = np.linspace(0.0, 1.0, 11)
 VALUES = np.array([0.0, 1e-14, 1e-14, 0.0, 0.0, 0.0, 0.0, 1e-3, 1.0, 2.0, 1.0])
@@ -78,7 +78,7 @@ def test_in_the_pictures_of_the_documentation() -> None:
 
 def test_in_a_figure() -> None:
     panel = Panel("a", "°", [], (TIME, VALUES), tolerance=0.1)
-    canvas = draw(Figure("t", [], ["one"], [panel], [], 1.0, None, []))
+    canvas = draw(Plot("t", [], ["one"], [panel], [], 1.0, None, []))
     (axes,) = canvas.axes
     ticks = [
         (float(place), label.get_text())

@@ -286,6 +286,7 @@ def test_warnings_of_compiling_come_up(tmp_path: Path, monkeypatch: pytest.Monke
         sm.load("so101")
 
 
+@pytest.mark.slow
 def test_ctrl_c_in_a_bulk_step_that_diverges_does_not_end_the_process() -> None:
     code = """
 import os, signal, threading, statemachine as sm

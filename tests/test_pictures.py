@@ -576,7 +576,7 @@ def test_an_svg_says_in_text_what_it_shows(compared: tuple[Trace, Trace, Any]) -
     text = _texts(drawn(plot(one, two, found), "svg"))
     for word in (one.header.label, two.header.label, "hold", *one.header.joints, "gripperframe"):
         assert word in text
-    for word in ("energy", "tolerance", "world – gripper", "time [s]", "statemachine 0."):
+    for word in ("energy", "tolerance", "gripper on floor", "time [s]", "statemachine 0."):
         assert word in text
     assert f"they part at {min(a.since for a in found.agreements if a.since):.3f} s" in text
 
@@ -633,7 +633,7 @@ def test_panels_hold_the_figures_of_the_comparison(compared: tuple[Trace, Trace,
     (p, _), (q, _) = one.site("gripperframe"), two.site("gripperframe")
     assert tip.apart is not None
     np.testing.assert_allclose(tip.apart[1], 1000 * np.linalg.norm(p - q, axis=1))
-    (touch,) = [touch for touch in figure.touches if touch.name == "world – gripper"]
+    (touch,) = [touch for touch in figure.touches if touch.name == "gripper on floor"]
     for spans, trace in zip(touch.spans, (one, two), strict=True):
         rows = np.unique(trace["contact_row"])
         assert spans[0][0] == pytest.approx(trace.time[rows[0]] - trace.time[0])

@@ -108,6 +108,7 @@ def test_python_block(tmp_path: Path) -> None:
     assert "1 of 1 reads were stale" in done.stdout
 
 
+@pytest.mark.slow
 def test_the_output_that_is_shown(cli: Cli) -> None:
     alone, both, part, causes = re.findall(r"```text\n(.*?)```", README, re.DOTALL)
     assert alone in cli("lesson", "gravity").stdout

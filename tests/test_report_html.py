@@ -22,13 +22,13 @@ import statemachine as sm
 from statemachine.compare import Comparison, compare, series, sides_of
 from statemachine.compare.series import total_forces
 from statemachine.compare.sides import Request
-from statemachine.compare.why import Attribution, Gap, Touch, Trial
+from statemachine.compare.why import Attribution, Deviation, FactorTrial, FirstTouch
+from statemachine.comparison.text import quantity
 from statemachine.drawing import drawing_of
 from statemachine.errors import BadInputError
 from statemachine.experiments.scenarios import SCENARIOS
 from statemachine.page import Page, Verdict
-from statemachine.report.figures_of import quantity
-from statemachine.report.html import Look, check_target, report, write_report
+from statemachine.report.html import SideDrawing, check_target, report, write_report
 from statemachine.report.html.between import shown_series
 from statemachine.report.html.charts import difference_chart, spread
 from statemachine.report.html.finding import headline
@@ -41,15 +41,15 @@ from .browser import Tab, browser
 from .conftest import ROOT, Cli, need_engine
 
 LIMIT = 2_000_000  # bytes
-Made = tuple[Comparison, Trace, Trace, Look]
+Made = tuple[Comparison, Trace, Trace, SideDrawing]
 
 
 def of(one: Trace, two: Trace) -> Made:
     return compare(one, two), one, two, look_of(one)
 
 
-def look_of(trace: Trace) -> Look:
-    return Look(drawing_of(sm.load(trace.header.provenance.model_file)))
+def look_of(trace: Trace) -> SideDrawing:
+    return SideDrawing(drawing_of(sm.load(trace.header.provenance.model_file)))
 
 
 def page_of(made: Made, **more: Any) -> str:
@@ -144,6 +144,7 @@ def test_its_policy_lets_nothing_in(page: Path) -> None:
     assert str(ROOT) not in text
 
 
+@pytest.mark.slow
 def test_a_script_that_was_put_in_is_not_run(page: Path, tmp_path: Path) -> None:
     """The policy does what it says: else the test above would say nothing."""
     text = page.read_text(encoding="utf-8")
@@ -191,7 +192,7 @@ def test_names_that_are_markup_do_nothing(hold: Made, tmp_path: Path) -> None:
         tab.nothing_wrong()
 
 
-def of_look(one: Trace, two: Trace, look: Look) -> Made:
+def of_look(one: Trace, two: Trace, look: SideDrawing) -> Made:
     return compare(one, two), one, two, look
 
 
@@ -222,6 +223,7 @@ def test_a_long_run_is_small_too_and_keeps_the_moments_that_count() -> None:
     assert len(frames_of(one, two)) < len(one)
 
 
+@pytest.mark.slow
 def test_much_to_draw_is_drawn_with_less(hold: Made) -> None:
     """Many contacts at once, and a shape of two hundred thousand triangles."""
     _, one, two, look = hold
@@ -243,7 +245,7 @@ def test_much_to_draw_is_drawn_with_less(hold: Made) -> None:
         vertices=ball.reshape(-1, 3).astype(np.float32),
         faces=faces.astype(np.int32),
     )
-    big = Look(dataclasses.replace(look.drawing, parts=(*look.drawing.parts, part)))
+    big = SideDrawing(dataclasses.replace(look.drawing, parts=(*look.drawing.parts, part)))
     text = page_of(of_look(Trace(one.header, columns), two, big))
     assert len(text.encode()) <= LIMIT
     assert "triangles" in text
@@ -259,7 +261,7 @@ def test_the_headline_is_made_of_the_figures(hold: Made) -> None:
     curves = series(one, two)
     finding = headline(comparison, events_of(comparison, one, two), None, curves)
     wrist = found["wrist_flex"]
-    far, at = quantity(wrist.max, "joint"), f"{wrist.at:.3f} s"
+    far, at = quantity(wrist.max, wrist.unit), f"{wrist.at:.3f} s"
     assert finding.lead.startswith(f"Joint wrist_flex is up to {far} apart")
     assert f", at {at}; " in finding.lead
     since = min(each.since for each in comparison.agreements if each.since is not None)
@@ -293,11 +295,11 @@ def attribution_of(made: Made, quantity: str = "joints", **more: Any) -> Attribu
     """An attribution with figures of our own: a servo law, and contact that hides the rest."""
     comparison, one, two, _ = made
     worst = max((a for a in comparison.agreements if a.kind == "joint"), key=lambda a: a.max)
-    gap = Gap("rad", worst.max, worst.at, worst.rms, worst.settled)
+    gap = Deviation("rad", worst.max, worst.at, worst.rms, worst.settled)
     g = worst.max
 
-    def trial(factor: str, way: Any, after: float, before: float, moved: float) -> Trial:
-        return Trial(
+    def trial(factor: str, way: Any, after: float, before: float, moved: float) -> FactorTrial:
+        return FactorTrial(
             factor, way, ("kp 998.2", "its motors"), "as mujoco" if way == "parity" else "none",
             {}, after * g, before - after, moved,
         )  # fmt: skip
@@ -333,11 +335,11 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
     assert "contact takes 50.0 % of it away*" in found.causes[1]
     assert "a hint, not a proof" in found.causes[1]
     # A proof comes before.
-    touch = Touch(0.27, "finger (gripper) on floor; other", 3e-16, 55)
+    touch = FirstTouch(0.27, "gripper on floor (finger); other", 3e-16, 55)
     found = headline(comparison, [], attribution_of(hold, touch=touch))
-    assert found.causes[0].startswith("Until the first touch, finger (gripper) on floor at 0.270 s")
+    assert found.causes[0].startswith("Until the first touch, gripper on floor (finger) at 0.270 s")
     assert "2e-14° apart" in found.causes[0]
-    late = Touch(0.27, "finger on floor", 0.01, 55)  # they were apart before
+    late = FirstTouch(0.27, "finger on floor", 0.01, 55)  # they were apart before
     assert len(headline(comparison, [], attribution_of(hold, touch=late)).causes) == 2
     # Of another quantity than any that is compared: named as it is.
     other = headline(comparison, [], attribution_of(hold, quantity="box in the hand"))
@@ -403,7 +405,7 @@ def test_who_presses_on_what(hold: Made) -> None:
     assert never == []
     both = f"with {mean:.1f} N (with friction {found.total['gripper on floor']:.1f} N)"
     assert f"gripper presses on floor {both}" in said[0]
-    whole = total_forces(one)["world – gripper"][360:]
+    whole = total_forces(one)["gripper on floor"][360:]
     assert found.total == {"gripper on floor": pytest.approx(whole.mean())}
     assert whole.mean() > mean
     said_under = "it is at most 351 N; the whole force, friction added as vectors, is at most 383 N"
@@ -421,7 +423,7 @@ def test_who_presses_on_what(hold: Made) -> None:
     assert "on pybullet nothing touches at all" in said[0]
     text = page_of(of_look(one, bare, hold[3]))
     assert "On pybullet gripper never touches floor" in text
-    assert "world – gripper normal force over time on both sides" in text
+    assert "gripper on floor normal force over time on both sides" in text
 
 
 def test_names_in_a_list_have_no_comma(hold: Made, page: Path) -> None:
@@ -529,6 +531,7 @@ def test_ticks_have_their_labels_under_them(page: Path) -> None:
         assert max(far) < 1.5
 
 
+@pytest.mark.slow
 def test_on_a_phone_the_slider_is_under_the_picture(page: Path) -> None:
     with browser(width=390, height=844) as tab:
         open_page(tab, page)
@@ -584,11 +587,11 @@ def test_every_figure_of_the_comparison_is_on_the_page(hold: Made, page: Path) -
         (line,) = [
             row for row in text.splitlines() if row.startswith(found.name.replace(", ", " ") + "\t")
         ]
-        assert quantity(found.tolerance, found.kind) in line
+        assert quantity(found.tolerance, found.unit) in line
         assert found.verdict in line
         if found.kind != "contact":
             for value in (found.max, found.rms, found.settled):
-                assert quantity(value, found.kind) in line
+                assert quantity(value, found.unit) in line
 
 
 def test_it_reads_without_a_script(page: Path) -> None:
@@ -633,6 +636,7 @@ def test_the_slider_moves_both_arms_the_cursors_and_the_figures(page: Path, hold
         tab.nothing_wrong()
 
 
+@pytest.mark.slow
 def test_each_side_is_drawn_and_can_be_left_out(page: Path) -> None:
     with browser(height=1000) as tab:
         open_page(tab, page)
@@ -645,6 +649,7 @@ def test_each_side_is_drawn_and_can_be_left_out(page: Path) -> None:
             assert changed(before, picture(tab)) == 0, name
 
 
+@pytest.mark.slow
 def test_the_sides_are_drawn_where_they_are(hold: Made, tmp_path: Path) -> None:
     """A run against itself turned by a quarter: the ghost is somewhere else."""
     _, one, _, look = hold
@@ -684,6 +689,7 @@ def moved(tab: Tab, since: float) -> float:
     return float(slider.input_value())
 
 
+@pytest.mark.slow
 def test_it_plays_and_pauses(page: Path) -> None:
     with browser(height=1000) as tab:
         open_page(tab, page)
@@ -704,6 +710,7 @@ def test_it_plays_and_pauses(page: Path) -> None:
         until(tab, lambda: tab.locator("#said").text_content().startswith("Paused at "))
 
 
+@pytest.mark.slow
 def test_it_can_be_used_by_keyboard(page: Path) -> None:
     with browser(height=1000) as tab:
         open_page(tab, page)
@@ -738,6 +745,7 @@ def test_it_can_be_used_by_keyboard(page: Path) -> None:
             assert style[1] >= 2
 
 
+@pytest.mark.slow
 def test_a_time_in_a_table_and_a_press_on_a_chart_go_there(page: Path) -> None:
     with browser(height=1000) as tab:
         open_page(tab, page)
@@ -752,6 +760,7 @@ def test_a_time_in_a_table_and_a_press_on_a_chart_go_there(page: Path) -> None:
         assert tab.locator("#clock").inner_text() == "1.500 s"
 
 
+@pytest.mark.slow
 def test_the_view_turns_and_comes_back(page: Path) -> None:
     with browser(height=1000) as tab:
         open_page(tab, page)
@@ -773,6 +782,7 @@ def test_the_view_turns_and_comes_back(page: Path) -> None:
 # How it looks, and to whom.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [360, 768, 1280])
 def test_nothing_is_wider_than_the_screen(page: Path, width: int) -> None:
     with browser(width=width, height=700) as tab:
@@ -785,6 +795,7 @@ def test_nothing_is_wider_than_the_screen(page: Path, width: int) -> None:
         assert box["x"] + box["width"] <= width
 
 
+@pytest.mark.slow
 def test_dark_and_light(page: Path) -> None:
     def paper(tab: Tab) -> float:
         colour = tab.evaluate("getComputedStyle(document.body).backgroundColor")
@@ -853,6 +864,7 @@ def test_the_sides_differ_for_the_colour_blind() -> None:
             assert np.abs(a - b).max() > 0.2
 
 
+@pytest.mark.slow
 def test_what_a_screen_reader_hears(page: Path) -> None:
     with browser() as tab:
         open_page(tab, page)
@@ -895,6 +907,7 @@ def test_what_a_screen_reader_hears(page: Path) -> None:
         assert tab.locator("#said").get_attribute("aria-live") == "polite"
 
 
+@pytest.mark.slow
 def test_it_prints_with_all_sections_and_the_picture(page: Path) -> None:
     with browser(color_scheme="dark") as tab:
         open_page(tab, page)
@@ -934,6 +947,7 @@ def test_it_says_so_without_webgl(page: Path, tmp_path: Path) -> None:
         tab.nothing_wrong()
 
 
+@pytest.mark.slow
 def test_it_does_not_move_by_itself_nor_smoothly_where_that_is_not_wanted(page: Path) -> None:
     with browser(reduced_motion="reduce") as tab:
         open_page(tab, page)
@@ -973,6 +987,7 @@ def not_finite(made: Made) -> Made:
     return of_look(one, Trace(two.header, {**two.columns, "xpos": xpos}), look)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [ended, single, same, not_finite])
 def test_other_traces(hold: Made, kind: Callable[[Made], Made], tmp_path: Path) -> None:
     made = kind(hold)
@@ -993,6 +1008,7 @@ def test_other_traces(hold: Made, kind: Callable[[Made], Made], tmp_path: Path) 
         tab.nothing_wrong()
 
 
+@pytest.mark.slow
 def test_timesteps_that_differ_are_drawn_between_and_it_is_said(tmp_path: Path) -> None:
     scenario = SCENARIOS["hold"]
     one = record_scenario(scenario, sm.load(scenario.model, defaults="engine"), defaults="engine")
@@ -1016,8 +1032,9 @@ def test_timesteps_that_differ_are_drawn_between_and_it_is_said(tmp_path: Path) 
         tab.nothing_wrong()
 
 
+@pytest.mark.slow
 def test_without_the_model_there_are_sticks(hold: Made, tmp_path: Path) -> None:
-    none = Look(None, "there is no so101/scene.xml here")
+    none = SideDrawing(None, "there is no so101/scene.xml here")
     target = write_report(tmp_path / "x.html", page_of(hold, looks=(none, none)))
     with browser(height=1000) as tab:
         open_page(tab, target)
@@ -1029,6 +1046,7 @@ def test_without_the_model_there_are_sticks(hold: Made, tmp_path: Path) -> None:
         tab.nothing_wrong()
 
 
+@pytest.mark.slow
 def test_without_poses_there_is_no_scene_and_it_is_said(hold: Made, tmp_path: Path) -> None:
     bare = [
         Trace(t.header, {k: v for k, v in t.columns.items() if k not in ("xpos", "xquat")})
@@ -1103,6 +1121,7 @@ def test_bones_reach_from_body_to_body(hold: Made) -> None:
 # The command.
 
 
+@pytest.mark.slow
 def test_the_command_writes_it(cli: Cli, tmp_path: Path) -> None:
     need_engine("pybullet")
     done = cli("compare", "hold", "--no-why", "--html", "out.html")
@@ -1147,6 +1166,7 @@ def test_a_folder_that_cannot_be_written_into(tmp_path: Path, monkeypatch: Any) 
         check_target(tmp_path / "folder.html")
 
 
+@pytest.mark.slow
 def test_traces_make_a_report_without_a_cause(cli: Cli, hold: Made, tmp_path: Path) -> None:
     for name, trace in (("one", hold[1]), ("two", hold[2])):
         write(rows(trace, 120), tmp_path / f"{name}.npz")

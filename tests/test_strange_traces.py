@@ -59,7 +59,7 @@ def with_nan(array: Any, row: int) -> Any:
         ("site_xpos", "gripperframe, position"),
         ("site_xmat", "gripperframe, rotation"),
         ("energy", "energy"),
-        ("contact_force", "gripper – box, normal force"),
+        ("contact_force", "gripper on box, normal force"),
     ],
 )
 def test_what_is_no_number_never_agrees(
@@ -146,13 +146,13 @@ def test_bodies_without_names_are_told_apart(tmp_path: Path) -> None:
         '<body pos="1 0 .05"><freejoint/><geom size=".05"/></body></worldbody></mujoco>'
     )
     trace = record(sm.load(path), seconds=0.2)
-    assert set(trace.touches()) == {"world – body 1", "world – body 2"}
+    assert set(trace.touches()) == {"body 1 on world", "body 2 on world"}
     force = {
         each.name: each.tolerance
         for each in compare(trace, trace).agreements
         if each.kind == "force"
     }
-    assert set(force) == {"world – body 1, normal force", "world – body 2, normal force"}
+    assert set(force) == {"body 1 on world, normal force", "body 2 on world, normal force"}
 
 
 def test_joints_of_other_kinds_and_written_states_are_said(box: Trace) -> None:

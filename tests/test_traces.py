@@ -100,7 +100,7 @@ def test_contacts_are_those_of_the_step(box: Trace) -> None:
             assert box["contact_geom"][mine].tolist() == data.contacts.geom.tolist()
             assert box["contact_force"][mine].tobytes() == data.contacts.force.tobytes()
     touches = box.touches()
-    assert set(touches) == {"gripper – box", "moving_jaw_so101_v1 – box"}
+    assert set(touches) == {"gripper on box", "moving_jaw_so101_v1 on box"}
     assert all(rows.all() for rows in touches.values())
 
 

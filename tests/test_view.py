@@ -23,21 +23,21 @@ from statemachine.traces import record, write
 from statemachine.view import frames, words
 from statemachine.view.frames import (
     Command,
-    Frame,
     Pause,
-    Reset,
-    Run,
+    Play,
+    ResetTo,
     Seek,
     SetCtrl,
     SetSpeed,
+    Snapshot,
     Step,
     controls_of,
     tip_of,
 )
-from statemachine.view.live import Live, Pace
+from statemachine.view.live import Live, Tempo
 from statemachine.view.pace import Pacer
-from statemachine.view.recording import Recording
-from statemachine.view.session import Session
+from statemachine.view.recording import TraceSession
+from statemachine.view.session import LiveSession
 
 from .conftest import ROOT, Cli, need_engine
 
@@ -68,8 +68,8 @@ def odd(tmp_path: Path) -> sm.Model:
 
 
 @pytest.fixture
-def session(backend: str) -> Iterator[Session]:
-    with Session([sm.load(SCENE, backend=backend)], "held") as made:
+def session(backend: str) -> Iterator[LiveSession]:
+    with LiveSession([sm.load(SCENE, backend=backend)], "held") as made:
         yield made
 
 
@@ -79,7 +79,7 @@ def session(backend: str) -> Iterator[Session]:
 def test_a_session_is_the_plain_loop_and_looking_changes_nothing(backend: str) -> None:
     """Bit by bit, with the box in the jaws, seen after every step and never."""
     model = sm.load(SCENE, backend=backend)
-    with sm.make_data(model) as plain, Session([model], "held") as session:
+    with sm.make_data(model) as plain, LiveSession([model], "held") as session:
         sm.reset(model, plain, "held")
         frame = session.frame()
         for k in range(150):
@@ -101,7 +101,7 @@ def test_a_session_is_the_plain_loop_and_looking_changes_nothing(backend: str) -
         assert (frame.time, frame.steps) == (plain.time, 150)
 
 
-def test_a_frame_is_a_copy(session: Session) -> None:
+def test_a_frame_is_a_copy(session: LiveSession) -> None:
     frame = session.frame()
     before = frame.poses[0].xpos.copy(), frame.ctrl.copy()
     session.apply(SetCtrl(0, 1.0))
@@ -111,24 +111,24 @@ def test_a_frame_is_a_copy(session: Session) -> None:
     np.testing.assert_array_equal(frame.ctrl, before[1])
 
 
-def test_commands_do_what_they_say(session: Session) -> None:
+def test_commands_do_what_they_say(session: LiveSession) -> None:
     start = session.frame()
     assert not start.running
     assert session.places == ("held", "pickup")
     assert start.time == 6
-    session.apply(Run())
+    session.apply(Play())
     assert session.frame().running
     session.apply(Step(7))
     frame = session.frame()
     assert (frame.running, frame.steps) == (False, 7)
     assert frame.time == pytest.approx(6 + 7 * session.timestep)
-    session.apply(Run())
+    session.apply(Play())
     session.apply(Pause())
     assert not session.frame().running
-    session.apply(Reset(1))
+    session.apply(ResetTo(1))
     assert session.frame().time == 59.522
     assert session.frame().steps == 0
-    session.apply(Reset())
+    session.apply(ResetTo())
     assert session.frame().time == 0
     assert session.frame().resets == start.resets + 2
     np.testing.assert_array_equal(session.frame().ctrl, 0)
@@ -142,14 +142,14 @@ def test_commands_do_what_they_say(session: Session) -> None:
         SetCtrl(-1, 0.0),
         Step(0),
         Step(10**9),
-        Reset(2),
-        Reset(-1),
+        ResetTo(2),
+        ResetTo(-1),
         Seek(1.0),
     ],
 )
 def test_what_cannot_be_done_is_refused_and_changes_nothing(command: Command) -> None:
-    with Session([sm.load(SCENE)], "held") as session:
-        session.apply(Run())
+    with LiveSession([sm.load(SCENE)], "held") as session:
+        session.apply(Play())
         before = session.frame()
         with pytest.raises(BadInputError):
             session.apply(command)
@@ -161,7 +161,7 @@ def test_what_cannot_be_done_is_refused_and_changes_nothing(command: Command) ->
 def test_the_ghost_gets_the_same_commands_at_the_same_steps() -> None:
     need_engine("pybullet")
     models = [sm.load(SCENE, backend=name) for name in ("mujoco", "pybullet")]
-    with Session(models) as session:
+    with LiveSession(models) as session:
         session.apply(SetCtrl(1, -0.6))
         session.apply(SetCtrl(2, 1.2))
         session.advance(300)
@@ -187,7 +187,7 @@ def test_the_ghost_gets_the_same_commands_at_the_same_steps() -> None:
 
 def test_a_ghost_that_falls_is_far_away() -> None:
     model = sm.load("so101/scene")
-    with Session([model, model.replace(actuation=False)]) as session:
+    with LiveSession([model, model.replace(actuation=False)]) as session:
         session.advance(200)
         gap = session.frame().gap
         assert gap is not None
@@ -199,10 +199,10 @@ def test_a_ghost_that_falls_is_far_away() -> None:
 
 
 def test_a_divergence_pauses_and_a_reset_recovers(odd: sm.Model) -> None:
-    with Session([odd, odd]) as session:
+    with LiveSession([odd, odd]) as session:
         session.advance(3)
         good = session.frame()
-        session.apply(Run())
+        session.apply(Play())
         session.apply(SetCtrl(2, 1e150))
         session.advance(5)
         bad = session.frame()
@@ -211,11 +211,11 @@ def test_a_divergence_pauses_and_a_reset_recovers(odd: sm.Model) -> None:
         assert bad.time == good.time  # the last moment that was good
         assert bad.steps == good.steps
         np.testing.assert_array_equal(bad.poses[0].xpos, good.poses[0].xpos)
-        session.apply(Run())
+        session.apply(Play())
         assert not session.running
         session.apply(Step(3))
         assert session.frame().trouble == bad.trouble
-        session.apply(Reset())
+        session.apply(ResetTo())
         session.advance(3)
         again = session.frame()
         assert again.trouble == ""
@@ -226,13 +226,13 @@ def test_a_divergence_pauses_and_a_reset_recovers(odd: sm.Model) -> None:
 def test_a_divergence_on_the_ghost_alone_stops_both() -> None:
     need_engine("pybullet")
     models = [sm.load("so101/scene", backend=name) for name in ("mujoco", "pybullet")]
-    with Session(models) as session:
+    with LiveSession(models) as session:
         session._arms[1][1].qvel[0] = math.nan
-        session.apply(Run())
+        session.apply(Play())
         session.advance()
         assert not session.running
         assert session.frame().trouble.startswith("pybullet: ")
-        session.apply(Reset())
+        session.apply(ResetTo())
         session.advance(10)
         assert session.frame().trouble == ""
 
@@ -240,13 +240,13 @@ def test_a_divergence_on_the_ghost_alone_stops_both() -> None:
 def test_a_session_refuses_what_does_not_fit(odd: sm.Model) -> None:
     scene = sm.load("so101/scene")
     with pytest.raises(BadInputError, match="another model"):
-        Session([scene, odd])
+        LiveSession([scene, odd])
     with pytest.raises(BadInputError, match="timesteps differ"):
-        Session([scene, scene.replace(timestep=0.001)])
+        LiveSession([scene, scene.replace(timestep=0.001)])
     with pytest.raises(UnknownNameError, match="hled"):
-        Session([sm.load(SCENE)], "hled")
+        LiveSession([sm.load(SCENE)], "hled")
     with pytest.raises(UnknownNameError):
-        Session([scene], site="nose")
+        LiveSession([scene], site="nose")
 
 
 def test_sliders_speak_degrees_where_an_angle_is_asked_for(odd: sm.Model) -> None:
@@ -326,17 +326,17 @@ class Hand:
 
     def __init__(self) -> None:
         self.asked: list[Command] = []
-        self.shown: list[tuple[Frame, Pace, str]] = []
+        self.shown: list[tuple[Snapshot, Tempo, str]] = []
 
     def commands(self) -> Sequence[Command]:
         taken, self.asked = self.asked, []
         return taken
 
-    def show(self, frame: Frame, pace: Pace, note: str) -> None:
+    def show(self, frame: Snapshot, pace: Tempo, note: str) -> None:
         self.shown.append((frame, pace, note))
 
 
-class Slow(Session):
+class Slow(LiveSession):
     """A session whose every step costs some time of a clock."""
 
     def __init__(self, clock: Clock, cost: float) -> None:
@@ -361,7 +361,7 @@ def live(cost: float = 0.0, speed: float = 1.0) -> Iterator[tuple[Slow, Live, Ha
 @pytest.mark.parametrize("speed", [0.1, 1.0, 3.0])
 def test_time_follows_the_clock(speed: float) -> None:
     with live(cost=0.0001, speed=speed) as (session, loop, hand, clock):
-        hand.asked.append(Run())
+        hand.asked.append(Play())
         began = clock.now
         loop.run(seconds=2.0)
         frame, pace, _ = hand.shown[-1]
@@ -374,7 +374,7 @@ def test_time_follows_the_clock(speed: float) -> None:
 
 def test_an_engine_that_is_too_slow_is_said_and_does_not_lag_ever_more() -> None:
     with live(cost=0.010) as (session, loop, hand, _clock):
-        hand.asked.append(Run())
+        hand.asked.append(Play())
         loop.run(seconds=3.0)
         _, pace, _ = hand.shown[-1]
         assert pace.reached == pytest.approx(0.5, abs=0.05)  # 5 ms of it in 10 ms
@@ -396,7 +396,7 @@ def test_time_that_stood_is_not_owed() -> None:
         loop.run(seconds=5.0)
         assert hand.shown[-1][0].time == 0
         assert hand.shown[-1][1].reached is None
-        hand.asked.append(Run())
+        hand.asked.append(Play())
         loop.turn()
         loop.turn()
         assert hand.shown[-1][0].time <= 0.051
@@ -405,7 +405,7 @@ def test_time_that_stood_is_not_owed() -> None:
         standing = hand.shown[-1][0].time
         loop.run(seconds=2.0)
         assert hand.shown[-1][0].time == standing
-        hand.asked.append(Run())
+        hand.asked.append(Play())
         loop.turn()
         loop.turn()
         assert hand.shown[-1][0].time <= standing + 0.051
@@ -426,7 +426,7 @@ def test_a_bad_command_is_a_note_until_the_next_one() -> None:
 
 def test_commands_are_obeyed_in_their_order() -> None:
     with live() as (_, loop, hand, _clock):
-        hand.asked += [SetCtrl(0, 0.5), Reset(), SetCtrl(0, 0.2), SetCtrl(0, 0.3)]
+        hand.asked += [SetCtrl(0, 0.5), ResetTo(), SetCtrl(0, 0.2), SetCtrl(0, 0.3)]
         loop.turn()
         assert hand.shown[-1][0].ctrl[0] == 0.3
 
@@ -435,23 +435,25 @@ def test_commands_are_obeyed_in_their_order() -> None:
 
 
 def test_the_readout_says_what_the_frame_says() -> None:
-    pose = frames.Pose("mujoco", np.zeros((1, 3)), np.zeros((1, 4)), np.array([0.1, -0.02, 0.3]))
-    ghost = frames.Pose("pybullet", pose.xpos, pose.xquat, np.array([0.1, -0.02, 0.3015]))
-    gap = frames.Gap(0.0015, "elbow", math.radians(2.5))
-    frame = Frame(1.25, 250, True, np.zeros(1), 1, (pose, ghost), gap, "")
-    rows = dict(words.rows(frame, Pace(1.0, 0.997, False), "tip"))
+    pose = frames.EnginePose(
+        "mujoco", np.zeros((1, 3)), np.zeros((1, 4)), np.array([0.1, -0.02, 0.3])
+    )
+    ghost = frames.EnginePose("pybullet", pose.xpos, pose.xquat, np.array([0.1, -0.02, 0.3015]))
+    gap = frames.Separation(0.0015, "elbow", math.radians(2.5))
+    frame = Snapshot(1.25, 250, True, np.zeros(1), 1, (pose, ghost), gap, "")
+    rows = dict(words.rows(frame, Tempo(1.0, 0.997, False), "tip"))
     assert rows["time"] == "1.250 s"
     assert rows["steps"] == "250"
     assert rows["pace"] == "1.00 × real time"
     assert rows["on mujoco"] == "100.0  -20.0  300.0 mm"
     assert rows["tips apart"] == "1.500 mm"
     assert rows["joints apart"] == "2.500°, elbow"
-    late = dict(words.rows(frame, Pace(2.0, 0.5, True), "tip"))["pace"]
+    late = dict(words.rows(frame, Tempo(2.0, 0.5, True), "tip"))["pace"]
     assert "0.50 ×" in late
     assert "2 ×" in late
     assert words.warning(frame, "a note") == "a note"
-    stopped = Frame(1.25, 250, False, np.zeros(1), 1, (pose,), None, "mujoco: it blew up")
-    assert dict(words.rows(stopped, Pace(1, None, False), ""))["pace"] == "paused"
+    stopped = Snapshot(1.25, 250, False, np.zeros(1), 1, (pose,), None, "mujoco: it blew up")
+    assert dict(words.rows(stopped, Tempo(1, None, False), ""))["pace"] == "paused"
     assert words.warning(stopped, "") == "mujoco: it blew up. Reset to go on."
 
 
@@ -462,9 +464,9 @@ def test_a_recording_is_played_and_sought() -> None:
     model = sm.load("so101/scene")
     held = record(model, seconds=1.0)
     fallen = record(model.replace(actuation=False), seconds=0.5)
-    recording = Recording([held, fallen])
+    recording = TraceSession([held, fallen])
     assert recording.length == pytest.approx(0.5)  # of the shorter
-    recording.apply(Run())
+    recording.apply(Play())
     recording.advance(30)
     frame = recording.frame()
     assert frame.time == pytest.approx(30 * model.timestep)
@@ -482,7 +484,7 @@ def test_a_recording_is_played_and_sought() -> None:
     recording.apply(Seek(-5))
     assert recording.frame().steps == 0
     recording.apply(Seek(1e9))
-    recording.apply(Run())  # from the end, again from the start
+    recording.apply(Play())  # from the end, again from the start
     assert (recording.frame().steps, recording.running) == (0, True)
     with pytest.raises(BadInputError):
         recording.apply(SetCtrl(0, 1.0))
@@ -491,16 +493,16 @@ def test_a_recording_is_played_and_sought() -> None:
 def test_recordings_that_do_not_fit_are_refused(odd: sm.Model) -> None:
     one = record(sm.load("so101/scene"), seconds=0.05)
     with pytest.raises(TraceError, match="another model"):
-        Recording([one, record(odd, seconds=0.05)])
+        TraceSession([one, record(odd, seconds=0.05)])
     with pytest.raises(TraceError, match="cannot be drawn"):
-        Recording([record(sm.load("so101/scene"), seconds=0.05, derive=False)])
+        TraceSession([record(sm.load("so101/scene"), seconds=0.05, derive=False)])
 
 
 def test_moments_that_are_not_the_same_are_not_compared() -> None:
     model = sm.load("so101/scene")
     one = record(model, seconds=0.1)
     two = record(model.replace(timestep=1 / 240), seconds=0.1)
-    recording = Recording([one, two])
+    recording = TraceSession([one, two])
     assert recording.frame().gap is not None  # both at 0
     recording.advance(1)
     frame = recording.frame()

@@ -18,10 +18,10 @@ from statemachine.drawing import drawing_of
 from statemachine.traces import record
 from statemachine.view import server as serving
 from statemachine.view.door import Door
-from statemachine.view.frames import Pause, Reset, Run, SetCtrl
-from statemachine.view.live import Live, Pace
-from statemachine.view.recording import Recording
-from statemachine.view.session import Session
+from statemachine.view.frames import Pause, Play, ResetTo, SetCtrl
+from statemachine.view.live import Live, Tempo
+from statemachine.view.recording import TraceSession
+from statemachine.view.session import LiveSession
 from statemachine.view.viser_front import ViserFront, _page, thinner
 
 from .browser import Tab, browser, tabs
@@ -48,7 +48,7 @@ def _serve(door: Door) -> Any:
 class Stage:
     """A session on a page, with tabs before it; time passes only in `until`."""
 
-    def __init__(self, session: Session, model: sm.Model, new_tab: Callable[[], Tab]) -> None:
+    def __init__(self, session: LiveSession, model: sm.Model, new_tab: Callable[[], Tab]) -> None:
         self.session, self.new_tab = session, new_tab
         self.door = Door("127.0.0.1")
         self.server = _serve(self.door)
@@ -95,7 +95,10 @@ class Stage:
 def stage() -> Iterator[Stage]:
     """The arm, and as its ghost the arm without its servos, which falls."""
     model = sm.load("so101/scene")
-    with tabs(1000, 640) as new_tab, Session([model, model.replace(actuation=False)]) as session:
+    with (
+        tabs(1000, 640) as new_tab,
+        LiveSession([model, model.replace(actuation=False)]) as session,
+    ):
         made = Stage(session, model, new_tab)
         yield made
         serving.stop(made.server)
@@ -110,7 +113,7 @@ def _colours(tab: Tab) -> tuple[int, int]:
     return int(((r > 150) & (r - b > 80)).sum()), int(((b > 150) & (b - r > 80)).sum())
 
 
-def _ctrl(session: Session) -> np.ndarray:
+def _ctrl(session: LiveSession) -> np.ndarray:
     return session.frame().ctrl
 
 
@@ -273,13 +276,13 @@ def test_the_page_is_told_where_every_body_is_on_each_engine() -> None:
     need_engine("pybullet")
     models = [sm.load("so101/scene_box", backend=name) for name in ("mujoco", "pybullet")]
     drawing = drawing_of(models[0])
-    with Session(models, "held") as session:
+    with LiveSession(models, "held") as session:
         session.apply(SetCtrl(0, 0.7))
         session.advance(100)
         server = _serve(Door("127.0.0.1"))
         try:
             front = ViserFront(server, session, drawing, 1.0, 0)
-            front.show(session.frame(), Pace(1.0, None, False), "")
+            front.show(session.frame(), Tempo(1.0, None, False), "")
             placed = 0
             for root, (_, data) in zip(("/mujoco", "/pybullet ghost"), session._arms, strict=True):
                 for body in range(1, models[0].nbody):
@@ -303,18 +306,18 @@ def test_the_page_is_told_where_every_body_is_on_each_engine() -> None:
 
 def test_the_slider_of_a_recording_follows_it() -> None:
     model = sm.load("so101/scene")
-    recording = Recording([record(model, seconds=0.5)])
+    recording = TraceSession([record(model, seconds=0.5)])
     server = _serve(Door("127.0.0.1"))
     try:
         front = ViserFront(server, recording, drawing_of(model))
         assert (front._seek.min, front._seek.max) == (0, pytest.approx(0.5))
-        recording.apply(Run())
+        recording.apply(Play())
         for _ in range(40):
             recording.advance()
-            front.show(recording.frame(), Pace(1.0, None, False), "")
+            front.show(recording.frame(), Tempo(1.0, None, False), "")
         assert front._seek.value == pytest.approx(40 * model.timestep)
-        recording.apply(Reset())
-        front.show(recording.frame(), Pace(1.0, None, False), "")
+        recording.apply(ResetTo())
+        front.show(recording.frame(), Tempo(1.0, None, False), "")
         assert front._seek.value == 0
         time.sleep(0.2)
         assert front.commands() == []

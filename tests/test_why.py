@@ -136,6 +136,7 @@ def test_what_is_not_in_the_table_stays_unexplained(arm: Model) -> None:
     assert "none of" in " ".join(report.conclusion(found))
 
 
+@pytest.mark.slow
 def test_leaving_out_the_motion_is_no_explanation() -> None:
     """Of another engine with a heavier arm: what stills the arm closes the gap, and is no cause."""
     with registered("hidden", "tests.hidden_world:load"):
@@ -318,7 +319,7 @@ def values_of(model: Model) -> dict[str, Any]:
 @pytest.mark.usefixtures("bullet")
 @pytest.mark.parametrize("name", ["hold", "gravity", "box"])
 def test_the_ends_of_the_dials_are_the_two_models(name: str) -> None:
-    from statemachine.probes.pybullet_dials import dials
+    from statemachine.engines.pybullet.dials import dials
 
     experiment = replace(scenario(name), seconds=0.7)
     fresh = quietly(experiment.model, defaults="engine")
@@ -339,8 +340,8 @@ def test_as_it_comes_is_what_a_user_of_pybullet_gets(tmp_path: Path) -> None:
     """Bit for bit the run of a script that knows nothing of this library but the URDF."""
     import pybullet as pb
 
+    from statemachine.engines.pybullet.dials import dials
     from statemachine.experiments._common import TARGET
-    from statemachine.probes.pybullet_dials import dials
 
     fresh = quietly("so101/scene", defaults="engine")
     found = dials(fresh, {})
@@ -374,7 +375,7 @@ def test_with_everything_dialled_off_the_engines_agree() -> None:
 
     Each of the dials is needed for it, so each acts.
     """
-    from statemachine.probes import pybullet_dials as module
+    from statemachine.engines.pybullet import dials as module
 
     fresh = quietly("so101/scene", defaults="engine")
     limp = {"actuation": False}
@@ -423,7 +424,7 @@ def test_with_everything_dialled_off_the_engines_agree() -> None:
 @pytest.mark.parametrize("dial", ["damping", "limits"])
 def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
     """A limp arm without joint damping, which reaches its limits and the floor."""
-    from statemachine.probes import pybullet_dials as module
+    from statemachine.engines.pybullet import dials as module
 
     fresh = quietly("so101/scene", defaults="engine")
     fresh = fresh.replace(gravity=[0, 0, -9.81], actuation=False)
@@ -473,7 +474,7 @@ def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
 @pytest.mark.usefixtures("bullet")
 def test_links_of_one_robot_meet_where_the_setting_says_so(arm: Model) -> None:
     """In a pose in which the arm is in its own way, by MuJoCo."""
-    from statemachine.probes.pybullet_dials import dials
+    from statemachine.engines.pybullet.dials import dials
 
     def own_ways(model: Model, qpos: np.ndarray, run: Any) -> int:
         with sm.make_data(model) as data:
@@ -501,7 +502,7 @@ def test_as_it_comes_has_the_engines_figures_in_the_emulated_world() -> None:
     """Read back from the engine: friction, masses, inertias, timestep and gravity."""
     import pybullet as pb
 
-    from statemachine.probes.pybullet_dials import dials
+    from statemachine.engines.pybullet.dials import dials
 
     fresh = quietly("so101/scene", defaults="engine")
     found = dials(fresh, {})
@@ -534,7 +535,7 @@ def test_as_it_comes_has_the_engines_figures_in_the_emulated_world() -> None:
 @pytest.mark.parametrize("name", SETTINGS)
 def test_each_dial_acts_on_the_emulated_side(name: str) -> None:
     """All settings the model's, one as the engine comes: the run is another one."""
-    from statemachine.probes.pybullet_dials import dials
+    from statemachine.engines.pybullet.dials import dials
 
     experiment = {"limits": FALL, "surfaces": replace(scenario("gravity"), seconds=0.8)}.get(
         name, HOLD
@@ -556,7 +557,7 @@ def test_each_dial_acts_on_the_emulated_side(name: str) -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_dials_outlive_a_reset() -> None:
-    from statemachine.probes.pybullet_dials import dials
+    from statemachine.engines.pybullet.dials import dials
 
     fresh = quietly("so101/scene", defaults="engine")
     found = dials(fresh, {})
@@ -577,8 +578,8 @@ def test_dials_outlive_a_reset() -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_a_dial_that_does_not_act_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    from statemachine.engines.pybullet import dials as module
     from statemachine.errors import EngineError
-    from statemachine.probes import pybullet_dials as module
 
     fresh = quietly("so101/scene", defaults="engine")
     found = module.dials(fresh, {})
@@ -689,6 +690,7 @@ def test_pages_fit_and_say_what_was_found(attributions: Any) -> None:
         json.loads(dumps(found))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("bullet")
 def test_the_two_ways_to_have_pybullet_end_in_the_same_bits() -> None:
     one, two = quietly("so101/scene"), quietly("so101/scene", defaults="engine")
@@ -710,6 +712,7 @@ def test_two_engines_as_they_come_differ_by_what_was_set() -> None:
 # The command
 
 
+@pytest.mark.slow
 def test_the_command(cli: Cli) -> None:
     need_engine("pybullet")
     done = cli("compare", "hold", "--why", "--seconds", "0.5")

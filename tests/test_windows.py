@@ -122,6 +122,7 @@ _COMMANDS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("encoding", ["cp1252", "cp437"])
 def test_an_old_code_page_is_enough_for_every_command(encoding: str, tmp_path: Path) -> None:
     for arguments in _COMMANDS:

@@ -127,21 +127,21 @@ def _look(request: Any, trace: Any) -> Any:
     from ..backends import load
     from ..drawing import drawing_of
     from ..experiments._common import provenance
-    from ..report.html import Look
+    from ..report.html import SideDrawing
 
     header = trace.header
     file = header.provenance.model_file
     try:
         model = load(request.model or file, menagerie=request.menagerie)
         if model.body_names != header.bodies:
-            return Look(None, f"{file} as it is here has other bodies")
+            return SideDrawing(None, f"{file} as it is here has other bodies")
         if provenance(model).model_sha256 != header.provenance.model_sha256:
-            return Look(None, f"{file} as it is here has another digest")
-        return Look(drawing_of(model))
+            return SideDrawing(None, f"{file} as it is here has another digest")
+        return SideDrawing(drawing_of(model))
     except MissingEngineError as error:
-        return Look(None, str(error))
+        return SideDrawing(None, str(error))
     except StateMachineError:
-        return Look(None, f"there is no {file} here")
+        return SideDrawing(None, f"there is no {file} here")
 
 
 def _typed(options: argparse.Namespace, request: Any) -> str:

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from ..errors import BadInputError
-from ..installed import available, require
+from ..installed import ENGINES, available
 from ._common import MISSING, PROGRAM, add_json, complain, show
 
 
@@ -30,7 +30,8 @@ def add(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Ask, and show."""
-    from ..probes import conventions, phrasebook
+    from .. import conventions
+    from ..conventions import phrasebook
     from ..report import conventions as report
     from ..report.progress import progress
 
@@ -50,10 +51,14 @@ def run(options: argparse.Namespace) -> int:
 
 def _engines(asked: str) -> list[str]:
     """The engine that was asked for; of all, those that load, and a line for each other."""
+    from ..conventions import check_engine
+    from ..engines import room_names
+
     if asked != "all":
-        require(asked)
+        check_engine(asked)
         return [asked]
     found, missing = available()
+    found += [name for name in room_names() if name not in ENGINES]
     for error in missing if found else missing[:-1]:
         complain(error, MISSING)
     if not found:

@@ -208,6 +208,8 @@ def _compute(
     recordings = {name: t.calls for name, t in taken.items() if t.calls and t.calls.statements}
     if recordings:
         page = replace(page, blocks=[*page.blocks, *calls.blocks(recordings)])
+    for name in [name for name, each in taken.items() if each.calls is None]:
+        page = replace(page, blocks=[*page.blocks, calls.not_asked(name)])
     return page, {name: {"result": t.result, "calls": t.calls} for name, t in taken.items()}
 
 

@@ -78,14 +78,14 @@ def _simulate(options: argparse.Namespace, port: int) -> int:
     """A session on one engine or two."""
     from ..backends import load
     from ..drawing import drawing_of
-    from ..view.session import Session
+    from ..view.session import LiveSession
 
     name = options.model or _MODEL
     backends = [options.backend, *([options.ghost] if options.ghost else [])]
     models = [load(name, backend=backend, menagerie=options.menagerie) for backend in backends]
     keyframe = _keyframe(options.keyframe, models[0])
     engines = " and ".join(f"{model.backend} {model.engine_version}" for model in models)
-    with Session(models, keyframe, options.site) as session:
+    with LiveSession(models, keyframe, options.site) as session:
         _serve(options, session, drawing_of(models[0]), keyframe, port, f"{name} on {engines}")
     return 0
 
@@ -95,14 +95,14 @@ def _play(options: argparse.Namespace, port: int) -> int:
     from ..backends import load
     from ..drawing import drawing_of
     from ..traces import model_file, read
-    from ..view.recording import Recording
+    from ..view.recording import TraceSession
 
     if len(options.traces) > 2:
         raise BadInputError(f"view shows one trace or two; got {len(options.traces)}")
     for name in ("ghost", "keyframe", "site"):
         if getattr(options, name) is not None:
             raise BadInputError(f"--{name} is for a simulation, and a trace is a recording")
-    recording = Recording([read(path) for path in options.traces])
+    recording = TraceSession([read(path) for path in options.traces])
     header = recording.header
     name, same = options.model or header.provenance.model_file.removesuffix(".xml"), True
     if options.model:
@@ -139,7 +139,7 @@ def _serve(
     """Show a session until it is interrupted: the ordinary end of a server, no failure."""
     from ..view import server as serving
     from ..view.door import Door
-    from ..view.frames import Run
+    from ..view.frames import Play
     from ..view.live import Live
     from ..view.viser_front import ViserFront
 
@@ -149,7 +149,7 @@ def _serve(
         front = ViserFront(server, session, drawing, options.speed, keyframe)
         _announce(options, server.get_port(), door.token, what, drawing)
         if not options.paused:
-            session.apply(Run())
+            session.apply(Play())
         Live(session, front, options.speed).run(options.seconds)
     except KeyboardInterrupt:
         if sys.stdout.isatty():

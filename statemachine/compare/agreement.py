@@ -9,13 +9,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..comparison import SAME, common_moments, largest, same_pairs
 from ..errors import TraceError
 from ..experiments._common import Provenance
 from ..interface import Array
 from ..traces import Trace
-from .align import SAME, common_moments
 from .notes import notes_on
-from .series import UNITS, Kind, Series, same_pairs, series
+from .series import UNITS, Kind, Series, series
 from .tolerances import tolerance_for
 
 Verdict = Literal["agrees", "settles", "differs"]
@@ -52,6 +52,14 @@ class Agreement:
     reason: str
     verdict: Verdict
     note: str = ""
+
+    @property
+    def tolerances(self) -> float:
+        """How many tolerances the largest difference is; what is no number is beyond all."""
+        if self.max == 0:
+            return 0.0  # the tolerance of what does not move may be zero, too
+        share = self.max / self.tolerance if self.tolerance else np.inf
+        return np.inf if np.isnan(share) else share
 
 
 @dataclass(frozen=True)
@@ -110,13 +118,7 @@ class Comparison:
     @property
     def worst(self) -> Agreement | None:
         """The quantity that is farthest beyond its tolerance; None if nothing was compared."""
-        return max(self.agreements, key=_beyond, default=None)
-
-
-def _beyond(found: Agreement) -> float:
-    """How many tolerances; what is no number is beyond all of them."""
-    share = found.max / found.tolerance
-    return np.inf if np.isnan(share) else share
+        return max(self.agreements, key=lambda found: found.tolerances, default=None)
 
 
 def compare(
@@ -144,13 +146,18 @@ def compare(
     common = common_moments(one, two)
     if "contact_row" in one and "contact_row" in two:
         found += _touches(one, two, float(common.time[-1]), tolerances)
+    strange = [
+        f"{each.name}: {each.note}, so it cannot agree"
+        for each in found
+        if each.note.startswith("no number")
+    ]
     return Comparison(
         one=_side(one),
         two=_side(two),
         moments=len(curves[0].time),
         until=float(curves[0].time[-1]),
         agreements=tuple(found),
-        notes=tuple(notes_on(one, two, common, found)),
+        notes=tuple(notes_on(one, two, common, strange)),
     )
 
 
@@ -160,7 +167,7 @@ def _of_curve(
     allowed = tolerance_for(curve, one, two, given)
     apart, time = curve.difference, curve.time
     strange = int(np.count_nonzero(~np.isfinite(apart)))
-    worst = int(np.argmax(np.nan_to_num(apart, nan=np.inf)))
+    most, row = largest(apart)
     tail = time >= time[-1] - SETTLED * (time[-1] - time[0])
     # Of a force the mean counts: stiff contacts ring from step to step.
     if curve.kind == "force":
@@ -175,8 +182,8 @@ def _of_curve(
         name=curve.name,
         kind=curve.kind,
         unit=curve.unit,
-        max=float(apart[worst]),
-        at=float(time[worst]),
+        max=most,
+        at=float(time[row]),
         rms=float(np.sqrt(np.mean(apart**2))),
         settled=settled,
         since=float(time[beyond[0]]) if len(beyond) else None,

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from ..comparison import SAME, Common
+from ..comparison.text import milliseconds, numbers, significant
 from ..interface import JointType
 from ..traces import Header, Trace
-from .align import SAME, Common
 from .series import tell
-
-if TYPE_CHECKING:
-    from .agreement import Agreement
 
 # Columns that are compared, and what a page calls them.
 _COMPARED = {
@@ -25,8 +22,15 @@ _COMPARED = {
 }
 
 
-def notes_on(one: Trace, two: Trace, common: Common, found: Sequence[Agreement]) -> Iterator[str]:
-    """A line for each thing that a reader of the figures must know."""
+def notes_on(one: Trace, two: Trace, common: Common, of_quantities: Iterable[str]) -> Iterator[str]:
+    """A line for each thing that a reader of the figures must know.
+
+    Args:
+        one: A trace.
+        two: The other.
+        common: The moments that they share.
+        of_quantities: What is to be said of single quantities.
+    """
     a, b = one.header, two.header
     if a.provenance.model_sha256 != b.provenance.model_sha256:
         yield (
@@ -35,14 +39,12 @@ def notes_on(one: Trace, two: Trace, common: Common, found: Sequence[Agreement])
         )
     yield from _of_joints(one, two)
     yield from _of_columns(one, two)
-    for each in found:
-        if each.note.startswith("no number"):
-            yield f"{each.name}: {each.note}, so it cannot agree"
+    yield from of_quantities
     if a.experiment != b.experiment:
         yield f"the experiments are two: {a.experiment} and {b.experiment}"
     yield from _of_time(one, two, common)
     if not np.allclose(a.gravity, b.gravity, rtol=0, atol=1e-12):
-        yield f"gravity differs: {_vector(a.gravity)} and {_vector(b.gravity)} m/s²"
+        yield f"gravity differs: {numbers(a.gravity)} and {numbers(b.gravity)} m/s²"
     if any(header.defaults == "engine" and header.energy_by for header in (a, b)):
         yield (
             "energy is measured by one yardstick on both sides, masses, armature and gravity of "
@@ -98,8 +100,8 @@ def _of_time(one: Trace, two: Trace, common: Common) -> Iterator[str]:
     steps = [trace.header.timestep for trace in (one, two)]
     if steps[0] != steps[1]:
         yield (
-            f"timesteps differ, {1000 * steps[0]:.4g} and {1000 * steps[1]:.4g} ms: compared "
-            "are the moments that both have, nothing is interpolated"
+            f"timesteps differ, {significant(1000 * steps[0])} and {milliseconds(steps[1])}: "
+            "compared are the moments that both have, nothing is interpolated"
         )
     ends = [float(trace.time[-1] - trace.time[0]) for trace in (one, two)]
     if abs(ends[0] - ends[1]) > max(steps) * (1 + SAME):
@@ -131,7 +133,3 @@ def _start(trace: Trace, name: str, column: str) -> np.ndarray:
 
 def _lacking(a: Header, b: Header) -> list[str]:
     return [f"{name} ({a.label})" for name in a.joint_labels if name not in b.joint_labels]
-
-
-def _vector(values: tuple[float, ...]) -> str:
-    return " ".join(f"{value:g}" for value in values)

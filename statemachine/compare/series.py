@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal, TypeVar
+from typing import Literal
 
 import numpy as np
 
+from ..comparison import Common, common_moments, same_pairs
 from ..interface import Array, JointType, usual_site
 from ..rotations import angle_between, matrix_from_quat
 from ..traces import Header, Trace
-from .align import Common, common_moments
 
 Kind = Literal[
     "joint", "slide", "tip", "tip rotation", "body", "body rotation", "energy", "contact", "force"
 ]
-_T = TypeVar("_T")
 UNITS: dict[str, str] = {
     "joint": "rad",
     "slide": "m",
@@ -102,19 +100,10 @@ def default_tip(*headers: Header) -> str:
 
 def normal_forces(trace: Trace) -> dict[str, Array]:
     """Sum of the normal contact forces (n,) [N] between each pair of bodies."""
-    found: dict[str, Array] = {}
-    if "contact_row" not in trace:
-        return found
-    header, labels = trace.header, trace.header.body_labels
-    for row, (one, two), force in zip(
-        trace["contact_row"].tolist(),
-        trace["contact_geom"].tolist(),
-        trace["contact_force"][:, 0].tolist(),
-        strict=True,
-    ):
-        bodies = sorted((header.geom_bodyid[one], header.geom_bodyid[two]))
-        name = " – ".join(labels[body] for body in bodies)
-        found.setdefault(name, np.zeros(len(trace)))[row] += force
+    found = {}
+    for pair, places in trace.contact_pairs().items():
+        found[pair] = np.zeros(len(trace))
+        np.add.at(found[pair], trace["contact_row"][places], trace["contact_force"][places, 0])
     return found
 
 
@@ -124,19 +113,14 @@ def total_forces(trace: Trace) -> dict[str, Array]:
     Friction and all, added as vectors in world axes: neither at least nor at most the sum of
     the normal forces.
     """
-    sums: dict[str, Array] = {}
-    if "contact_row" not in trace:
-        return {}
-    header, labels = trace.header, trace.header.body_labels
-    for row, geoms, force in zip(
-        trace["contact_row"].tolist(),
-        trace["contact_geom"].tolist(),
-        world_forces(trace),
-        strict=True,
-    ):
-        name = " – ".join(labels[body] for body in sorted(header.geom_bodyid[g] for g in geoms))
-        sums.setdefault(name, np.zeros((len(trace), 3)))[row] += force
-    return {name: np.linalg.norm(total, axis=1) for name, total in sums.items()}
+    found = {}
+    pairs = trace.contact_pairs()
+    forces = world_forces(trace) if pairs else np.empty((0, 3))
+    for pair, places in pairs.items():
+        total = np.zeros((len(trace), 3))
+        np.add.at(total, trace["contact_row"][places], forces[places])
+        found[pair] = np.linalg.norm(total, axis=1)
+    return found
 
 
 def world_forces(trace: Trace) -> Array:
@@ -160,18 +144,6 @@ def tell(one: Trace, two: Trace, column: str) -> bool:
         if array.size and np.isnan(array).all():
             return False
     return True
-
-
-def same_pairs(one: Mapping[str, _T], two: Mapping[str, _T]) -> dict[str, _T]:
-    """What `two` has by pair of bodies, the pairs called as in `one`.
-
-    A pair is named in the order of its model's bodies, and two models may have other orders.
-    """
-    found = {}
-    for pair, value in two.items():
-        turned = " – ".join(reversed(pair.split(" – ")))
-        found[turned if turned in one and pair not in one else pair] = value
-    return found
 
 
 def _scalar(name: str, kind: Kind, common: Common, one: Array, two: Array) -> Series:

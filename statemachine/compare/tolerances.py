@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..comparison.text import milliseconds, rounded
 from ..errors import BadInputError, unknown_name
 from ..interface import Array
 from ..traces import Trace
@@ -57,21 +58,22 @@ def tolerance_for(
     if kind == "body rotation":
         return Tolerance(_BODY_TURN, "a degree, which moves the rim of a hand's breadth by 1 mm")
     if kind == "energy":
-        range_ = max(float(np.ptp(series.one)), float(np.ptp(series.two)))
+        range_ = max(_range(series.one), _range(series.two))
         return Tolerance(
-            max(_ENERGY * range_, 1e-9), f"1 % of the {range_:.3g} J that the run turns over"
+            max(_ENERGY * range_, 1e-9),
+            f"1 % of the {rounded(range_, 'J')} that the run turns over",
         )
     if kind == "force":
         # Not of its peak: that of an impact is its impulse over the timestep, whatever that is.
         acting = max(_mean_acting(values) for values in (series.one, series.two))
         return Tolerance(
             max(_FORCE * acting, 1e-6),
-            f"5 % of {acting:.3g} N, the mean while they touch",
+            f"5 % of {rounded(acting, 'N')}, the mean while they touch",
         )
     longest = max(one.header.timestep, two.header.timestep)
     return Tolerance(
         longest * (1 + 1e-9),
-        f"one timestep, {1000 * longest:.3g} ms: an engine looks at contacts once in a step",
+        f"one timestep, {milliseconds(longest, 3)}: an engine looks at contacts once in a step",
     )
 
 
@@ -135,6 +137,13 @@ def _mean_acting(force: Array) -> float:
 def _reach(trace: Trace, series: Series) -> float:
     """How far a site gets from where the first jointed body has its origin [m]."""
     positions, _ = trace.site(series.name.partition(",")[0])
-    if "xpos" not in trace or len(trace.header.bodies) < 2:
-        return float(np.linalg.norm(positions, axis=1).max())
-    return float(np.linalg.norm(positions - trace["xpos"][:, 1], axis=1).max())
+    if "xpos" in trace and len(trace.header.bodies) > 1:
+        positions = positions - trace["xpos"][:, 1]
+    lengths = np.linalg.norm(positions, axis=1)
+    return float(lengths[np.isfinite(lengths)].max(initial=0.0))
+
+
+def _range(values: Array) -> float:
+    """From the smallest to the largest of those that are finite; 0 if none is."""
+    finite = values[np.isfinite(values)]
+    return float(np.ptp(finite)) if len(finite) else 0.0

@@ -19,7 +19,13 @@ _ROOMS: dict[str, str] = {
     name: f"{__name__}.{name}" for name in ("mujoco", "pybullet", "pinocchio")
 }
 # What a room may have.
-PARTS: dict[str, str] = {}
+PARTS: dict[str, str] = {
+    "as_it_comes": "what the engine calls things, and a model as its own users load it",
+    "conventions": "what it does with tiny models, for the questions of `conventions`",
+    "phrasebook": "which of its calls does what, as lines to type",
+    "calls": "which of its functions can be watched, and what they change",
+    "dials": "Models between the engine as it comes and the contract",
+}
 
 
 def room_names() -> list[str]:
@@ -47,6 +53,11 @@ def register(name: str, package: str) -> None:
     _ROOMS[name] = package
 
 
+def rooms_with(name: str) -> list[str]:
+    """Engines whose rooms have a part of `PARTS`; the parts are not imported."""
+    return [engine for engine in room_names() if _has(_ROOMS[engine], name)]
+
+
 def part(engine: str | None, name: str) -> Any | None:
     """A part of an engine's room, imported now; None if the engine has none.
 
@@ -58,6 +69,9 @@ def part(engine: str | None, name: str) -> Any | None:
         raise unknown_name("part of an engine's room", name, PARTS)
     if engine is None or engine not in room_names():
         return None
-    module = f"{_ROOMS[engine]}.{name}"
-    importlib.import_module(_ROOMS[engine])
-    return importlib.import_module(module) if importlib.util.find_spec(module) else None
+    room = _ROOMS[engine]
+    return importlib.import_module(f"{room}.{name}") if _has(room, name) else None
+
+
+def _has(room: str, name: str) -> bool:
+    return importlib.util.find_spec(f"{room}.{name}") is not None

@@ -13,10 +13,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from .. import __version__
+from .. import __version__, conventions
+from ..comparison import ContactNames
+from ..engines import part
 from ..errors import BadInputError, UnsupportedError
 from ..interface import DERIVED, INPUTS, Array, Contacts, Data, JointType, Model
-from ..probes import conventions, probe
 
 Progress = Callable[[float], None]  # told the fraction that is done
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)  # a command to the arm [rad]
@@ -84,12 +85,12 @@ class Itself:
 
 def ask_itself(model: Model, *questions: str) -> tuple[Itself, ...]:
     """Conventions of the engine behind a Model that emulates some of the contract."""
-    if probe(model) is None:  # the interface is the engine's own
+    if part(model.backend, "as_it_comes") is None:  # the interface is the engine's own
         return ()
     return tuple(
         Itself(question, finding.of, finding.answer)
         for question in questions
-        for finding in conventions.ask(question, model.backend)
+        for finding in conventions.ask(question, model.backend) or ()
     )
 
 
@@ -184,12 +185,9 @@ def read_derived(data: Data) -> dict[str, bytes]:
 
 
 def body_pairs(model: Model, contacts: Contacts) -> Counter[str]:
-    """How many contacts each pair of bodies has, as {"gripper – box": 6}."""
-    pairs: Counter[str] = Counter()
-    for one, two in np.atleast_2d(contacts.geom)[: len(contacts)]:
-        bodies = sorted((int(model.geom_bodyid[one]), int(model.geom_bodyid[two])))
-        pairs[" – ".join(model.body_names[body] for body in bodies)] += 1
-    return pairs
+    """How many contacts each pair of bodies has, as {"gripper on box": 6}."""
+    names = ContactNames.of(model)
+    return Counter(names.pair(*geoms) for geoms in contacts.geom.tolist())
 
 
 def carried_by(model: Model, bodies: Iterable[int]) -> frozenset[int]:
@@ -208,22 +206,12 @@ def moved_by_actuators(model: Model) -> frozenset[int]:
 
 
 def touching(model: Model, contacts: Contacts, bodies: frozenset[int]) -> tuple[str, ...]:
-    """What of `bodies` touches what else, as "fixed_tip (gripper) on floor", each once."""
-
-    def label(geom: int) -> str:
-        body = model.body_names[int(model.geom_bodyid[geom])]
-        name = model.geom_names[geom]
-        if name and body not in (name, "world"):
-            return f"{name} ({body})"
-        return name or body
-
-    seen: dict[str, None] = {}
-    for pair in contacts.geom.tolist():
-        inside = [int(model.geom_bodyid[geom]) in bodies for geom in pair]
-        if inside[0] != inside[1]:
-            ours, other = pair if inside[0] else pair[::-1]
-            seen[f"{label(ours)} on {label(other)}"] = None
-    return tuple(seen)
+    """What of `bodies` touches what else, as "gripper on floor (fixed_tip)", each once."""
+    pairs = contacts.geom.tolist()
+    inside = [[int(model.geom_bodyid[geom]) in bodies for geom in pair] for pair in pairs]
+    found = [pair for pair, (one, two) in zip(pairs, inside, strict=True) if one != two]
+    names = ContactNames.of(model) if found else None
+    return tuple(dict.fromkeys(names.geoms(*pair) for pair in found)) if names else ()
 
 
 def is_slide(model: Model, joint: str) -> bool:

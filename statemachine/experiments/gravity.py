@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..engines import part
+from ..engines.parts import AsItComes, LeftAlone
 from ..errors import UnsupportedError
 from ..interface import Array, Model, forward, make_data, step
-from ..probes import Alone, probe
 from ._common import (
     Forces,
     Progress,
@@ -73,7 +74,7 @@ class Gravity:
     servos_on: Droop
     servos_off: Droop
     longer: dict[str, Droop]
-    alone: tuple[Alone, ...]
+    alone: tuple[LeftAlone, ...]
     provenance: Provenance
 
 
@@ -110,12 +111,12 @@ def run(
             runs["no floor"] = limp.replace(contacts=False), longer
     total, done, droops = sum(time for _, time in runs.values()), 0.0, {}
     for name, (each, time) in runs.items():
-        part = part_of(progress, done / total, time / total)
-        droops[name] = _droop(each, time, joint, part, watch=name in ("on", "off"))
+        share = part_of(progress, done / total, time / total)
+        droops[name] = _droop(each, time, joint, share, watch=name in ("on", "off"))
         done += time
     on, off = droops.pop("on"), droops.pop("off")
     which = model.joint_id(joint)
-    own = probe(model)
+    own: AsItComes | None = part(model.backend, "as_it_comes")
     return Gravity(
         joint=joint,
         slide=is_slide(model, joint),

@@ -9,6 +9,9 @@ from typing import Literal
 
 import numpy as np
 
+from ..comparison import largest
+from ..engines import part
+from ..engines.parts import AsItComes, WayBack
 from ..errors import BadInputError, UnsupportedError, unknown_name
 from ..interface import (
     Array,
@@ -23,7 +26,6 @@ from ..interface import (
     step,
 )
 from ..interface.checks import as_count
-from ..probes import WayBack, probe
 from ._common import Progress, Provenance, body_pairs, command, part_of, provenance, silent
 
 Break = Literal["extra-step", "late-ctrl"]
@@ -159,7 +161,7 @@ def run(
         if kind == JointType.FREE
     ]
     gap = first - second
-    own = probe(model)
+    own: AsItComes | None = part(model.backend, "as_it_comes")
     hinges = model.jnt_qposadr[model.jnt_type == int(JointType.HINGE)]
     return Replay(
         ctrl=goal,
@@ -186,9 +188,9 @@ def run(
 
 def _broken(way: str, first: Array, other: Array) -> Broken:
     gap = np.abs(first - other).max(axis=1)
-    peak = int(np.argmax(gap))
+    peak, step = largest(gap)
     close = bool(np.allclose(first[-1], other[-1]))
-    return Broken(way, close, float(gap[peak]), peak, float(gap[-1]))
+    return Broken(way, close, peak, step, float(gap[-1]))
 
 
 def _finer(

@@ -24,7 +24,7 @@ _WATCHED = 600  # steps under the keyframe's own ctrl
 
 
 @dataclass(frozen=True)
-class Scene:
+class KeyframeScene:
     """What a keyframe shows, and what becomes of it under its own ctrl.
 
     Attributes:
@@ -77,7 +77,7 @@ class Reset:
     empty: bool
     same_future: bool
     steps: int
-    scenes: tuple[Scene, ...]
+    scenes: tuple[KeyframeScene, ...]
     provenance: Provenance
 
 
@@ -121,7 +121,7 @@ def run(model: Model, steps: int = 100, progress: Progress = silent) -> Reset:
     )
 
 
-def _scene(model: Model, key: int) -> Scene:
+def _scene(model: Model, key: int) -> KeyframeScene:
     frame = model.keyframes[key]
     free = np.flatnonzero(model.jnt_type == int(JointType.FREE))
     body = int(model.jnt_bodyid[free[0]]) if len(free) else None
@@ -142,7 +142,7 @@ def _scene(model: Model, key: int) -> Scene:
             steps["robot"] += robot > 0
             steps["world"] += world > 0
         ended = 0.0 if height is None else float(data.qpos[height])
-    return Scene(
+    return KeyframeScene(
         name=frame.name,
         time=frame.time,
         exact=tuple(name for name in wanted if now[name] == wanted[name]),

@@ -7,9 +7,9 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 
 from ..backends import load
+from ..engines import part
 from ..interface import Data, Model, make_data, reset, step
 from ..interface.checks import as_count
-from ..probes import probe
 from ._common import Progress, Provenance, provenance, silent
 from .in_turns import Ratio, in_turns
 
@@ -74,7 +74,7 @@ def run(model: Model, steps: int = 4000, progress: Progress = silent) -> Speed:
     size = max(1, min(total // _ROUNDS, _MOST))
     rounds = [size] * (total // size) + [total % size] * bool(total % size)
     models = {_BULK: model, _AGAIN: model, _LOOP: model}
-    if probe(model):
+    if part(model.backend, "as_it_comes"):
         as_it_comes = load(model.path, backend=model.backend, defaults="engine")
         gravity = model.gravity
         models[_OWN] = as_it_comes.replace(gravity=gravity, timestep=model.timestep)

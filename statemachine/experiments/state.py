@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..engines import part
+from ..engines.parts import AsItComes, Term
 from ..interface import JointType, Model, make_data, reset
-from ..probes import Term, probe
 from ._common import Provenance, provenance
 
 
@@ -61,7 +62,7 @@ def run(model: Model) -> Layout:
                 qvel_stop=int(dof) + known.nv,
             )
         )
-    own = probe(model)
+    own: AsItComes | None = part(model.backend, "as_it_comes")
     with make_data(model) as data:
         fresh, name, time = data.time, None, None
         if model.keyframes:

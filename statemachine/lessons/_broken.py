@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
+from ..comparison import largest
+from ..comparison.text import millimetres
 from ..experiments import replay
 from ..page import Table, Text, Traces
-from ._words import millimetres, where
+from ._words import where
 
 _STEPS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 300, 600, 1000, 2000, 5000, 10_000, 20_000)
 _SHORT = {"extra-step": "one step more", "late-ctrl": "late ctrl"}
@@ -71,7 +71,7 @@ def course(difference: Any) -> int:
     peak, end = float(difference.max()), float(difference[-1])
     if end < peak / 3:
         return 1
-    return 0 if int(np.argmax(difference)) == len(difference) - 1 else 2
+    return 0 if largest(difference)[1] == len(difference) - 1 else 2
 
 
 def traces(results: Mapping[str, replay.Replay]) -> Traces:

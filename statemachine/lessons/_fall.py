@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ..comparison.text import apart, position
 from ..experiments import gravity
 from ..page import Table, Text, Traces, Verdict
-from ._words import angle_or_length, position, where
+from ._words import where
 
 _BALANCE = 1e-3  # N·m or N; a sum below it is zero
 _CREEP = 0.05  # of the way; a joint that goes on by more has not settled
@@ -75,7 +76,7 @@ def longer_apart(results: Mapping[str, gravity.Gravity]) -> list[tuple[str, Any]
             if label not in one.longer or label not in two.longer:
                 return "–"
             ends = [each.longer[label].position[-1] for each in (one, two)]
-            return angle_or_length(abs(float(ends[0] - ends[1])), one.slide)
+            return apart(abs(float(ends[0] - ends[1])), one.slide)
 
         return gap
 

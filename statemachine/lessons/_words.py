@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from ..comparison.text import capital, milliseconds
 from ..page import Code, Page, Printed, Question, Table, Text
 from .records import Session
 
@@ -22,9 +22,10 @@ def origin(results: Mapping[str, Any]) -> str:
     """What a page was computed with: model and engine versions."""
     first = next(iter(results.values())).provenance
     engines = ", ".join(
-        f"{name} {result.provenance.versions[name]}" for name, result in results.items()
+        f"{name} {result.provenance.versions[result.provenance.backend]}"
+        for name, result in results.items()
     )
-    return f"{first.model_file} on {engines}, {first.timestep * 1e3:g} ms a step"
+    return f"{first.model_file} on {engines}, {milliseconds(first.timestep)} a step"
 
 
 def page_of(title: str, results: Mapping[str, Any], blocks: Sequence[Any]) -> Page:
@@ -65,14 +66,6 @@ def itself(name: str, asked: Sequence[Any]) -> list[Table]:
     ]
 
 
-def duration(seconds: float) -> str:
-    """A wall time in the unit that reads best."""
-    for factor, unit in ((1e6, "µs"), (1e3, "ms")):
-        if seconds * factor < 1000:
-            return f"{seconds * factor:.3g} {unit}"
-    return f"{seconds:.3g} s"
-
-
 def differences(
     results: Mapping[str, Any], rows: Sequence[tuple[str, Callable[[Any, Any], str]]]
 ) -> list[Table]:
@@ -94,53 +87,9 @@ def differences(
     ]
 
 
-def angle_or_length(value: float, slide: bool) -> str:
-    """A difference of a joint's positions; what is below a millionth is only called so."""
-    shown, unit = (value * 1e3, " mm") if slide else (math.degrees(value), "°")
-    return f"{shown:.2g}{unit}" if shown >= 1e-6 else f"below 1e-6{unit}"
-
-
-def degrees(radians: float, digits: int = 2) -> str:
-    """An angle in degrees; what rounds to zero has no sign."""
-    return f"{_rounded(math.degrees(radians), digits)}°"
-
-
-def position(value: float, slide: bool, digits: int = 2) -> str:
-    """A joint's position: a hinge's in degrees, a slide's in millimetres."""
-    return millimetres(value, digits) if slide else degrees(value, digits)
-
-
-def _rounded(value: float, digits: int) -> str:
-    text = f"{value:.{digits}f}"
-    return text.removeprefix("-") if float(text) == 0 else text
-
-
-def signed(value: float | None, digits: int = 4) -> str:
-    """A number with its sign; what rounds to zero has none; a dash if there is none."""
-    if value is None:
-        return "–"
-    text = f"{value:+.{digits}f}"
-    return text[1:] if float(text) == 0 else text
-
-
-def millimetres(metres: float, digits: int = 2) -> str:
-    """A length in millimetres."""
-    return f"{_rounded(metres * 1e3, digits)} mm"
-
-
-def vector(values: Iterable[float], digits: int = 4) -> str:
-    """Components in brackets; what rounds to zero has no sign."""
-    return "[" + " ".join(f"{round(float(v), digits) + 0.0:.{digits}f}" for v in values) + "]"
-
-
-def count(number: int, thing: str) -> str:
-    """A number of things: 1 step, 2 steps."""
-    return f"{number:,} {thing}" + ("" if number == 1 else "s")
-
-
 def sentence(results: Mapping[str, Any], backend: str, text: str) -> Text:
     """A paragraph about one engine; alone, it begins with a capital."""
-    return Text(f"{backend}: {text}" if len(results) > 1 else text[0].upper() + text[1:])
+    return Text(f"{backend}: {text}" if len(results) > 1 else capital(text))
 
 
 def where(results: Mapping[str, Any], backend: str) -> str:

@@ -6,9 +6,10 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from ..comparison.text import degrees, millimetres, vector
 from ..experiments import fingertip
 from ..page import Page, Table, Text, Verdict
-from ._words import differences, millimetres, page_of, vector, where
+from ._words import differences, page_of, where
 
 
 def page(results: Mapping[str, fingertip.Certificate]) -> Page:
@@ -53,7 +54,7 @@ def _offset(offset: fingertip.Offset | None) -> str:
         return "no common body: not comparable"
     if offset.same:
         return "0 mm, 0°"
-    return f"{millimetres(offset.distance)}, {math.degrees(offset.angle):.2f}°"
+    return f"{millimetres(offset.distance)}, {degrees(offset.angle)}"
 
 
 def _figure(value: float | None) -> str:

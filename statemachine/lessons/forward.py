@@ -6,22 +6,11 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import numpy as np
-
+from ..comparison import largest
+from ..comparison.text import count, millimetres, short_time, vector
 from ..experiments import forward
 from ..page import Page, Pipeline, Question, Table, Text, Traces, Verdict
-from ._words import (
-    count,
-    differences,
-    emulation,
-    itself,
-    millimetres,
-    page_of,
-    sentence,
-    typed,
-    vector,
-    where,
-)
+from ._words import differences, emulation, itself, page_of, sentence, typed, where
 from .records import Session
 
 _WHEN = ("before it", "after it")
@@ -257,8 +246,8 @@ def _moments(results: Mapping[str, forward.Forward]) -> list[Any]:
     ]
     for name, result in results.items():
         stages = result.stages
-        worst = int(np.argmax(stages.lag))
-        if stages.lag[worst] == 0:
+        lag, row = largest(stages.lag)
+        if lag == 0:
             blocks.append(sentence(results, name, f"{stages.site} did not move in this run."))
             continue
         # Contacts of step and forward may be found with another memory of what touched before.
@@ -267,9 +256,9 @@ def _moments(results: Mapping[str, forward.Forward]) -> list[Any]:
             Verdict(
                 f"{where(results, name)}after each step {' and '.join(left)} "
                 f"{'are' if len(left) > 1 else 'is'} of the state before it: the fingertip is "
-                f"{millimetres(stages.lag[worst])} behind at worst (in the step from "
-                f"{stages.time[worst]:.3f} s). Drawings in which step delivers the next state's "
-                "xpos and contacts are wrong: call forward before you read",
+                f"{millimetres(lag)} behind at worst (in the step from "
+                f"{short_time(stages.time[row])}). Drawings in which step delivers the next "
+                "state's xpos and contacts are wrong: call forward before you read",
                 all(stages.of_before[each] == steps > stages.of_after[each] for each in left),
             )
         )

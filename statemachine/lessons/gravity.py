@@ -7,19 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from ..comparison import largest
+from ..comparison.text import apart, position, short_time, signed
 from ..experiments import gravity
 from ..page import Page, Question, Table, Text, Verdict
 from ._fall import longer, longer_apart
-from ._words import (
-    angle_or_length,
-    differences,
-    emulation,
-    page_of,
-    position,
-    signed,
-    typed,
-    where,
-)
+from ._words import differences, emulation, page_of, typed, where
 from .records import Session
 
 _PARTS = (
@@ -116,7 +109,7 @@ def page(results: Mapping[str, gravity.Gravity], session: Session) -> Page:
     for name, run in columns.items():
         blocks.append(_finding(name, run, first))
         if run.touching:
-            touches = (f"{touch} (since {run.touches[touch]:.3f} s)" for touch in run.touching)
+            touches = (f"{touch} since {run.touches[touch]:.3f} s" for touch in run.touching)
             blocks.append(Text(f"{name}: touching at the end: {', '.join(touches)}."))
     blocks += longer(results)
     for name, result in results.items():
@@ -166,9 +159,9 @@ def _worst(
         if first >= len(gap):
             return "nothing touched"
         gap = np.concatenate([np.zeros(first), gap[first:]])
-    worst = int(np.argmax(gap))
-    found = angle_or_length(float(gap[worst]), one.slide)
-    return found if found.startswith("below") else f"{found} at {worst * timestep:.3f} s"
+    size, row = largest(gap)
+    found = apart(size, one.slide)
+    return found if found.startswith("below") else f"{found} at {short_time(row * timestep)}"
 
 
 def _alone(name: str, result: gravity.Gravity) -> list[Table | Text]:

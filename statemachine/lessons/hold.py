@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from ..comparison import largest
+from ..comparison.text import apart, position, short_time
 from ..experiments import hold
 from ..interface import Array
 from ..page import Page, Question, Table, Text, Traces
-from ._words import angle_or_length, differences, page_of, position, typed, where
+from ._words import differences, page_of, typed, where
 from .records import Session
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -105,7 +107,7 @@ def page(results: Mapping[str, hold.Hold], session: Session) -> Page:
 
 def _question(first: hold.Hold) -> Question:
     gaps = np.abs(first.qpos[-1] - first.goal)
-    away, worst = int((gaps > _THERE).sum()), int(np.argmax(gaps))
+    away, (_, worst) = int((gaps > _THERE).sum()), largest(gaps)
     because = f"{away} of {len(gaps)} are farther away; the worst, {first.joints[worst]}, by "
     because += _at(first, gaps[worst], worst)
     if first.without_contacts is not None:
@@ -133,11 +135,11 @@ def _traces(results: Mapping[str, hold.Hold]) -> Traces:
 
 def _gap(one: hold.Hold, gaps: Array, time: float | None = None) -> str:
     """The largest of the joints' gaps, whose it is, and when."""
-    joint = int(np.argmax(gaps))
-    found = angle_or_length(float(gaps[joint]), one.slides[joint])
+    gap, joint = largest(gaps)
+    found = apart(gap, one.slides[joint])
     if found.startswith("below"):
         return found
-    return f"{found}  {one.joints[joint]}" + ("" if time is None else f" at {time:.3f} s")
+    return f"{found}  {one.joints[joint]}" + ("" if time is None else f" at {short_time(time)}")
 
 
 def _apart(one: hold.Hold, two: hold.Hold, touching: bool) -> str:
@@ -147,8 +149,8 @@ def _apart(one: hold.Hold, two: hold.Hold, touching: bool) -> str:
     gaps = np.abs(one.qpos - two.qpos).max(axis=1)
     if touching and not times:
         return "nothing touched"
-    span = range(first + 1, len(gaps)) if touching else range(first + 1)
-    worst = max(span, key=lambda k: gaps[k], default=first)
+    span = gaps[first + 1 :] if touching else gaps[: first + 1]
+    worst = (first + 1 if touching else 0) + largest(span)[1] if len(span) else first
     return _gap(one, np.abs(one.qpos[worst] - two.qpos[worst]), float(one.time[worst]))
 
 
@@ -162,10 +164,10 @@ def _at(result: hold.Hold, value: float, joint: int) -> str:
 
 
 def _end(result: hold.Hold) -> str:
-    fastest = int(np.argmax(np.abs(result.speed)))
-    speed = position(abs(result.speed[fastest]), result.slides[fastest], 3)
-    text = f"At the end {result.joints[fastest]} is the fastest joint; it still moves by {speed}/s."
-    if abs(result.speed[fastest]) < _STILL:
+    fastest, joint = largest(np.abs(result.speed))
+    speed = position(fastest, result.slides[joint], 3)
+    text = f"At the end {result.joints[joint]} is the fastest joint; it still moves by {speed}/s."
+    if fastest < _STILL:
         text = "At the end everything stands still."
     if result.first_contact is None:
         return text + " The robot touched nothing."
@@ -183,8 +185,8 @@ def _end(result: hold.Hold) -> str:
 
 
 def _farthest(result: hold.Hold, gaps: Array) -> str:
-    joint = int(np.argmax(gaps))
-    return f"{result.joints[joint]}, by {_at(result, gaps[joint], joint)}"
+    gap, joint = largest(gaps)
+    return f"{result.joints[joint]}, by {_at(result, gap, joint)}"
 
 
 def _row(results: Mapping[str, hold.Hold], time: float) -> tuple[str, ...]:

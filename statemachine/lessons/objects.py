@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..comparison.text import count, duration
 from ..experiments import objects
 from ..page import Page, Question, Table, Text, Verdict
-from ._words import WORDS, count, differences, duration, page_of, sentence, typed, where
+from ._words import WORDS, differences, page_of, sentence, typed, where
 from .records import Session
 
 _CHEAP = 5  # times; a Data that is not cheaper than that is no bargain

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..comparison.text import count, degrees, duration, millimetres
 from ..experiments import questions
 from ..page import Page, Question, Text, Verdict
-from ._words import count, degrees, duration, millimetres, page_of, where
+from ._words import page_of, where
 from .records import Session
 
 _Results = Mapping[str, questions.Answers]

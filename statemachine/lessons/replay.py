@@ -7,20 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from ..comparison import largest
+from ..comparison.text import count, degrees, millimetres, vector
 from ..experiments import replay
 from ..page import Page, Question, Table, Text, Verdict
 from ._broken import BROKEN, course, growth, in_short, traces
-from ._words import (
-    count,
-    degrees,
-    differences,
-    millimetres,
-    page_of,
-    sentence,
-    typed,
-    vector,
-    where,
-)
+from ._words import differences, page_of, sentence, typed, where
 from .records import Session
 
 
@@ -260,12 +252,12 @@ def _finding(prefix: str, result: replay.Replay) -> Text | Verdict:
         )
     if result.identical:
         return Text(f"{prefix}The two runs are the same all the same: the break changed nothing.")
-    peak = int(np.argmax(result.difference))
+    peak, row = largest(result.difference)
     text = (
-        f"{prefix}not the same: the difference peaks at {result.difference[peak]:.1e} after step "
-        f"{peak} and is {result.difference[-1]:.1e} at the end"
+        f"{prefix}not the same: the difference peaks at {peak:.1e} after step "
+        f"{row} and is {result.difference[-1]:.1e} at the end"
     )
-    if result.difference[-1] < result.difference[peak] / 10:
+    if result.difference[-1] < peak / 10:
         text += ". A small divergence need not grow: here it shrinks again"
     if result.close:
         text += "; np.allclose would call the two runs equal, np.array_equal does not"

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..comparison.text import count, millimetres
 from ..experiments import reset
 from ..page import Page, Question, Table, Text, Verdict
-from ._words import count, differences, emulation, millimetres, page_of, sentence, typed, where
+from ._words import differences, emulation, page_of, sentence, typed, where
 from .records import Session
 
 
@@ -86,7 +87,9 @@ def _question(first: reset.Reset) -> Question | None:
     )
 
 
-def _contacts(number: int, first: reset.Scene, scenes: Mapping[str, reset.Scene]) -> Table:
+def _contacts(
+    number: int, first: reset.KeyframeScene, scenes: Mapping[str, reset.KeyframeScene]
+) -> Table:
     pairs = dict.fromkeys(pair for scene in scenes.values() for pair in scene.contacts)
     rows = [
         (pair, *(count(scene.contacts.get(pair, 0), "contact") for scene in scenes.values()))

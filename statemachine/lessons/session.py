@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..backends import backend_engine
+from ..calls import CallRecording, record, recorded_engines
 from ..interface import Model
 from ..page import Page
-from ..probes.calls import Recording, record
 from . import module
 from .records import Lesson, Session
 
@@ -26,13 +26,13 @@ class Taken:
     Attributes:
         result: What its module computed.
         code: As it was typed; printed: what it printed.
-        calls: What the engine was made to do by it, if that was to be recorded.
+        calls: What the engine was made to do by it, if that was to be recorded and can be.
     """
 
     result: Any
     code: str
     printed: str
-    calls: Recording | None = None
+    calls: CallRecording | None = None
 
 
 def take(
@@ -55,18 +55,16 @@ def take(
         name: What `load` was given as the model, if not the lesson's.
         menagerie: What it was given as that.
         progress: Told the fraction that is done.
-        calls: Whether to record what the code makes the engine do.
-
-    Raises:
-        UnknownNameError: The backend's calls were to be recorded, and cannot be.
+        calls: Whether to record what the code makes the engine do, if its room can tell.
     """
     values = {option.key: option.default for option in lesson.options} | dict(options or {})
     station = module(lesson.name)
     result = station.run(model, values, progress)
     code = station.code(values, load_line(name or lesson.model, backend, menagerie))
-    if not calls:
+    engine = backend_engine(backend) or backend
+    if not calls or engine not in recorded_engines():
         return Taken(result, code, play(code))
-    recording = record(code, backend_engine(backend) or backend)
+    recording = record(code, engine)
     return Taken(result, code, recording.printed, recording)
 
 

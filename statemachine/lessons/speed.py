@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..comparison.text import capital, count, duration
 from ..experiments import speed
 from ..experiments.in_turns import FEWEST, Ratio
 from ..page import Page, Question, Table, Text
-from ._words import count, differences, duration, page_of, sentence, typed
+from ._words import differences, page_of, sentence, typed
 from .records import Session
 
 
@@ -102,7 +103,7 @@ def _question(first: speed.Speed) -> Question:
         "how much longer does a Python loop with one call a step take than one call for all steps?",
         ("no longer, as far as can be told here", "longer, up to twice as long", "more than twice"),
         0 if not slower else 1 if first.loop.median <= 2 else 2,
-        _told(first)[0].upper() + _told(first)[1:],
+        capital(_told(first)),
     )
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..comparison.text import count, duration
 from ..errors import BadInputError
 from ..experiments import pace
 from ..page import Page, Question, Table, Text, Verdict
-from ._words import count, duration, page_of, typed, where
+from ._words import page_of, typed, where
 from .records import Session
 
 _BEFORE = "A simulation, a pause of the program, and the time on the simulator's own clock."

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..comparison.text import count, position
 from ..experiments import write
 from ..page import Page, Question, Table, Text, Verdict
-from ._words import count, emulation, page_of, position, sentence, typed, where
+from ._words import emulation, page_of, sentence, typed, where
 from .records import Session
 
 

@@ -50,7 +50,7 @@ def motion_of(trace: Trace, model: Model, times: Array) -> Motion:
     A trace without poses has them from its qpos, by MuJoCo's kinematics.
 
     Raises:
-        TraceError: The model has other bodies than the trace.
+        TraceError: The model has other bodies than the trace, or a pose is no number.
     """
     if tuple(model.body_names) != trace.header.bodies:
         raise TraceError(
@@ -59,7 +59,14 @@ def motion_of(trace: Trace, model: Model, times: Array) -> Motion:
         )
     rows = rows_at(trace, times)
     if "xpos" in trace and "xquat" in trace:
-        return Motion(model.path, trace["xpos"][rows], trace["xquat"][rows])
+        xpos, xquat = trace["xpos"][rows], trace["xquat"][rows]
+        strange = ~(np.isfinite(xpos).all((1, 2)) & np.isfinite(xquat).all((1, 2)))
+        if strange.any():
+            raise TraceError(
+                f"from {times[int(np.argmax(strange))]:.3g} s on the trace has no poses of the "
+                "bodies that are numbers: it cannot be drawn"
+            )
+        return Motion(model.path, xpos, xquat)
     reader = model if model.backend == "mujoco" else load(model.path)
     xpos, xquat = np.empty((len(rows), model.nbody, 3)), np.empty((len(rows), model.nbody, 4))
     with make_data(reader) as data:

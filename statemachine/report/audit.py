@@ -8,8 +8,9 @@ from ..audit import Audit, Audited
 from ..audit.falls import BOXES, FALL, STEPS
 from ..audit.findings import EACH_OTHER, Finding, worst
 from ..audit.restore import FORGETS, NO_CONTACTS, NOT_RESTORED, RESTORE, WITHOUT
+from ..comparison.text import count, milliseconds, rough
 from ..page import Block, Page, Table, Text, Verdict
-from .audit_words import cell, listed, number, sentences
+from .audit_words import cell, sentences
 
 _NOT_TRIED = "–"
 _OF_THE_STATE = (RESTORE, WITHOUT, FORGETS, NO_CONTACTS)
@@ -46,7 +47,9 @@ def page(results: Mapping[str, Audit]) -> Page:
     made = first.provenance
     of = [result.provenance for result in results.values()]
     engines = ", ".join(f"{each.backend} {each.versions[each.backend]}" for each in of)
-    origin = f"{made.model_file} on {engines}, {made.timestep * 1e3:g} ms a step, seed {made.seed}"
+    origin = (
+        f"{made.model_file} on {engines}, {milliseconds(made.timestep)} a step, seed {made.seed}"
+    )
     return Page("What exactly is the state?", origin, blocks)
 
 
@@ -59,9 +62,9 @@ def _of_one(one: Audited) -> list[Block]:
 def _places(one: Audited) -> Table:
     rows = []
     for seen in one.points:
-        measured = "at rest" if seen.speed < _AT_REST else f"moves at {number(seen.speed)}"
-        measured += f", {_count(seen.contacts, 'contact')}"
-        measured += f", {_count(seen.limits, 'limit')}" if seen.limits else ""
+        measured = "at rest" if seen.speed < _AT_REST else f"moves at {rough(seen.speed)}"
+        measured += f", {count(seen.contacts, 'contact', zero='no')}"
+        measured += f", {count(seen.limits, 'limit')}" if seen.limits else ""
         rows.append((seen.point, seen.how, f"{seen.time:.3g} s", measured))
     return Table(
         ("save point", "how to get there", "after", "measured there"),
@@ -69,10 +72,6 @@ def _places(one: Audited) -> Table:
         title=f"{one.name}: where runs are saved (speeds in rad/s or m/s)",
         words=frozenset({0, 1, 3}),
     )
-
-
-def _count(number: int, thing: str) -> str:
-    return f"{number or 'no'} {thing}" + ("" if number == 1 else "s")
 
 
 def _candidates(one: Audited) -> dict[str, list[Finding]]:
@@ -202,7 +201,7 @@ def _fallen(one: Audited) -> list[Text]:
 
 
 def _broken(one: Audited, of: Sequence[Finding]) -> str:
-    off, where = worst([each.gap for each in of]), listed([each.point for each in of])
+    off, where = worst([each.gap for each in of]), ", ".join([each.point for each in of])
     return (
         f"{one.name}: {of[0].case}, compared with {of[0].into}: differs at {where}, from step "
         f"{off.first}, by {cell(off)} at the worst"

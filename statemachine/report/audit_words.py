@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 from ..audit import Audited
@@ -10,6 +9,7 @@ from ..audit.conclusions import Conclusion, Missing
 from ..audit.findings import Gap, worst
 from ..audit.look import LOOK
 from ..audit.repeat import AGAIN
+from ..comparison.text import rough
 
 _SAME = "same"
 
@@ -30,28 +30,28 @@ def sentences(one: Audited) -> list[str]:
         )
     said += _what_breaks(one.name, of, points)
     if of.not_read_back:
-        where = [f"{name} (at {listed(at)})" for name, at in of.not_read_back.items()]
+        where = [f"{name} (at {', '.join(at)})" for name, at in of.not_read_back.items()]
         said.append(
             f"{one.name}: before any step, not every byte reads back as it was saved: "
-            f"{listed(where)}."
+            f"{', '.join(where)}."
         )
     if of.in_contact:
         sizes = [of.touching[point] for point in of.in_contact]
         said.append(
             f"{one.name}: what cannot be written acts through contacts: at "
-            f"{listed(of.in_contact)} the future is off by {cell(worst([s for s, _ in sizes]))} "
+            f"{', '.join(of.in_contact)} the future is off by {cell(worst([s for s, _ in sizes]))} "
             f"as it stands, and by {cell(worst([off for _, off in sizes]))} where the contacts "
             "are switched off."
         )
     for what in dict.fromkeys(of.forgotten.values()):
         ways = [way for way, forgotten in of.forgotten.items() if forgotten == what]
         if what:
-            said.append(f"{one.name}: not brought back by {listed(ways)}: {listed(what)}.")
+            said.append(f"{one.name}: not brought back by {', '.join(ways)}: {', '.join(what)}.")
     agree = [name for name in of.agree if name not in of.suffice]
     if agree:
         said.append(
             f"{one.name}: all restores of one state have one future, though not that of the "
-            f"run: {listed(agree)}."
+            f"run: {', '.join(agree)}."
         )
     for case in dict.fromkeys(each.case for each in one.findings if each.experiment == LOOK):
         off = [e for e in one.findings if (e.experiment, e.case) == (LOOK, case)]
@@ -60,8 +60,8 @@ def sentences(one: Audited) -> list[str]:
             most = worst([each.gap for each in differs])
             said.append(
                 f"{one.name}: {case} before each step changes what follows, at "
-                f"{listed([each.point for each in differs])}: a body or joint by up to "
-                f"{number(most.length * 1e3)} mm and {number(math.degrees(most.angle))}°."
+                f"{', '.join([each.point for each in differs])}: a body or joint by up to "
+                f"{rough(most.length, 'm')} and {rough(most.angle, 'rad')}."
             )
     again = [each for each in one.findings if each.experiment == AGAIN]
     if not of.suffice and again and all(each.gap.exact for each in again):
@@ -79,9 +79,9 @@ def _what_breaks(name: str, of: Conclusion, points: Sequence[str]) -> list[str]:
     itself = [each for each in of.missing if each.itself]
     others = [each for each in of.missing if not each.itself]
     alone = {None: "", True: " These alone suffice, tried.", False: " These alone do not suffice."}
-    text = f"{name}: back in the run itself it needs {listed(_with(itself, points))}"
+    text = f"{name}: back in the run itself it needs {', '.join(_with(itself, points))}"
     if others:
-        text += f"; in one with another past also {listed([each.field for each in others])}"
+        text += f"; in one with another past also {', '.join([each.field for each in others])}"
     lines.append(f"{text}.{alone[of.smallest]}")
     lines.append(
         f"{name}: what breaks a smaller one: "
@@ -93,7 +93,7 @@ def _what_breaks(name: str, of: Conclusion, points: Sequence[str]) -> list[str]:
         + "."
     )
     if of.idle:
-        lines.append(f"{name}: without {listed(of.idle)} nothing differed.")
+        lines.append(f"{name}: without {', '.join(of.idle)} nothing differed.")
     return lines
 
 
@@ -104,9 +104,9 @@ def _with(missing: Sequence[Missing], points: Sequence[str]) -> list[str]:
         at = each.itself
         few = len(at) <= len(points) / 2
         where = (
-            f"only at {listed(at)}"
+            f"only at {', '.join(at)}"
             if few
-            else "not at " + listed([point for point in points if point not in at])
+            else "not at " + ", ".join(p for p in points if p not in at)
         )
         found.append(each.field if len(at) == len(points) else f"{each.field} ({where})")
     return found
@@ -116,11 +116,6 @@ def _all(points: Sequence[str]) -> str:
     return f"all of {len(points)} save points" if len(points) > 1 else "the one save point"
 
 
-def listed(words: Sequence[str]) -> str:
-    """Words in a row."""
-    return ", ".join(words)
-
-
 def cell(off: Gap) -> str:
     """The larger of angle and length, or that every byte is the same."""
     if off.exact:
@@ -128,14 +123,5 @@ def cell(off: Gap) -> str:
     if not off.size:  # of a velocity, or a 0 that became -0
         return "bytes"
     if off.angle >= off.length:
-        return f"{number(math.degrees(off.angle))}°"
-    return f"{number(off.length * 1e3)} mm"
-
-
-def number(value: float) -> str:
-    """A size: two digits, or its order of magnitude where it is tiny."""
-    if not math.isfinite(value):
-        return "beyond all"
-    if value >= 100:
-        return f"{value:.0f}"
-    return f"{value:.2g}" if value >= 1e-3 or value == 0 else f"{value:.0e}"
+        return rough(off.angle, "rad")
+    return rough(off.length, "m")

@@ -5,22 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby, zip_longest
 
+from ..calls import Call, CallRecording, Statement
+from ..engines import part
+from ..engines.call_watch import CallWords
 from ..interface import DERIVED
 from ..page import Block, Code, Table, Text
-from ..probes.calls import Call, Recording, Statement
 
 _MOST_NAMES = 8  # of what a call changed
 _MOST_ROWS = 6  # of the calls on one thing, before those that changed nothing share one
 _NOTHING = "–"
-# What the recorder looks at.
-_SHOWN = {
-    "mujoco": "the arrays, counts and options of MjData and MjModel",
-    "pybullet": "what its getters tell without computing anything anew",
-}
 _NO_OBJECT = "no object"
 
 
-def blocks(recordings: Mapping[str, Recording]) -> list[Block]:
+def blocks(recordings: Mapping[str, CallRecording]) -> list[Block]:
     """Blocks for the recordings of one code, by engine; the code's backend may differ."""
     found: list[Block] = [_heading(recordings)]
     for statements in zip_longest(*(each.statements for each in recordings.values())):
@@ -43,15 +40,20 @@ def blocks(recordings: Mapping[str, Recording]) -> list[Block]:
     return [*found, *_legend(recordings)]
 
 
-def _prefix(name: str, recordings: Mapping[str, Recording]) -> str:
+def not_asked(backend: str) -> Text:
+    """What is said of a backend whose engine has no room that tells of its calls."""
+    return Text(f"{backend}: not asked which of its own functions it ran.")
+
+
+def _prefix(name: str, recordings: Mapping[str, CallRecording]) -> str:
     return f"{name}: " if len(recordings) > 1 else ""
 
 
-def _heading(recordings: Mapping[str, Recording]) -> Text:
+def _heading(recordings: Mapping[str, CallRecording]) -> Text:
     engines = " and ".join(f"{name} {each.version}" for name, each in recordings.items())
     looks = "; ".join(
-        f"{_prefix(name, recordings)}{_SHOWN.get(name, 'what the recorder sees of it')}"
-        for name in recordings
+        f"{_prefix(name, recordings)}{_words(recording.engine).shown}"
+        for name, recording in recordings.items()
     )
     return Text(
         f"The engine's own words, recorded from this run on {engines}: under each line, the "
@@ -135,52 +137,31 @@ def _names(changed: Sequence[str]) -> str:
     return f"{', '.join(changed[:_MOST_NAMES])} and {len(changed) - _MOST_NAMES} more"
 
 
-def _legend(recordings: Mapping[str, Recording]) -> Iterator[Text]:
+def _words(engine: str) -> CallWords:
+    own = part(engine, "calls")
+    assert own is not None, engine
+    return own.WORDS
+
+
+def _legend(recordings: Mapping[str, CallRecording]) -> Iterator[Text]:
     """What the roles are that appear, with what this run says of them."""
-    calls = [
-        call
-        for recording in recordings.values()
-        for statement in recording.statements
-        for call in statement.calls
-    ]
-    stepped = {
-        role: sum(
-            call.count for call in calls if role in call.on and call.function == "stepSimulation"
-        )
-        for role in ("the still copy", "the look-ahead")
-    }
-    if any("the still copy" in call.on for call in calls):
-        yield Text(
-            "The still copy is the robot with its true inertias, in a world of its own; the one "
-            "that is stepped carries extra inertia for its servos. The interface asks the copy for "
-            "poses, the mass matrix and the bias. In this run it was "
-            f"{_times(stepped['the still copy'])}."
-        )
-    if any("the look-ahead" in call.on for call in calls):
-        yield Text(
-            "The look-ahead is another copy. It is put where your data is and takes one step, so "
-            "that contacts and forces can be read after forward and no time passes in yours. In "
-            f"this run it was {_times(stepped['the look-ahead'])}."
-        )
-    if "pybullet" in recordings:
-        yield Text(
-            "On pybullet a Data's arrays are the interface's own: it copies between them and the "
-            "engine's hidden world, which is outside the engine's functions."
-        )
-    helpers = [
-        call
-        for name, recording in recordings.items()
-        for statement in recording.statements
-        for call in statement.calls
-        if call.engine != name
-    ]
-    if helpers:
-        steps = sum(call.count for call in helpers if call.function.startswith("mj_step"))
-        yield Text(
-            "On pybullet the interface uses MuJoCo as a library: its parser reads the model's "
-            "file, and it solves small linear systems. Its own step was "
-            f"{_times(steps, 'called')} there."
-        )
+    for recording in recordings.values():
+        words = _words(recording.engine)
+        calls = [call for statement in recording.statements for call in statement.calls]
+        for role, text in words.roles.items():
+            own = [call for call in calls if role in call.on]
+            if own:
+                yield Text(text.format(_times(_steps(own, words.step))))
+        if words.note:
+            yield Text(words.note)
+        for engine, text in words.helpers.items():
+            own = [call for call in calls if call.engine == engine]
+            if own:
+                yield Text(text.format(_times(_steps(own, _words(engine).step), "called")))
+
+
+def _steps(calls: Sequence[Call], name: str) -> int:
+    return sum(call.count for call in calls if call.function.startswith(name))
 
 
 def _times(count: int, verb: str = "stepped") -> str:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..compare import Agreement, Comparison, Contact, Touch, Witness
+from ..comparison.text import few, figure, milliseconds, quantity, sentence, short_time
 from ..page import Page, Table, Text, Verdict
-from .figures_of import pressed, quantity, short_time
 
 # Of the promises that a backend may emulate, those that move the arm.
 _PHYSICS = ("position servo", "armature", "joint damping", "dry friction", "joint limits")
@@ -34,7 +34,7 @@ def page(
     blocks: list[Any] = []
     if says:
         blocks.append(Text(says))
-    blocks += [Text(_sentence(line)) for line in (*said, *comparison.notes)]
+    blocks += [Text(sentence(line)) for line in (*said, *comparison.notes)]
     blocks.append(
         Table(
             ("quantity", "max", "at", "RMS", "settled", "from", "verdict"),
@@ -91,17 +91,16 @@ def page(
 
 
 def _row(found: Agreement) -> tuple[str, ...]:
-    kind = found.kind
-    if kind == "contact":
-        gap = found.note or quantity(found.max, kind)
+    if found.kind == "contact":
+        gap = found.note or quantity(found.max, found.unit)
         return (found.name, gap, f"{found.at:.3f}", "", "", "", _WORDS[found.verdict])
     since = "" if found.since is None else f"{found.since:.3f}"
     return (
         found.name,
-        quantity(found.max, kind),
+        quantity(found.max, found.unit),
         f"{found.at:.3f}",
-        quantity(found.rms, kind),
-        quantity(found.settled, kind),
+        quantity(found.rms, found.unit),
+        quantity(found.settled, found.unit),
         since,
         _WORDS[found.verdict],
     )
@@ -111,7 +110,7 @@ def _reasons(comparison: Comparison) -> list[tuple[str, str, str]]:
     """One row for each tolerance: who shares it, how much, why."""
     shared: dict[tuple[str, str], list[str]] = {}
     for found in comparison.agreements:
-        key = (quantity(found.tolerance, found.kind), found.reason)
+        key = (quantity(found.tolerance, found.unit), found.reason)
         shared.setdefault(key, []).append(found.kind)
     return [
         (", ".join(dict.fromkeys(_PLURAL[kind] for kind in kinds)), value, reason)
@@ -144,7 +143,7 @@ def _summary(comparison: Comparison) -> str:
         if worst is not None:
             text += (
                 f"; nearest to its tolerance comes {worst.name}, with "
-                f"{quantity(worst.max, worst.kind)} of {quantity(worst.tolerance, worst.kind)}"
+                f"{quantity(worst.max, worst.unit)} of {quantity(worst.tolerance, worst.unit)}"
             )
         return text + "."
     apart = [found.since for found in comparison.agreements if found.since is not None]
@@ -152,8 +151,7 @@ def _summary(comparison: Comparison) -> str:
     if apart:
         first = min(apart)
         names = [found.name for found in comparison.agreements if found.since == first]
-        text += f" They part at {short_time(first)}: first {', '.join(names[:3])}"
-        text += f" and {len(names) - 3} more." if len(names) > 3 else "."
+        text += f" They part at {short_time(first)}: first {few(names)}."
     return text
 
 
@@ -167,7 +165,8 @@ def _end(contact: Contact, backend: str) -> str:
     if contact.last is None:
         return f"on {backend} they never touch"
     if contact.ends:
-        return f"on {backend} in touch at the end, {pressed(contact.force, contact.total)}"
+        force, total = figure(contact.force), figure(contact.total)
+        return f"on {backend} in touch at the end, pressed with {force} N (with friction {total} N)"
     return f"on {backend} last in touch at {short_time(contact.last)}"
 
 
@@ -182,8 +181,7 @@ def _verdict(comparison: Comparison) -> str:
     for verdict, word in (("differs", "differ"), ("settles", "settle")):
         names = [each.name for each in found if each.verdict == verdict]
         if names:
-            few = "; ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
-            parts.append(f"{len(names)} {word}: {few}")
+            parts.append(f"{len(names)} {word}: {few(names, 4, '; ')}")
     return f"not within tolerance always: of {len(found)} quantities {'. '.join(parts)}"
 
 
@@ -191,13 +189,8 @@ def _origin(comparison: Comparison) -> str:
     words = []
     for side in (comparison.one, comparison.two):
         seed = side.provenance.seed
-        text = f"{side.label}, {1000 * side.timestep:.4g} ms"
+        text = f"{side.label}, {milliseconds(side.timestep)}"
         words.append(text + (f", seed {seed}" if seed is not None else ""))
     file = comparison.one.provenance.model_file
     digest = comparison.one.provenance.model_sha256[:8]
     return f"{file} ({digest}); {'; '.join(words)}"
-
-
-def _sentence(line: str) -> str:
-    text = line[:1].upper() + line[1:]
-    return text if text.endswith(".") else text + "."

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
+from ..comparison.text import reading, significant
+from ..conventions import Answered, Conventions
+from ..conventions.phrasebook import CONCEPTS, Phrasebook
+from ..engines.measured import Measurement
 from ..page import Block, Page, Table, Text, Verdict
-from ..probes.conventions import Answered, Conventions, Figure
-from ..probes.phrasebook import CONCEPTS, Calls
 
 _ZERO = 1e-12
-# Units as a reader has them; a result has SI.
-_SHOWN = {"m": (1e3, "mm"), "s": (1e3, "ms"), "rad": (180 / math.pi, "°")}
+_NOT_ASKED = "not asked"
 
 
 def page(result: Conventions) -> Page:
@@ -28,14 +28,15 @@ def page(result: Conventions) -> Page:
     return Page("What the engines take for granted", _origin(result.versions), blocks)
 
 
-def calls_page(result: Calls) -> Page:
+def calls_page(result: Phrasebook) -> Page:
     """One table for each concept, and whether all of its calls did what they should."""
     blocks: list[Block] = []
     for concept in CONCEPTS:
         rows = []
         for engine, calls in result.engines.items():
-            call = next(each for each in calls if each.concept == concept)
-            rows.append((engine, "✓" if call.works else "✗", call.code))
+            call = next((each for each in calls if each.concept == concept), None)
+            mark = "✓" if call and call.works else "✗" if call else ""
+            rows.append((engine, mark, call.code if call else _NOT_ASKED))
         blocks.append(Table(("", "", "what to type"), rows, concept, frozenset({0, 1, 2})))
     every = [(engine, call) for engine, calls in result.engines.items() for call in calls]
     wrong = [(engine, call) for engine, call in every if not call.works]
@@ -46,13 +47,16 @@ def calls_page(result: Calls) -> Page:
 
 
 def _origin(versions: Mapping[str, str]) -> str:
-    return ", ".join(f"{engine} {version}" for engine, version in versions.items())
+    return ", ".join(f"{engine} {version}".strip() for engine, version in versions.items())
 
 
 def _table(answered: Answered) -> Table:
-    parts = any(finding.of for each in answered.findings.values() for finding in each)
+    parts = any(finding.of for each in answered.findings.values() for finding in each or ())
     rows = []
     for engine, findings in answered.findings.items():
+        if findings is None:
+            rows.append((engine, *([""] if parts else []), _NOT_ASKED, ""))
+            continue
         for k, finding in enumerate(findings):
             measured = ", ".join(_text(figure) for figure in finding.figures)
             part = (finding.of,) if parts else ()
@@ -64,19 +68,18 @@ def _table(answered: Answered) -> Table:
 
 
 def _number(value: float) -> str:
-    return f"{value + 0:.{3 if abs(value) >= 1e-3 else 2}g}"
+    return significant(value, 3 if abs(value) >= 1e-3 else 2)
 
 
-def _text(figure: Figure) -> str:
+def _text(figure: Measurement) -> str:
     values = figure.value if isinstance(figure.value, tuple) else (figure.value,)
     numbers = [each for each in values if not isinstance(each, str)]
     most = max(map(abs, numbers), default=0.0)
-    factor, unit = _SHOWN.get(figure.unit, (1, figure.unit))
+    factor, unit = reading(figure.unit)
     words = [
         # Beside a large number, one that is only rounding is nothing.
         each if isinstance(each, str) else _number(factor * each if abs(each) > _ZERO * most else 0)
         for each in values
     ]
     shown = (" " if numbers else ", ").join(words) or "nothing"
-    gap = "" if unit in ("", "°") else " "
-    return f"{figure.name} {shown}{gap}{unit}".strip()
+    return f"{figure.name} {shown}{unit}".strip()

@@ -31,7 +31,9 @@ def svg(picture: Picture) -> str:
             "pictures need matplotlib: pip install 'statemachine-sim[docs]'", engine="matplotlib"
         ) from error
     # Text as paths would be twice as large; without a salt and a date each run differs.
-    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "statemachine"}):
+    with matplotlib.rc_context(
+        {"svg.fonttype": "none", "svg.hashsalt": "statemachine", "text.parse_math": False}
+    ):
         figure = Figure(figsize=_SIZES[type(picture)](picture), facecolor=_PAPER)
         axes = figure.add_subplot()
         cast("Callable[[Any, Any], None]", _DRAW[type(picture)])(axes, picture)

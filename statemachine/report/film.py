@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from ..compare import Comparison, Series, series
+from ..comparison.text import reading
 from ..errors import BadInputError, MissingEngineError
 from ..experiments._common import Progress, silent
 from ..interface import Model
 from ..rendering import Renderer, Timing, frames, renderer_here, timing_of
 from ..rendering.pictures import check_size
 from ..traces import Trace
-from .figures_of import scale_of
 from .film_files import SUFFIXES, write_mp4, write_webp
 from .film_overlay import Overlay, Strip
 from .plot_panels import side_labels
@@ -146,7 +146,7 @@ def _strip(one: Trace, two: Trace | None, comparison: Comparison | None) -> Stri
 
 
 def _strip_of(curve: Series, comparison: Comparison | None) -> Strip:
-    scale, unit = scale_of(curve.kind)
+    scale, unit = reading(curve.unit)
     found = comparison.agreements if comparison is not None else ()
     allowed = next(
         (agreement.tolerance for agreement in found if agreement.name == curve.name), None

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 from ..compare.models import Agreement, Compared, Difference, Side
 from ..compare.models.ledger import SUBJECTS, Value
+from ..comparison.text import after, listed, reading, rounded, sentence, significant
 from ..page import Block, Page, Table, Text, Verdict
 
 _ROWS = 8  # of a table, unless all are asked for
-# Units as a reader has them, of differences; a result has SI.
 _MOMENT = "of a part"  # kg m², which are of another size than those of a joint
+# Units as a reader has them, of differences; a result has SI.
 _APART = {
-    "rad": (180 / math.pi, "°"),
-    "m": (1e3, "mm"),
-    "m³": (1e6, "cm³"),
-    _MOMENT: (1e6, "kg mm²"),
+    "rad": reading("rad"),
+    "m": reading("m"),
+    "m³": (1e6, " cm³"),
+    _MOMENT: (1e6, " kg mm²"),
 }
 # ... and of the figures themselves.
 _SHOWN = {unit: _APART[unit] for unit in ("m", "m³", _MOMENT)}
@@ -68,7 +68,7 @@ def page(result: Compared, everything: bool = False) -> Page:
         *(f"B: {note}" for note in result.two.notes),
         *result.found.notes,
     ]
-    blocks += [Text(f"{note[0].upper()}{note[1:]}.") for note in notes]
+    blocks += [Text(sentence(note)) for note in notes]
     origin = ", ".join(f"{name} {version}" for name, version in result.versions.items())
     names = [
         f"{side.file} on {side.reader.split()[0]}" if side.format == "engine" else side.file
@@ -88,10 +88,8 @@ def _sides(result: Compared) -> Text:
             f"{side.file} ({how}; {side.links} links, {side.joints} joints, {side.shapes} shapes)"
         )
 
-    weigh = [f"{mass:.4g} kg" for mass in result.found.mass]
-    alike = (
-        "Both weigh " + weigh[0] if weigh[0] == weigh[1] else f"They weigh {' and '.join(weigh)}"
-    )
+    weigh = [rounded(mass, "kg", 4) for mass in result.found.mass]
+    alike = f"Both weigh {weigh[0]}" if weigh[0] == weigh[1] else f"They weigh {listed(weigh)}"
     return Text(f"A is {said(result.one)}. B is {said(result.two)}. {alike}.")
 
 
@@ -176,20 +174,14 @@ def _value(value: Value, unit: str) -> str:
     if isinstance(value, str):
         return value
     if isinstance(value, tuple):
-        factor, shown = _SHOWN.get(unit, (1.0, "" if len(value) == 3 else unit))
-        words = " ".join(_digits(each * factor) for each in value)
-        return f"{words} {shown}".strip()
+        factor, shown = _SHOWN.get(unit, (1.0, "" if len(value) == 3 else f" {unit}"))
+        return (" ".join(significant(each * factor) for each in value) + shown).strip()
     return _number(value, unit, _SHOWN)
 
 
 def _number(value: float, unit: str, units: dict[str, tuple[float, str]]) -> str:
-    factor, shown = units.get(unit, (1.0, unit))
-    gap = "" if shown in ("", "°") else " "
-    return f"{_digits(value * factor)}{gap}{shown}"
-
-
-def _digits(value: float) -> str:
-    return f"{value + 0.0:.4g}"
+    factor, shown = units.get(unit, (1.0, after(unit)))
+    return f"{significant(value * factor)}{shown}"
 
 
 def _equal(result: Compared) -> Iterator[Block]:
@@ -206,14 +198,14 @@ def _equal(result: Compared) -> Iterator[Block]:
     if posed.joints:
         yield Text(
             f"The same positions of {posed.joints} joints put every link within "
-            f"{_tiny(posed.distance * 1e3)} mm and {_tiny(math.degrees(posed.angle))}° of the same "
+            f"{_tiny(posed.distance, 'm')} and {_tiny(posed.angle, 'rad')} of the same "
             f"pose, at {posed.poses} poses (seed {posed.seed})"
             + (f"; {posed.link} is the furthest off." if posed.distance > 1e-5 else ".")
         )
 
 
-def _tiny(value: float) -> str:
-    return f"{value:.4g}" if value > 1e-2 else f"{value:.1g}"
+def _tiny(value: float, unit: str) -> str:
+    return rounded(value, unit, 4 if value * reading(unit)[0] > 1e-2 else 1)
 
 
 def _agreement(group: Sequence[Agreement]) -> list[str]:
@@ -221,9 +213,9 @@ def _agreement(group: Sequence[Agreement]) -> list[str]:
     subject, worst = group[0].subject, []
     for each in group:
         of = _MOMENT if subject == "inertia" else each.unit
-        factor, unit = _APART.get(of, (1.0, of))
+        factor, unit = _APART.get(of, (1.0, after(of)))
         if each.worst:
-            worst.append(f"{each.worst * factor:.1e} {unit}".replace(" °", "°").strip())
+            worst.append(f"{each.worst * factor:.1e}{unit}")
     count, digits = sum(each.count for each in group), min(each.digits for each in group)
     name = SUBJECTS[subject].partition(":")[0]
     return [name, str(count), ", ".join(worst) or "0", "all" if digits == 17 else str(digits)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..comparison.text import count
 from ..grading.mutants.run import Examination, Failure, Trial
 from ..page import Block, Page, Table, Text, Verdict
 
@@ -12,7 +13,7 @@ def page(found: Examination) -> Page:
     """The examination as a page."""
     return Page(
         f"The tests of {found.file}",
-        f"{_count(len(found.tests), 'test')}, on {found.backend} {found.engine_version}",
+        f"{count(len(found.tests), 'test')}, on {found.backend} {found.engine_version}",
         _unhealthy(found) if found.failures else _trials(found),
     )
 
@@ -37,7 +38,7 @@ def _trials(found: Examination) -> list[Block]:
     if found.idle and len(found.trials) > 1:
         idle = [Text(f"Caught nothing here: {', '.join(found.idle)}.")]
     verdict = Verdict(
-        f"{found.caught} of {_count(len(found.trials), 'fault')} caught", not found.survivors
+        f"{found.caught} of {count(len(found.trials), 'fault')} caught", not found.survivors
     )
     return [table, *hints, *idle, verdict]
 
@@ -57,7 +58,3 @@ def _told(failure: Failure) -> str:
 
 def _cut(text: str, most: int) -> str:
     return text if len(text) <= most else text[: most - 1] + "…"
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -11,7 +11,7 @@ from ..errors import BadInputError, MissingEngineError
 from ..traces import Trace
 from ..traces.whole import replace_file
 from . import plot_panels
-from .plot_panels import Figure
+from .plot_panels import Plot
 
 SUFFIXES = (".svg", ".png", ".pdf")
 # The same figures give the same bytes: no date, no random names, no settings of the user's.
@@ -27,6 +27,7 @@ _SETTINGS = {
     "font.family": ["DejaVu Sans", "sans-serif"],
     "font.size": 6.5,
     "axes.linewidth": 0.5,
+    "text.parse_math": False,  # a name may have a $ in it
     "axes.unicode_minus": True,
     "path.simplify": True,
 }
@@ -41,7 +42,7 @@ def check_suffix(path: Path) -> None:
     _matplotlib()
 
 
-def plot(one: Trace, two: Trace, comparison: Comparison, tip: str | None = None) -> Figure:
+def plot(one: Trace, two: Trace, comparison: Comparison, tip: str | None = None) -> Plot:
     """The figure of two traces and their comparison.
 
     Args:
@@ -53,12 +54,12 @@ def plot(one: Trace, two: Trace, comparison: Comparison, tip: str | None = None)
     return plot_panels.of_comparison(one, two, comparison, tip)
 
 
-def plot_trace(trace: Trace) -> Figure:
+def plot_trace(trace: Trace) -> Plot:
     """The figure of one trace: its joints and what they were told, energy and touches."""
     return plot_panels.of_trace(trace)
 
 
-def drawn(figure: Figure, form: str) -> bytes:
+def drawn(figure: Plot, form: str) -> bytes:
     """A figure as svg, png or pdf; the same figure gives the same bytes.
 
     Raises:
@@ -75,7 +76,7 @@ def drawn(figure: Figure, form: str) -> bytes:
     return out.getvalue()
 
 
-def write_plot(figure: Figure, path: Path) -> int:
+def write_plot(figure: Plot, path: Path) -> int:
     """Write a figure to a file .svg, .png or .pdf, whole or not at all; its bytes.
 
     Raises:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .log_axis import LogAxis
-from .plot_panels import Figure, Panel
+from .plot_panels import Panel, Plot
 
 # A colour-blind-safe pair, pale and broad under dark and dashed: told apart in grey too.
 STYLES: tuple[dict[str, Any], ...] = (
@@ -29,7 +29,7 @@ _POWERS = 2  # that its axis names, at most
 _BELOW = "#ececec"  # behind the level of zero
 
 
-def draw(figure: Figure) -> Any:
+def draw(figure: Plot) -> Any:
     """The figure as matplotlib's, 80 mm wide."""
     from matplotlib.figure import Figure as Canvas
 
@@ -101,14 +101,14 @@ def _tall(row: Sequence[Panel], times: bool) -> float:
     return _TITLE + _VALUES + lower + (4.6 if times else 2.2)
 
 
-def _legend_rows(figure: Figure) -> list[list[str]]:
+def _legend_rows(figure: Plot) -> list[list[str]]:
     """Labels in one row if there is room, else each in its own."""
     if sum(_SAMPLE + _LETTER * len(label) + 5 for label in figure.labels) <= _WIDTH:
         return [list(figure.labels)]
     return [[label] for label in figure.labels]
 
 
-def _head(place: _Places, figure: Figure) -> None:
+def _head(place: _Places, figure: Plot) -> None:
     from matplotlib.lines import Line2D
 
     place.text(_RIGHT, 1.2, figure.title, size=8, weight="bold", color=_INK)
@@ -130,7 +130,7 @@ def _head(place: _Places, figure: Figure) -> None:
 
 
 def _panel(
-    place: _Places, figure: Figure, panel: Panel, column: int, y: float, times: bool, named: bool
+    place: _Places, figure: Plot, panel: Panel, column: int, y: float, times: bool, named: bool
 ) -> None:
     half = (_WIDTH - _LEFT - _RIGHT - _BETWEEN) / 2
     width = _WIDTH - _LEFT - _RIGHT if panel.wide else half
@@ -202,7 +202,7 @@ def _apart(axes: Any, panel: Panel) -> None:
     axes.get_yticklabels()[-1].set_verticalalignment("top")  # above it is another panel's label
 
 
-def _time_axis(axes: Any, figure: Figure) -> None:
+def _time_axis(axes: Any, figure: Plot) -> None:
     from matplotlib.ticker import MaxNLocator
 
     axes.set_xlim(0, max(figure.seconds, 1e-9))
@@ -211,7 +211,7 @@ def _time_axis(axes: Any, figure: Figure) -> None:
         axes.axvline(figure.part, color=_GREY, linewidth=0.6, zorder=0)
 
 
-def _touches(place: _Places, figure: Figure, y: float) -> None:
+def _touches(place: _Places, figure: Plot, y: float) -> None:
     """Bars while two bodies touch: above of the first side, below, hatched, of the second."""
     place.text(_LEFT - 6.5, y, "who touches when", size=6.2, color=_INK)
     count, names = len(figure.touches), max(len(touch.name) for touch in figure.touches)

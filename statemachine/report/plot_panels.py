@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ..compare import Agreement, Comparison, Series, default_tip, series
 from ..compare.tolerances import COUNT
+from ..comparison.text import few, milliseconds, quantity, reading, short_time
 from ..interface import Array, JointType
 from ..traces import Header, Trace
-from .figures_of import quantity, scale_of, short_time
 
 MOST = 16  # panels of joints and bodies
 _MOST_PAIRS = 8
@@ -44,7 +44,7 @@ class Panel:
 
 
 @dataclass(frozen=True, eq=False)
-class Touch:
+class TouchSpans:
     """When two bodies touch: spans of time [s] on each side."""
 
     name: str
@@ -52,7 +52,7 @@ class Touch:
 
 
 @dataclass(frozen=True, eq=False)
-class Figure:
+class Plot:
     """All of a figure.
 
     Attributes:
@@ -70,13 +70,13 @@ class Figure:
     lines: Sequence[str]
     labels: Sequence[str]
     panels: Sequence[Panel]
-    touches: Sequence[Touch]
+    touches: Sequence[TouchSpans]
     seconds: float
     part: float | None
     notes: Sequence[str]
 
 
-def of_comparison(one: Trace, two: Trace, comparison: Comparison, tip: str | None = None) -> Figure:
+def of_comparison(one: Trace, two: Trace, comparison: Comparison, tip: str | None = None) -> Plot:
     """The figure of two traces: fingertip first, then joints, bodies, energy, touches."""
     found = {agreement.name: agreement for agreement in comparison.agreements}
     curves = series(one, two, tip)
@@ -95,11 +95,10 @@ def of_comparison(one: Trace, two: Trace, comparison: Comparison, tip: str | Non
     ]
     if first is not None:
         names = [agreement.name for agreement in parted if agreement.since == first]
-        more = f" and {len(names) - 1} more" if len(names) > 1 else ""
-        notes.append(f"Grey line: they part at {short_time(first)}, first {names[0]}{more}.")
+        notes.append(f"Grey line: they part at {short_time(first)}, first {few(names, 1)}.")
     if len(shown) > len(kept):
         notes.append(f"{len(shown) - len(kept)} further joints and bodies differ less.")
-    return Figure(
+    return Plot(
         title=one.header.experiment,
         lines=_origin(one, two),
         labels=side_labels(one, two),
@@ -111,7 +110,7 @@ def of_comparison(one: Trace, two: Trace, comparison: Comparison, tip: str | Non
     )
 
 
-def of_trace(trace: Trace) -> Figure:
+def of_trace(trace: Trace) -> Plot:
     """The figure of one trace: joints and what they were told, fingertip, energy, touches."""
     header, time = trace.header, trace.time - trace.time[0]
     told = {joint: k for k, joint in enumerate(header.actuator_jntid) if joint >= 0}
@@ -128,7 +127,7 @@ def of_trace(trace: Trace) -> Figure:
     ]
     for joint in joints[:MOST]:
         hinge = header.jnt_type[joint] == JointType.HINGE
-        scale, unit = scale_of("joint" if hinge else "slide")
+        scale, unit = reading("rad" if hinge else "m")
         # What the robot itself would not notice is not blown up to the height of a panel.
         small = scale * COUNT if hinge else None
         curves = [(0, (time, scale * trace.qpos[:, header.jnt_qposadr[joint]]))]
@@ -141,7 +140,7 @@ def of_trace(trace: Trace) -> Figure:
     notes = ["Dashed: the command."] if told else []
     if len(joints) > MOST:
         notes.append(f"{len(joints) - MOST} further joints are not shown.")
-    return Figure(
+    return Plot(
         title=header.experiment,
         lines=_origin(trace),
         labels=[header.label, "the command"] if told else [header.label],
@@ -154,7 +153,7 @@ def of_trace(trace: Trace) -> Figure:
 
 
 def _panel(curve: Series, found: Agreement | None, wide: bool = False) -> Panel:
-    scale, unit = scale_of(curve.kind)
+    scale, unit = reading(curve.unit)
     values = [(k, (curve.time, scale * side)) for k, side in enumerate(_values(curve))]
     title = curve.name.removesuffix(", position").removeprefix(", ")  # a joint without a name
     if curve.kind in ("tip", "body"):
@@ -162,7 +161,7 @@ def _panel(curve: Series, found: Agreement | None, wide: bool = False) -> Panel:
     verdict = ""
     if found is not None:
         verdict = {"agrees": "agrees", "settles": "settles", "differs": "DIFFERS"}[found.verdict]
-        verdict += f", {quantity(found.max, found.kind)}"
+        verdict += f", {quantity(found.max, found.unit)}"
     return Panel(
         title=title,
         unit=unit.strip(),
@@ -187,12 +186,12 @@ def _worst_of(shown: list[Series], found: dict[str, Agreement]) -> list[Series]:
     """All of them, or, of very many, those that are farthest beyond their tolerance."""
     if len(shown) <= MOST:
         return shown
-    share = {name: agreement.max / agreement.tolerance for name, agreement in found.items()}
+    share = {name: agreement.tolerances for name, agreement in found.items()}
     kept = sorted(shown, key=lambda curve: -share.get(curve.name, 0.0))[:MOST]
     return [curve for curve in shown if any(curve is one for one in kept)]
 
 
-def _touches(traces: Sequence[Trace], until: float) -> list[Touch]:
+def _touches(traces: Sequence[Trace], until: float) -> list[TouchSpans]:
     """Spans of each pair of bodies; those that touch first come first."""
     touching = [trace.touches() for trace in traces]
     found = []
@@ -204,7 +203,7 @@ def _touches(traces: Sequence[Trace], until: float) -> list[Touch]:
             for touch, trace in zip(touching, traces, strict=True)
         ]
         if any(spans):
-            found.append(Touch(pair, spans))
+            found.append(TouchSpans(pair, spans))
     found.sort(key=lambda touch: min(span[0] for side in touch.spans for span in side))
     return found[:_MOST_PAIRS]
 
@@ -230,7 +229,7 @@ def side_labels(one: Trace, two: Trace) -> list[str]:
         labels = [f"{t.header.label}, {t.header.provenance.model_file}" for t in (one, two)]
     if labels[0] == labels[1]:
         labels = [
-            f"{t.header.label}, {1000 * t.header.timestep:.3g} ms ({k})"
+            f"{t.header.label}, {milliseconds(t.header.timestep, 3)} ({k})"
             for k, t in enumerate((one, two), start=1)
         ]
     return labels
@@ -240,7 +239,7 @@ def _origin(*traces: Trace) -> list[str]:
     """The model, the steps and the version that computed it."""
     headers: list[Header] = [trace.header for trace in traces]
     models = {h.provenance.model_file: h.provenance.model_sha256[:8] for h in headers}
-    steps = dict.fromkeys(f"{1000 * header.timestep:.4g} ms" for header in headers)
+    steps = dict.fromkeys(milliseconds(header.timestep) for header in headers)
     seeds = dict.fromkeys(
         f"seed {header.provenance.seed}" for header in headers if header.provenance.seed is not None
     )

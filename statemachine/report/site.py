@@ -9,19 +9,18 @@ from pathlib import Path
 from ..backends import backend_names, load
 from ..compare import Request, compare, series, sides_of, touches, witness
 from ..compare.why import attribute
+from ..comparison.text import reading
+from ..conventions import phrasebook, probe
 from ..errors import MissingEngineError
 from ..experiments.scenarios import scenario
 from ..installed import available
 from ..lessons import LESSONS
 from ..lessons.session import page_of_lesson, take
 from ..page import Page, Picture, Traces, Verdict
-from ..probes import phrasebook
-from ..probes.conventions import probe
 from ..traces.whole import replace_file
 from . import compare as comparison
 from . import conventions, why
 from .figures import svg
-from .figures_of import scale_of
 from .markdown import block_as_markdown, markdown
 
 
@@ -96,7 +95,7 @@ def make_comparisons(folder: Path, say: Callable[[str], None] = print) -> list[P
         asked = witness(one, two)
         page = comparison.page(compare(one, two), one.header.says, said, asked, touches(one, two))
         curves = {
-            curve.name: (curve.time.tolist(), (curve.difference * scale_of(curve.kind)[0]).tolist())
+            curve.name: (curve.time.tolist(), (curve.difference * reading(curve.unit)[0]).tolist())
             for curve in series(one, two)
             if curve.kind == "joint"
         }
@@ -104,30 +103,31 @@ def make_comparisons(folder: Path, say: Callable[[str], None] = print) -> list[P
         page = replace(page, blocks=[page.blocks[0], apart, *page.blocks[1:]])
         found.append(_write(folder, name, page, "", f"statemachine compare {name}"))
         if not (one.header.recorded or two.header.recorded):
-            found.append(_explain(folder, name))
+            found.append(_explain(folder, name, (one.header.backend, two.header.backend)))
     return found
 
 
-def _explain(folder: Path, name: str) -> Path:
+def _explain(folder: Path, name: str, backends: tuple[str, str]) -> Path:
     """The page that says why, for engines as they come."""
     asked = scenario(name)
-    models = [
-        load(asked.model, backend=backend, defaults="engine") for backend in ("mujoco", "pybullet")
-    ]
+    models = [load(asked.model, backend=backend, defaults="engine") for backend in backends]
     page = why.page(attribute(models[0], models[1], asked), [])
     return _write(
         folder, f"{name}-why", page, "", f"statemachine compare {name} --why --defaults engine"
     )
 
 
-def _phrases(page: Page, table: phrasebook.Calls) -> str:
+def _phrases(page: Page, table: phrasebook.Phrasebook) -> str:
     """A heading for each concept, and what to type on each engine."""
     parts = [f"# {page.title}", f"*{page.origin}*"]
     parts += [block_as_markdown(b, lambda _: "") for b in page.blocks if isinstance(b, Verdict)]
     for concept in phrasebook.CONCEPTS:
         parts.append(f"## {concept[0].upper()}{concept[1:]}")
         for engine, calls in table.engines.items():
-            (call,) = (each for each in calls if each.concept == concept)
+            call = next((each for each in calls if each.concept == concept), None)
+            if call is None:
+                parts.append(f"{engine}: not asked")
+                continue
             mark = "✓" if call.works else "✗"
             parts.append(f"{engine} {mark}\n\n```python\n{call.code}\n```")
     return "\n\n".join(parts) + "\n"

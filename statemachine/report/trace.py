@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from ..comparison.text import figure, milliseconds, numbers, short_time
 from ..page import Page, Table, Text
 from ..traces import COLUMNS, Trace
-from .figures_of import figure
 
 
 def page(trace: Trace, name: str) -> Page:
@@ -20,12 +20,12 @@ def page(trace: Trace, name: str) -> Page:
         (
             "time",
             f"{trace.time[0]:g} to {trace.time[-1]:g} s, {len(trace)} rows, "
-            f"{1000 * header.timestep:.4g} ms apart"
+            f"{milliseconds(header.timestep)} apart"
             + (f" ({header.substeps} engine steps)" if header.substeps > 1 else ""),
         ),
         ("start", f"keyframe {header.keyframe}" if header.keyframe else "as in the first row"),
         ("model", f"{header.provenance.model_file} ({header.provenance.model_sha256[:8]})"),
-        ("gravity", " ".join(f"{value:g}" for value in header.gravity) + " m/s²"),
+        ("gravity", numbers(header.gravity) + " m/s²"),
         ("options", ", ".join(f"{key}={value}" for key, value in header.options.items()) or "none"),
         ("seed", "none" if header.provenance.seed is None else str(header.provenance.seed)),
         ("versions", ", ".join(f"{k} {v}" for k, v in header.provenance.versions.items())),
@@ -54,7 +54,7 @@ def page(trace: Trace, name: str) -> Page:
                 [
                     (
                         pair,
-                        f"{trace.time[int(np.argmax(rows))] - trace.time[0]:.3f} s",
+                        short_time(trace.time[int(np.argmax(rows))] - trace.time[0]),
                         f"{int(rows.sum())} of {len(trace)}",
                     )
                     for pair, rows in touches.items()

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ..compare.why import FACTORS, Attribution, Trial
+from ..compare.why import FACTORS, Attribution, FactorTrial
+from ..comparison.text import NONE, capital, percent, quantity, short_time
 from ..page import Page, Table, Text, Verdict
-from .figures_of import quantity as in_units
-from .figures_of import short_time
-from .why_words import ENOUGH, KINDS, amount, astray, conclusion, percent, shown, titles, upper
+from .why_words import ENOUGH, amount, astray, conclusion, shown, titles
 
 _BAR = 16  # characters of the longest bar
 
@@ -72,7 +71,7 @@ def _gap_sentence(result: Attribution) -> str:
         f"{amount(result, gap.end)})."
     )
     others = [
-        f"{name} {in_units(other.worst, KINDS[other.unit])}"
+        f"{name} {quantity(other.worst, other.unit)}"
         for name, other in result.first.items()
         if name != result.quantity
     ]
@@ -107,14 +106,14 @@ def _alone(result: Attribution) -> Table:
     return Table(headers, rows, "One at a time: what happens to the gap", frozenset({0, 1}))
 
 
-def _brought(result: Attribution, trial: Trial) -> str:
+def _brought(result: Attribution, trial: FactorTrial) -> str:
     if trial.way == "parity":
         had = trial.had if trial.did == f"as {result.names[0]}" else trial.had[::-1]
         return f"{had[1]} → {had[0]}"
-    return trial.did or "–"
+    return trial.did or NONE
 
 
-def _another(trial: Trial) -> bool:
+def _another(trial: FactorTrial) -> bool:
     """Whether one itself moves otherwise with it: then the gap is that of another motion."""
     return bool(trial.moved) and trial.worst is not None
 
@@ -129,7 +128,7 @@ def _notes(result: Attribution) -> list[str]:
             "this one is as it came. The parts need not add up: one setting can hide another."
         )
     found += [
-        f"{upper(FACTORS[trial.factor].title)}, put back, takes {titles(trial.along)} back "
+        f"{capital(FACTORS[trial.factor].title)}, put back, takes {titles(trial.along)} back "
         "with it: they can be set only where it is."
         for trial in result.alone
         if trial.along
@@ -147,7 +146,7 @@ def _notes(result: Attribution) -> list[str]:
         )
     for trial in result.alone:
         if trial.note:
-            found.append(f"{upper(FACTORS[trial.factor].title)}: {trial.note}.")
+            found.append(f"{capital(FACTORS[trial.factor].title)}: {trial.note}.")
     if any(trial.way == "one side" for trial in result.alone):
         found.append(f"Integrator: {two} has none to choose from, so only {one} was changed.")
     return found
@@ -177,7 +176,7 @@ def _ladder(result: Attribution) -> Table:
     )
 
 
-def _rung(trial: Trial) -> str:
+def _rung(trial: FactorTrial) -> str:
     if trial.explains is None and trial.worst:
         return trial.note
     return percent(trial.explains) + ("*" if _another(trial) else "")

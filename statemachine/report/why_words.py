@@ -4,42 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..compare.why import FACTORS, Attribution, Trial
-from .figures_of import quantity as in_units
-from .figures_of import short_time
+from ..compare.why import FACTORS, Attribution, FactorTrial
+from ..comparison.text import listed, percent, quantity, short_time
 
 _WORTH = 0.005  # the least part of the gap that the conclusion speaks of
 ENOUGH = 0.1  # what may stay unexplained without the answer being no
 _OPENS = 1.5  # times the gap of equal settings: a setting put back that opens more is named
 _OTHERWISE = 0.05  # of the gap: a part that changes by more with the order is given both ways
 _AT_TOUCH = ("contact", "limits", "surfaces")  # what does nothing before something is met
-KINDS = {"rad": "joint", "m": "body"}
 
 
 def amount(result: Attribution, value: float | None) -> str:
     """A gap of the attribution's quantity, with its unit."""
-    if value is None:
-        return "–"
-    return in_units(value, KINDS[result.unit])
+    return quantity(value, result.unit)
 
 
-def percent(part: float | None) -> str:
-    """A part of the gap; tiny ones with their power of ten."""
-    if part is None:
-        return "–"
-    value = 100 * part
-    if value == 0:
-        return "0 %"
-    if abs(value) < 1e-6:
-        return "< 1e-6 %"
-    if abs(value) < 0.05:
-        return f"{value:.0e} %".replace("e-0", "e-")
-    if 99.95 <= value < 100:
-        return "> 99.9 %"
-    return f"{value:.1f} %" if abs(value) < 1000 else f"{value:.0f} %"
-
-
-def shown(result: Attribution, value: float | None, trial: Trial | None = None) -> str:
+def shown(result: Attribution, value: float | None, trial: FactorTrial | None = None) -> str:
     """A gap, marked where it is out of all proportion; not of a trial that moves one too."""
     own = trial is not None and bool(trial.moved)
     return amount(result, value) + ("!" if not own and astray(result, value) else "")
@@ -48,11 +28,6 @@ def shown(result: Attribution, value: float | None, trial: Trial | None = None) 
 def astray(result: Attribution, value: float | None) -> bool:
     """Whether a gap is more than twice what one moves at all, and than the first gap."""
     return value is not None and value > 2 * max(result.extent, result.gap)
-
-
-def upper(text: str) -> str:
-    """With a capital."""
-    return text[:1].upper() + text[1:]
 
 
 def conclusion(result: Attribution) -> list[str]:
@@ -109,7 +84,7 @@ def conclusion(result: Attribution) -> list[str]:
             found.append(
                 f"The motion as it comes says the same. Until {what}, at "
                 f"{short_time(touch.time)}, the two are {amount(result, touch.before)} apart, "
-                f"though {_and(named)} act from the start."
+                f"though {listed(named)} act from the start."
             )
         elif touch is None and not settings:
             found.append("Something touches from the start, so no moment shows the rest alone.")
@@ -121,7 +96,7 @@ def conclusion(result: Attribution) -> list[str]:
     return found
 
 
-def _other_orders(result: Attribution, worth: Sequence[Trial]) -> list[str]:
+def _other_orders(result: Attribution, worth: Sequence[FactorTrial]) -> list[str]:
     """What settings explain if they come first or last, where that is another part."""
     alone = {trial.factor: trial for trial in result.alone}
     parts = []
@@ -143,8 +118,4 @@ def _other_orders(result: Attribution, worth: Sequence[Trial]) -> list[str]:
 
 def titles(names: Sequence[str]) -> str:
     """Factors by their titles: "armature, dry friction and joint limits"."""
-    return _and([FACTORS[name].title for name in names])
-
-
-def _and(words: Sequence[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+    return listed([FACTORS[name].title for name in names])

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from ..comparison import Gap
+from ..comparison.text import count, listed
 from ..errors import UnsupportedError
 from ..interface import (
     DERIVED,
@@ -26,7 +28,7 @@ from ..interface import (
     set_state,
 )
 from ..rotations import times
-from .gaps import Gap, gaps, same
+from .gaps import gaps, same
 from .result import Row
 
 Readings = Mapping[str, "Array | Contacts"]
@@ -117,10 +119,10 @@ def stale_row(model: Model, name: str, age: Age, found: tuple[Gap, ...]) -> Row:
         writes = sum(age.writes[each] for each in DEPEND[name])
     words = []
     if age.steps:
-        words.append(_count(age.steps, "substep" if model.substeps > 1 else "step"))
+        words.append(count(age.steps, "substep" if model.substeps > 1 else "step"))
     if writes:
-        words.append(_count(writes, "write"))
-    of = " and ".join(words) + " ago" if words else "an earlier state"
+        words.append(count(writes, "write"))
+    of = f"{listed(words)} ago" if words else "an earlier state"
     return Row(name, False, age.steps, writes, of, found)
 
 
@@ -193,7 +195,3 @@ def _array(found: Readings, name: str) -> Array:
 def engine_step(model: Model) -> float:
     """Simulated time of one step of the engine [s]."""
     return model.timestep / model.substeps
-
-
-def _count(number: int, thing: str) -> str:
-    return f"{number} {thing}" + "s" * (number != 1)

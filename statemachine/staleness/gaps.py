@@ -3,56 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from ..comparison import ContactNames, Gap
+from ..comparison.text import TINY
 from ..interface import Array, Contacts, JointType, Model
 from ..rotations import angle_between, matrix_from_quat
-
-# What is shown of a size in SI: factor and unit.
-_SHOWN = {"m": (1e3, " mm"), "rad": (180 / np.pi, "°")}
-_TINY = 1e-6  # smaller than this, in what is shown, nobody wants the digits
-
-
-@dataclass(frozen=True)
-class Gap:
-    """One way in which a derived array is not what it would be now.
-
-    Attributes:
-        size: The worst of its entries [unit], of a vector its length; None where an entry is
-            no rotation at all.
-        unit: "m", "rad", "m/s²", "rad/s²", "N", "N·m"; of contacts also "appears" and "vanishes",
-            whose sizes are how many there are now and were not, and the other way round.
-        where: The body, site, joint or pair of geoms with the worst entry; "" if unnamed.
-    """
-
-    size: float | None
-    unit: str
-    where: str
-
-    @property
-    def shown(self) -> float:
-        """The size in the unit that is shown, mm or degrees; infinite if it has none."""
-        factor, _ = _SHOWN.get(self.unit, (1.0, ""))
-        return np.inf if self.size is None else factor * self.size
-
-    def __str__(self) -> str:
-        _, unit = _SHOWN.get(self.unit, (1.0, f" {self.unit}"))
-        if self.size is None:
-            text = "all zero, which is no rotation"
-        elif self.unit in ("appears", "vanishes"):
-            text = f"1 {self.unit}"
-            if self.size > 1:
-                text = f"{self.size:.0f} {self.unit.removesuffix('es').removesuffix('s')}"
-        else:
-            text = f"{self.shown:.3g}{unit}" if self.shown >= _TINY else f"below {_TINY:g}{unit}"
-        return f"{text} at {self.where}" if self.where else text
 
 
 def told(found: Sequence[Gap]) -> str:
     """Gaps in words; what is nothing but rounding is left out beside what is more."""
-    worth = [gap for gap in found if gap.shown >= _TINY]
+    worth = [gap for gap in found if gap.shown >= TINY]
     return "; ".join(str(gap) for gap in worth or found[:1])
 
 
@@ -73,7 +35,7 @@ def gaps(model: Model, name: str, held: Array | Contacts, now: Array | Contacts)
     assert isinstance(now, np.ndarray)
     owners = model.site_names if name.startswith("site") else model.body_names
     if name in ("xpos", "site_xpos"):
-        return (_worst(np.linalg.norm(now - held, axis=1), "m", owners),)
+        return (Gap.of(np.linalg.norm(now - held, axis=1), "m", owners),)
     if name in ("xquat", "site_xmat"):
         return (_rotated(name, held, now, owners),)
     return tuple(_by_unit(model, name, now - held))
@@ -86,11 +48,6 @@ def same(held: Array | Contacts, now: Array | Contacts) -> bool:
     return np.array_equal(held, now)
 
 
-def _worst(sizes: Array, unit: str, owners: Sequence[str]) -> Gap:
-    place = int(np.argmax(sizes))  # the first NaN, if there is one
-    return Gap(float(sizes[place]), unit, owners[place])
-
-
 def _rotated(name: str, held: Array, now: Array, owners: Sequence[str]) -> Gap:
     if not np.abs(held).max(axis=1).all():  # never computed
         return Gap(None, "rad", "")
@@ -98,7 +55,7 @@ def _rotated(name: str, held: Array, now: Array, owners: Sequence[str]) -> Gap:
         one, two = matrix_from_quat(held), matrix_from_quat(now)
     else:
         one, two = held.reshape(-1, 3, 3), now.reshape(-1, 3, 3)
-    return _worst(angle_between(one, two), "rad", owners)
+    return Gap.of(angle_between(one, two), "rad", owners)
 
 
 def _by_unit(model: Model, name: str, change: Array) -> Iterator[Gap]:
@@ -113,7 +70,7 @@ def _by_unit(model: Model, name: str, change: Array) -> Iterator[Gap]:
     units = ("m/s²", "rad/s²") if name == "qacc" else ("N", "N·m")
     for unit, chosen in zip(units, (linear, ~linear), strict=True):
         if sizes[chosen].any():
-            yield _worst(np.where(chosen, sizes, -1.0), unit, owners)
+            yield Gap.of(np.where(chosen, sizes, -1.0), unit, owners)
 
 
 def _vectors(model: Model) -> list[tuple[str, bool, int]]:
@@ -130,7 +87,8 @@ def _vectors(model: Model) -> list[tuple[str, bool, int]]:
 
 def _between_contacts(model: Model, held: Contacts, now: Contacts) -> Iterator[Gap]:
     pairs = [tuple(pair) for pair in held.geom.tolist()], [tuple(p) for p in now.geom.tolist()]
-    names = {pair: _pair_name(model, pair) for pair in (*pairs[0], *pairs[1])}
+    called = ContactNames.of(model)
+    names = {pair: called.geoms(*pair) for pair in (*pairs[0], *pairs[1])}
     kept: list[tuple[int, int]] = []
     gone, come = [], []
     for pair in dict.fromkeys((*pairs[0], *pairs[1])):
@@ -161,12 +119,4 @@ def _between_contacts(model: Model, held: Contacts, now: Contacts) -> Iterator[G
         sizes[unit] = np.linalg.norm(before[ours] - after[theirs], axis=1)
     for unit, each in sizes.items():
         if each.any():
-            yield _worst(each, unit, owners)
-
-
-def _pair_name(model: Model, pair: tuple[int, ...]) -> str:
-    """'floor – box', by geom; one without a name goes by its body."""
-    names = [
-        model.geom_names[geom] or model.body_names[int(model.geom_bodyid[geom])] for geom in pair
-    ]
-    return " – ".join(names)
+            yield Gap.of(each, unit, owners)

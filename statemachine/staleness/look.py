@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import nullcontext
 from typing import cast
 
+from ..comparison.text import few, milliseconds
 from ..interface import DERIVED, POSES, Contacts, Data, Model, get_state
 from .age import Age, Scratch, age_of, engine_step, readings, row
 from .result import Freshness, Row
@@ -58,11 +59,6 @@ def freshness(model: Model, data: Data) -> Freshness:
     )
 
 
-def _some(names: tuple[str, ...]) -> str:
-    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    return ", ".join(names[:3]) + more
-
-
 def _notes(model: Model, rows: tuple[Row, ...], age: Age, touching: bool) -> Iterator[str]:
     behaviours = model.capabilities.behaviours
     stale = [each.name for each in rows if not each.now]
@@ -90,12 +86,12 @@ def _how(model: Model, age: Age, poses: bool) -> Iterator[str]:
     if age.retraced:
         exact = f"to {age.within:.1e} m" if age.within else "to the bit"
         yield (
-            f"Found by going back: qpos − h·qvel, h = {1e3 * engine_step(model):.4g} ms, gives "
-            f"the poses of {_some(age.retraced)}, {exact}."
+            f"Found by going back: qpos − h·qvel, h = {milliseconds(engine_step(model))}, gives "
+            f"the poses of {few(age.retraced)}, {exact}."
         )
         if age.strays:
             yield (
-                f"Not so {_some(age.strays)}: qpos or qvel was written since, or the engine "
+                f"Not so {few(age.strays)}: qpos or qvel was written since, or the engine "
                 "integrates otherwise."
             )
     elif not age.never and age.steps is None:

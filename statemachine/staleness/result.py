@@ -6,8 +6,9 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from ..comparison import Gap
 from ..errors import unknown_name
-from .gaps import Gap, told
+from .gaps import told
 
 WIDTH = 80
 _TIGHT = "\u00a0"

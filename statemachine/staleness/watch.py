@@ -15,10 +15,12 @@ from typing import Any, cast
 
 import numpy as np
 
+from ..comparison import Gap
+from ..comparison.text import few
 from ..errors import BadInputError, StaleReadError
 from ..interface import INPUTS, Array, Contacts, Data, Model, State, get_state
 from .age import DEPEND, Age, Readings, Scratch, age_of, readings, row, stale_row
-from .gaps import Gap, told
+from .gaps import told
 from .result import Row, StaleRead, table
 
 _PACKAGE = str(Path(os.path.abspath(__file__)).parent.parent) + os.sep
@@ -262,8 +264,7 @@ def _stale_read(found: Row, entries: list[str]) -> StaleReadError:
     never = found.of == "never computed"
     facts = [told(found.gaps)] if found.gaps else []
     if entries and not never:
-        more = f" and {len(entries) - 3} more" if len(entries) > 3 else ""
-        facts.append(f"written since: {', '.join(entries[:3])}{more}")
+        facts.append(f"written since: {few(entries)}")
     said = f"{found.name} {'was' if never else 'is of'} {found.of}"
     said += f" ({'; '.join(facts)})" if facts else ""
     return StaleReadError(

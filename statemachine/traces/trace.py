@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..comparison import ContactNames
 from ..errors import TraceError
-from ..interface import Array
+from ..interface import Array, Ints
 from ..interface.checks import HUGE, index_of
 from .checked import LARGEST
 from .header import COLUMNS, CONTACTS, INPUTS, Header
@@ -104,6 +105,11 @@ class Trace:
         return column in self.columns
 
     @property
+    def timestep(self) -> float:
+        """Simulated time between two rows [s]."""
+        return self.header.timestep
+
+    @property
     def time(self) -> Array:
         """(n,) [s]."""
         return self.columns["time"]
@@ -128,16 +134,22 @@ class Trace:
         number = index_of("site", name, self.header.sites)
         return self["site_xpos"][:, number], self["site_xmat"][:, number].reshape(-1, 3, 3)
 
+    def contact_pairs(self) -> dict[str, Ints]:
+        """Which contacts are of each pair of bodies: their places by "gripper on box"."""
+        found: dict[str, list[int]] = {}
+        if "contact_geom" in self:
+            header = self.header
+            names = ContactNames(
+                header.bodies, header.geoms, header.geom_bodyid, header.body_parentid
+            )
+            for place, geoms in enumerate(self["contact_geom"].tolist()):
+                found.setdefault(names.pair(*geoms), []).append(place)
+        return {pair: np.array(places) for pair, places in found.items()}
+
     def touches(self) -> dict[str, NDArray[np.bool_]]:
-        """When each pair of bodies touches: (n,) bool by "gripper – box"."""
-        found: dict[str, NDArray[np.bool_]] = {}
-        if "contact_row" not in self:
-            return found
-        labels = self.header.body_labels
-        for row, (one, two) in zip(
-            self["contact_row"].tolist(), self["contact_geom"].tolist(), strict=True
-        ):
-            bodies = sorted((self.header.geom_bodyid[one], self.header.geom_bodyid[two]))
-            name = " – ".join(labels[body] for body in bodies)
-            found.setdefault(name, np.zeros(len(self), dtype=bool))[row] = True
+        """When each pair of bodies touches: (n,) bool by "gripper on box"."""
+        found = {}
+        for pair, places in self.contact_pairs().items():
+            found[pair] = np.zeros(len(self), dtype=bool)
+            found[pair][self["contact_row"][places]] = True
         return found

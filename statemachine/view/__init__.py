@@ -7,8 +7,8 @@
 
 from __future__ import annotations
 
-from .frames import Control, Frame, Gap, Pose
+from .frames import Control, EnginePose, Separation, Snapshot
 from .pace import Pacer
-from .session import Session
+from .session import LiveSession
 
-__all__ = ["Control", "Frame", "Gap", "Pacer", "Pose", "Session"]
+__all__ = ["Control", "EnginePose", "LiveSession", "Pacer", "Separation", "Snapshot"]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..comparison import largest
 from ..interface import Array, JointType, Model, usual_site
 
 _TURN = math.pi / 180  # radians in a degree
@@ -32,7 +33,7 @@ class Control:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class EnginePose:
     """Where one engine has everything.
 
     Attributes:
@@ -48,7 +49,7 @@ class Pose:
 
 
 @dataclass(frozen=True)
-class Gap:
+class Separation:
     """How far two engines are apart.
 
     Attributes:
@@ -65,7 +66,7 @@ class Gap:
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class Snapshot:
     """One moment.
 
     Attributes:
@@ -84,8 +85,8 @@ class Frame:
     running: bool
     ctrl: Array
     resets: int
-    poses: tuple[Pose, ...]
-    gap: Gap | None
+    poses: tuple[EnginePose, ...]
+    gap: Separation | None
     trouble: str
 
 
@@ -98,7 +99,7 @@ class SetCtrl:
 
 
 @dataclass(frozen=True)
-class Run:
+class Play:
     """Let time go on."""
 
 
@@ -115,7 +116,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Reset:
+class ResetTo:
     """To a keyframe by number, or to the default state."""
 
     keyframe: int | None = None
@@ -135,7 +136,7 @@ class SetSpeed:
     factor: float
 
 
-Command = SetCtrl | Run | Pause | Step | Reset | Seek | SetSpeed
+Command = SetCtrl | Play | Pause | Step | ResetTo | Seek | SetSpeed
 
 
 def controls_of(model: Model) -> tuple[Control, ...]:
@@ -178,7 +179,7 @@ def gap_between(
     addresses: Sequence[int],
     qpos: tuple[Array, Array],
     tips: tuple[Array | None, Array | None],
-) -> Gap:
+) -> Separation:
     """How far two moments of one model are apart.
 
     Args:
@@ -195,6 +196,6 @@ def gap_between(
         if joints:
             starts = [addresses[joint] for joint in joints]
             apart = np.abs(qpos[0][starts] - qpos[1][starts])
-            worst = int(apart.argmax())
-            return Gap(tip, names[joints[worst]], float(apart[worst]), kind == JointType.SLIDE)
-    return Gap(tip, "", None)
+            angle, worst = largest(apart)
+            return Separation(tip, names[joints[worst]], angle, kind == JointType.SLIDE)
+    return Separation(tip, "", None)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ..errors import StateMachineError
-from .frames import Command, Control, Frame, Reset, Run, Seek, SetSpeed, Step
+from .frames import Command, Control, Play, ResetTo, Seek, SetSpeed, Snapshot, Step
 from .pace import Pacer
 
 RATE = 40.0  # frames in a second of the clock
@@ -16,7 +16,7 @@ _MOST_LAG = 0.25  # seconds behind the clock that may still be caught up
 
 
 class Show(Protocol):
-    """What can be shown: a running simulation, or a recording. See `Session`."""
+    """What can be shown: a running simulation, or a recording. See `LiveSession`."""
 
     timestep: float
     names: tuple[str, ...]
@@ -36,13 +36,13 @@ class Show(Protocol):
     def advance(self, count: int = 1) -> None:
         """Take steps."""
 
-    def frame(self) -> Frame:
+    def frame(self) -> Snapshot:
         """This moment."""
         ...
 
 
 @dataclass(frozen=True)
-class Pace:
+class Tempo:
     """How fast it goes.
 
     Attributes:
@@ -63,7 +63,7 @@ class Front(Protocol):
         """What was asked for since the last time, in order."""
         ...
 
-    def show(self, frame: Frame, pace: Pace, note: str) -> None:
+    def show(self, frame: Snapshot, pace: Tempo, note: str) -> None:
         """A moment, how fast time goes, and what was wrong with the last command."""
 
 
@@ -115,7 +115,7 @@ class Live:
             self._catch_up(began + self._span)
         now = self._clock()
         running = self._session.running
-        pace = Pace(
+        pace = Tempo(
             self._pacer.speed, self._pacer.factor(now) if running else None, now < self._late
         )
         self._front.show(self._session.frame(), pace, self._note)
@@ -133,7 +133,7 @@ class Live:
         except StateMachineError as error:
             self._note = str(error)
         # What passed while it stood, or before it jumped, is not owed.
-        if isinstance(command, Run | Step | Reset | Seek):
+        if isinstance(command, Play | Step | ResetTo | Seek):
             self._pacer.restart(self._clock())
 
     def _catch_up(self, deadline: float) -> None:

@@ -13,13 +13,13 @@ from ..traces import Header, Trace
 from .frames import (
     Command,
     Control,
-    Frame,
-    Gap,
+    EnginePose,
     Pause,
-    Pose,
-    Reset,
-    Run,
+    Play,
+    ResetTo,
     Seek,
+    Separation,
+    Snapshot,
     Step,
     gap_between,
 )
@@ -28,10 +28,10 @@ _NEEDED = ("xpos", "xquat")
 _EQUAL = 1e-6  # seconds between moments that count as the same
 
 
-class Recording:
+class TraceSession:
     """One or two traces of one model, row by row.
 
-    Attributes: those of a `Session`; it has no sliders, and the only place is its start.
+    Attributes: those of a `LiveSession`; it has no sliders, and the only place is its start.
     """
 
     controls: tuple[Control, ...] = ()
@@ -87,7 +87,7 @@ class Recording:
             BadInputError: It is nothing that a recording can do; nothing is changed then.
         """
         match command:
-            case Run():
+            case Play():
                 if self._row == self._rows - 1:
                     self._jump(0)
                 self._running = self._rows > 1
@@ -97,7 +97,7 @@ class Recording:
                 self._running = False
                 self.advance(count)
                 self._jump(self._row)
-            case Reset():
+            case ResetTo():
                 self._jump(0)
             case Seek(time):
                 if not math.isfinite(time):
@@ -118,7 +118,7 @@ class Recording:
             self._running = False
             self._jump(self._row)
 
-    def frame(self) -> Frame:
+    def frame(self) -> Snapshot:
         """This row of the first trace, and what the other has nearest to its time."""
         first = self._traces[0]
         since = first.time[self._row] - first.time[0]
@@ -126,14 +126,14 @@ class Recording:
         poses = []
         for trace, name, row in zip(self._traces, self.names, rows, strict=True):
             tip = None if self._site is None else trace["site_xpos"][row, self._site]
-            poses.append(Pose(name, trace["xpos"][row], trace["xquat"][row], tip))
+            poses.append(EnginePose(name, trace["xpos"][row], trace["xquat"][row], tip))
         gap = None
         if len(rows) > 1:
             other = self._traces[1]
             # Moments that are not the same say nothing about the engines.
             if abs(other.time[rows[1]] - other.time[0] - since) < _EQUAL:
                 gap = self._gap((poses[0], poses[1]), (first.qpos[rows[0]], other.qpos[rows[1]]))
-        return Frame(
+        return Snapshot(
             time=float(first.time[self._row]),
             steps=self._row,
             running=self._running,
@@ -144,7 +144,7 @@ class Recording:
             trouble="",
         )
 
-    def _gap(self, poses: tuple[Pose, Pose], qpos: tuple[Array, Array]) -> Gap:
+    def _gap(self, poses: tuple[EnginePose, EnginePose], qpos: tuple[Array, Array]) -> Separation:
         header = self.header
         return gap_between(
             header.joints,

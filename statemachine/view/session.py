@@ -11,13 +11,13 @@ from ..errors import BadInputError, StateMachineError
 from ..interface import Data, Model, forward, make_data, reset, step
 from .frames import (
     Command,
-    Frame,
-    Gap,
+    EnginePose,
     Pause,
-    Pose,
-    Reset,
-    Run,
+    Play,
+    ResetTo,
+    Separation,
     SetCtrl,
+    Snapshot,
     Step,
     controls_of,
     gap_between,
@@ -27,7 +27,7 @@ from .frames import (
 _STEPS_MOST = 100_000  # of one press of a button
 
 
-class Session:
+class LiveSession:
     """One or two engines under the same commands, at the same steps.
 
     Whoever makes it is the only one to touch its Data: what other threads want comes as
@@ -36,7 +36,7 @@ class Session:
     Attributes:
         names: Of the engines.
         controls: A slider for each actuator.
-        places: Where `Reset` can go: names of the keyframes, by number.
+        places: Where `ResetTo` can go: names of the keyframes, by number.
         timestep: Simulated time of a step [s].
         tip: The site that stands for the fingertip, or "".
         length: Simulated time from first to last [s]; None: a simulation has no end.
@@ -75,8 +75,8 @@ class Session:
         self.tip = "" if self._site is None else first.site_names[self._site]
         start = None if keyframe is None else first.key_id(keyframe)
         self._arms: list[tuple[Model, Data]] = []
-        self._poses: tuple[Pose, ...] = ()
-        self._gap: Gap | None = None
+        self._poses: tuple[EnginePose, ...] = ()
+        self._gap: Separation | None = None
         self._time = 0.0
         self._running, self._trouble, self._steps, self._resets = False, "", 0, 0
         try:
@@ -104,7 +104,7 @@ class Session:
                     raise BadInputError(f"actuator {index} cannot be set to {value}")
                 for _, data in self._arms:
                     data.ctrl[index] = value
-            case Run():
+            case Play():
                 self._running = not self._trouble
             case Pause():
                 self._running = False
@@ -113,7 +113,7 @@ class Session:
                     raise BadInputError(f"steps must be from 1 to {_STEPS_MOST}; got {count}")
                 self._running = False
                 self.advance(count)
-            case Reset(keyframe):
+            case ResetTo(keyframe):
                 self._reset(keyframe)
             case _:
                 raise BadInputError(f"a simulation cannot do {command!r}")
@@ -130,14 +130,14 @@ class Session:
         if not self._trouble:
             self._steps += count
 
-    def frame(self) -> Frame:
+    def frame(self) -> Snapshot:
         """This moment; after an engine failed, the last one that was good.
 
         Looking changes nothing: the run goes on as if nobody had looked.
         """
         if not self._trouble:
             self._look()
-        return Frame(
+        return Snapshot(
             time=self._time,
             steps=self._steps,
             running=self._running,
@@ -157,7 +157,7 @@ class Session:
                 self._stop(model, error)
                 return
             tip = None if self._site is None else np.array(data.site_xpos[self._site])
-            poses.append(Pose(model.backend, np.array(data.xpos), np.array(data.xquat), tip))
+            poses.append(EnginePose(model.backend, np.array(data.xpos), np.array(data.xquat), tip))
         self._poses = tuple(poses)
         model, data = self._arms[0]
         self._time = data.time
@@ -187,7 +187,7 @@ class Session:
         for _, data in self._arms:
             data.close()
 
-    def __enter__(self) -> Session:
+    def __enter__(self) -> LiveSession:
         return self
 
     def __exit__(

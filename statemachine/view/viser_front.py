@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ..drawing import Drawing, Part
 from . import words
-from .frames import Command, Frame, Pause, Reset, Run, Seek, SetCtrl, SetSpeed, Step
-from .live import Pace, Show
+from .frames import Command, Pause, Play, ResetTo, Seek, SetCtrl, SetSpeed, Snapshot, Step
+from .live import Show, Tempo
 from .pace import FASTEST, SLOWEST
 
 _GHOST = (0.20, 0.45, 0.95)  # the second engine, seen through
@@ -67,7 +67,7 @@ class ViserFront:
             except queue.Empty:
                 return found
 
-    def show(self, frame: Frame, pace: Pace, note: str) -> None:
+    def show(self, frame: Snapshot, pace: Tempo, note: str) -> None:
         """Move the bodies, and what stands beside them."""
         with self._server.atomic():
             for bodies, pose in zip(self._frames, frame.poses, strict=True):
@@ -195,7 +195,7 @@ class ViserFront:
         self._on_update(slider, asked)
         self._sliders.append(slider)
 
-    def _follow(self, frame: Frame) -> None:
+    def _follow(self, frame: Snapshot) -> None:
         """Put the sliders to commands that did not come from them."""
         for index, slider in enumerate(self._sliders):
             scale = self._session.controls[index].scale
@@ -203,19 +203,19 @@ class ViserFront:
             slider.value = min(max(shown, slider.min), slider.max)
         self._follow_time(frame)
 
-    def _follow_time(self, frame: Frame) -> None:
+    def _follow_time(self, frame: Snapshot) -> None:
         # Not out of the hand of someone who drags it.
         if self._seek is not None and time.monotonic() - self._dragged > _HELD:
             self._seek.value = min(frame.steps * self._session.timestep, self._seek.max)
 
-    def _switch(self, frame: Frame) -> None:
+    def _switch(self, frame: Snapshot) -> None:
         label = "Pause" if frame.running else "Run"
         if self._switch_button.label != label:
             self._switch_button.label = label
         if frame.running:
             self._follow_time(frame)
 
-    def _say(self, frame: Frame, pace: Pace, note: str) -> None:
+    def _say(self, frame: Snapshot, pace: Tempo, note: str) -> None:
         now = time.monotonic()
         if frame.running and now - self._when < _SPAN:
             return  # nobody reads faster
@@ -227,12 +227,12 @@ class ViserFront:
     # What comes back
 
     def _toggle(self) -> Command:
-        return Pause() if self._switch_button.label == "Pause" else Run()
+        return Pause() if self._switch_button.label == "Pause" else Play()
 
     def _reset(self) -> Command:
         place = self._places.value
         places = self._session.places
-        return Reset(places.index(place) if place in places else None)
+        return ResetTo(places.index(place) if place in places else None)
 
     def _sought(self) -> Command:
         self._dragged = time.monotonic()

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
+from ..comparison.text import millimetres, position, short_time
+from .frames import Snapshot
+from .live import Tempo
 
-from .frames import Frame
-from .live import Pace
 
-
-def rows(frame: Frame, pace: Pace, tip: str) -> list[tuple[str, str]]:
+def rows(frame: Snapshot, pace: Tempo, tip: str) -> list[tuple[str, str]]:
     """The readout of one moment.
 
     Args:
@@ -17,7 +16,7 @@ def rows(frame: Frame, pace: Pace, tip: str) -> list[tuple[str, str]]:
         tip: Name of the site that stands for the fingertip, or "".
     """
     found = [
-        ("time", f"{frame.time:.3f} s"),
+        ("time", short_time(frame.time)),
         ("steps", f"{frame.steps:,}"),
         ("pace", _pace(frame, pace)),
     ]
@@ -29,18 +28,14 @@ def rows(frame: Frame, pace: Pace, tip: str) -> list[tuple[str, str]]:
             found.append((f"on {pose.name}", f"{where} mm"))
     if frame.gap is not None:
         if frame.gap.tip is not None:
-            found.append(("tips apart", f"{1000 * frame.gap.tip:.3f} mm"))
+            found.append(("tips apart", millimetres(frame.gap.tip, 3)))
         if frame.gap.angle is not None:
-            far = (
-                f"{1000 * frame.gap.angle:.3f} mm"
-                if frame.gap.slide
-                else f"{math.degrees(frame.gap.angle):.3f}°"
-            )
+            far = position(frame.gap.angle, frame.gap.slide, 3)
             found.append(("joints apart", f"{far}, {frame.gap.joint}"))
     return found
 
 
-def _pace(frame: Frame, pace: Pace) -> str:
+def _pace(frame: Snapshot, pace: Tempo) -> str:
     if not frame.running:
         return "paused"
     if pace.reached is None:
@@ -51,7 +46,7 @@ def _pace(frame: Frame, pace: Pace) -> str:
     return text
 
 
-def warning(frame: Frame, note: str) -> str:
+def warning(frame: Snapshot, note: str) -> str:
     """What is wrong, or ""."""
     if frame.trouble:
         return f"{frame.trouble}. Reset to go on."

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from ...comparison.text import milliseconds, rounded
 from .description import Actuator, Joint, Robot
 from .ledger import Ledger
 from .match import Pair
@@ -76,7 +77,7 @@ def _damping(book: Ledger, a: Joint, b: Joint, whole: list[float], effort: float
     """Its share is that of the effort at 1 rad/s; it slows a free joint in M_ii / damping."""
     unit = "N·m·s" if a.kind != "slide" else "N·s/m"
     times = [
-        f"{m / d * 1e3:.3g} ms" if d and m > 0 else "never"
+        milliseconds(m / d, 3) if d and m > 0 else "never"
         for d, m in ((a.damping, whole[0]), (b.damping, whole[1]))
     ]
     effect = f"{times[0]} / {times[1]}"
@@ -122,7 +123,7 @@ def _limits(book: Ledger, a: Joint, b: Joint, unit: str) -> None:
         size = book.same("limits", a.name, a.limits[k], b.limits[k], unit, span)
         if size is not None:
             further = "A" if (a.limits[k] > b.limits[k]) == (k == 1) else "B"
-            text = f"{math.degrees(size):.3g}°" if unit == "rad" else f"{size * 1e3:.3g} mm"
+            text = rounded(size, unit)
             share = size / span if span else 1.0
             effect = f"{further} goes {text} further"
             book.differ(
@@ -145,7 +146,7 @@ def _effort(book: Ledger, a: Joint, b: Joint, unit: str, load: list[float]) -> N
     """Its share is that of the larger one; the weight it may have to hold beside it."""
     heavy = max(load)
     if a.effort is None or b.effort is None:
-        effect = f"its load: {heavy:.3g} {unit}" if heavy > 0 else ""
+        effect = f"its load: {rounded(heavy, unit)}" if heavy > 0 else ""
         _unsaid(book, "effort", a.name, "", a.effort, b.effort, unit, 1.0, effect)
         return
     size = book.same("effort", a.name, a.effort, b.effort, unit)
@@ -228,9 +229,7 @@ def _gain_effect(
     """Of kp the sag under the load that a joint may have; of kv the damping ratio."""
     if name == "kp":
         sag = load / value if value > 0 else math.nan
-        if joint.kind == "slide":
-            return f"sags {sag * 1e3:.2g} mm"
-        return f"sags {math.degrees(sag):.2g}°"
+        return f"sags {rounded(sag, 'm' if joint.kind == 'slide' else 'rad', 2)}"
     if drive.kp and drive.kp > 0 and whole > 0:
         ratio = (value + (joint.damping or 0.0)) / (2 * math.sqrt(drive.kp * whole))
         return f"damping ratio {ratio:.2g}"

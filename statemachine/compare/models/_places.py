@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ...comparison.text import rounded
 from ...interface import Array
 from ...rotations import angle_between
 from .description import Joint
@@ -33,7 +34,7 @@ def compare(book: Ledger, pair: Pair, above: Pair, tree: Tree, reach: float) -> 
     tips = _tips(tree, pair)
     far = max(float(np.linalg.norm(off.of(tip) - tip)) for tip in tips)
     share = max(far / reach, angle / math.pi)
-    effect = f"moves what it carries by up to {far * 1e3:.3g} mm" if far else ""
+    effect = f"moves what it carries by up to {rounded(far, 'm')}" if far else ""
     zero = float(turn @ axis) if a.kind == "hinge" else float(shift @ axis)
     rest = turn - zero * axis if a.kind == "hinge" else shift - zero * axis
     small = book.tolerance * (2 * math.pi if a.kind == "hinge" else reach)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...comparison.text import few, rounded
 from . import _joints, _places, _settings, _shapes, _solids
 from .description import HERE
 from .ledger import Agreement, Difference, Ledger
@@ -124,7 +125,7 @@ def _structure(book: Ledger, one: Tree, two: Tree, found: Matching, notes: list[
                 continue  # the world
             joint = group.joint
             kind = f"{joint.kind} joint" if joint else "fixed"
-            mass = f"carries {tree.carried(group.number).mass:.3g} kg"
+            mass = f"carries {rounded(tree.carried(group.number).mass, 'kg')}"
             name = joint.name if joint else group.name
             sides = (name, "nothing") if k == 0 else ("nothing", name)
             book.differ("structure", group.name, kind, sides[0], sides[1], effect=mass)
@@ -148,11 +149,11 @@ def _structure(book: Ledger, one: Tree, two: Tree, found: Matching, notes: list[
             told = one.robot.rooted and two.robot.rooted
             book.differ("structure", a.name, "base", words[0], words[1], matters=told)
         if pair.align is not HERE and pair.by != "root":
-            far, turn = pair.align.distance(HERE), math.degrees(pair.align.angle(HERE))
+            far, turn = pair.align.distance(HERE), pair.align.angle(HERE)
             notes.append(
                 f"the frame of link {a.name!r} is put elsewhere on the same solid, "
-                f"{far * 1e3:.3g} mm and {turn:.3g}° off: it moves alike, and its pose reads "
-                "otherwise"
+                f"{rounded(far, 'm')} and {rounded(turn, 'rad')} off: it moves "
+                "alike, and its pose reads otherwise"
             )
     names = [
         (p.one.name, p.two.name) for p in found.pairs if p.one.name != p.two.name and p.by != "root"
@@ -221,10 +222,7 @@ def _tools(
         matched = {g.name for p in found.pairs for g in (p.one, p.two)} | {"world"}
         alone = [name for name in tree.frames if name not in those and name not in matched]
         if alone:
-            more = f" and {len(alone) - 8} more" if len(alone) > 8 else ""
-            notes.append(
-                f"only {which} has the frames {', '.join(alone[:8])}{more} (--frame A=B pairs two)"
-            )
+            notes.append(f"only {which} has the frames {few(alone, 8)} (--frame A=B pairs two)")
 
 
 def _posed(found: Matching, one: Tree, two: Tree, seed: int) -> Posed:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ...probes import conventions
+from ... import conventions
+from ...engines import part
 
 # Of the conventions, those that stand between a description and what comes of it.
 _ASKED = ("actuation", "damping", "friction")
@@ -12,13 +13,16 @@ def own_ways(one: str | None, two: str | None) -> tuple[tuple[str, str, str], ..
     """For each question that two engines answer otherwise: its title, and both answers."""
     if one is None or two is None or one == two:
         return ()
+    if any(part(engine, "conventions") is None for engine in (one, two)):
+        return ()
     asked = conventions.probe((one, two), _ASKED)
     found = []
     for each in asked.questions:
-        answers = [
-            "; ".join(f"{f.of}: {f.answer}" if f.of else f.answer for f in each.findings[engine])
-            for engine in (one, two)
-        ]
-        if answers[0] != answers[1]:
-            found.append((each.question.title, answers[0], answers[1]))
+        left, right = (_in_words(each.findings[engine]) for engine in (one, two))
+        if left and right and left != right:
+            found.append((each.question.title, left, right))
     return tuple(found)
+
+
+def _in_words(answers: conventions.Answers | None) -> str:
+    return "; ".join(f"{a.of}: {a.answer}" if a.of else a.answer for a in answers or ())

@@ -11,8 +11,8 @@ from ...experiments._common import Progress, silent
 from ...experiments.scenarios import Scenario
 from ...interface import Model
 from .factors import FACTORS, OFF_ORDER, PARITY_ORDER, Factor
-from .gap import Gap
-from .results import Attribution, Trial, Way
+from .gap import Deviation
+from .results import Attribution, FactorTrial, Way
 from .runs import Runs
 from .sides import Change, Changes, same, side_of
 
@@ -159,7 +159,7 @@ def _leave_out(runs: Runs, factor: Factor, two_has_none: bool) -> _Move:
     return _Move("off", one=off, two=None if two_has_none else off, did=did)
 
 
-def _alone(runs: Runs, one: Changes, two: Changes) -> tuple[Trial, ...]:
+def _alone(runs: Runs, one: Changes, two: Changes) -> tuple[FactorTrial, ...]:
     """Each factor by itself; then as it came, where all other settings are the same."""
     found = []
     for factor in runs.listed:
@@ -207,16 +207,16 @@ def _trial(
     runs: Runs,
     factor: Factor,
     move: _Move,
-    gaps: dict[str, Gap],
+    gaps: dict[str, Deviation],
     before: float,
     changes: Changes,
     note: str = "",
-) -> Trial:
+) -> FactorTrial:
     worst = gaps[runs.quantity].worst if gaps else None
     explains = None if worst is None else (before - worst) / runs.first if runs.first else 0.0
     if move.way == "alike":
         worst, explains = before, 0.0
-    return Trial(
+    return FactorTrial(
         factor=factor.name,
         way=move.way,
         had=(runs.one.words(factor), runs.two.words(factor)),
@@ -229,9 +229,9 @@ def _trial(
     )
 
 
-def _ladder(runs: Runs) -> tuple[tuple[Trial, ...], tuple[Changes, Changes]]:
+def _ladder(runs: Runs) -> tuple[tuple[FactorTrial, ...], tuple[Changes, Changes]]:
     """One factor on top of the other, and the changes with which all settings are the same."""
-    found: list[Trial] = []
+    found: list[FactorTrial] = []
     one: dict[str, Change] = {}
     two: dict[str, Change] = {}
     last = runs.first

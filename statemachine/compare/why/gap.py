@@ -6,16 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...comparison import SAME, common_moments, largest, nearest
 from ...errors import BadInputError, DivergedError, TraceError
-from ...interface import Array, Ints, JointType, Model, forward, make_data, usual_site
+from ...interface import Array, JointType, Model, forward, make_data, usual_site
 from ...traces import Trace
-from ..align import common_moments
-
-_SAME = 1e-6  # of a timestep: two moments nearer than this are one
 
 
 @dataclass(frozen=True)
-class Gap:
+class Deviation:
     """How far apart two runs are in one quantity.
 
     Attributes:
@@ -60,7 +58,7 @@ class Ruler:
             self.between, self.time = False, common_moments(one, two).time
         except TraceError:  # too few: rows of the second are made up between its own
             time, end = one.time - one.time[0], two.time[-1] - two.time[0]
-            slack = _SAME * one.header.timestep
+            slack = SAME * one.header.timestep
             self.between, self.time = True, time[time <= end + slack]
         self._model = model
         kinds, places = model.jnt_type, model.jnt_qposadr
@@ -93,7 +91,7 @@ class Ruler:
     def curves(self, trace: Trace) -> Curves | None:
         """A run at the moments of the ruler; None if it ended before the last of them."""
         time = trace.time - trace.time[0]
-        if trace.header.ended or time[-1] < self.time[-1] - _SAME * trace.header.timestep - 1e-9:
+        if trace.header.ended or time[-1] < self.time[-1] - SAME * trace.header.timestep - 1e-9:
             return None
         qpos = _rows(time, trace.qpos, self.time, trace.header.timestep)
         found: dict[str, Array] = {}
@@ -146,34 +144,28 @@ class Ruler:
             return np.abs(apart).max(axis=1)
         return np.sqrt((apart**2).sum(axis=1))
 
-    def gap(self, quantity: str, one: Curves, two: Curves) -> Gap:
+    def gap(self, quantity: str, one: Curves, two: Curves) -> Deviation:
         """In one quantity."""
         far = self.distances(quantity, one, two)
-        return Gap(
+        worst, row = largest(far)
+        return Deviation(
             unit=self.units[quantity],
-            worst=float(far.max()),
-            at=float(self.time[far.argmax()]),
+            worst=worst,
+            at=float(self.time[row]),
             rms=float(np.sqrt((far**2).mean())),
             end=float(far[-1]),
         )
 
-    def gaps(self, one: Curves, two: Curves) -> dict[str, Gap]:
+    def gaps(self, one: Curves, two: Curves) -> dict[str, Deviation]:
         """In every quantity."""
         return {name: self.gap(name, one, two) for name in self.units}
 
 
-def _nearest(time: Array, wanted: Array) -> Ints:
-    """The row of the time (n,), ascending, that is nearest to each that is wanted (k,)."""
-    near = np.clip(np.searchsorted(time, wanted), 0, len(time) - 1)
-    near -= (near > 0) & (np.abs(time[near - 1] - wanted) < np.abs(time[near] - wanted))
-    return near
-
-
 def _rows(time: Array, values: Array, wanted: Array, timestep: float) -> Array:
     """Rows at moments: of the run itself where it has them, else between two of them."""
-    near = _nearest(time, wanted)
+    near = nearest(time, wanted)
     found = values[near].copy()
-    off = np.flatnonzero(np.abs(time[near] - wanted) > _SAME * timestep + 1e-9)
+    off = np.flatnonzero(np.abs(time[near] - wanted) > SAME * timestep + 1e-9)
     if len(off):
         found[off] = np.column_stack([np.interp(wanted[off], time, column) for column in values.T])
     return found

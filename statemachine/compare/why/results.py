@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ...experiments._common import Provenance
-from .gap import Gap
+from .gap import Deviation
 
 Way = Literal["parity", "off", "one side", "alike", "none"]
 
 
 @dataclass(frozen=True)
-class Trial:
+class FactorTrial:
     """One factor brought to the same, alone or on top of others, and what became of the gap.
 
     Attributes:
@@ -38,7 +38,7 @@ class Trial:
     way: Way
     had: tuple[str, str]
     did: str
-    gaps: dict[str, Gap]
+    gaps: dict[str, Deviation]
     worst: float | None
     explains: float | None
     moved: float | None
@@ -48,7 +48,7 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Touch:
+class FirstTouch:
     """The first contact of the robot, and how far apart the runs were until then.
 
     Attributes:
@@ -93,13 +93,13 @@ class Attribution:
     names: tuple[str, str]
     quantity: str
     unit: str
-    first: dict[str, Gap]
-    alone: tuple[Trial, ...]
-    ladder: tuple[Trial, ...]
+    first: dict[str, Deviation]
+    alone: tuple[FactorTrial, ...]
+    ladder: tuple[FactorTrial, ...]
     left: float
     negligible: float
     extent: float
-    touch: Touch | None
+    touch: FirstTouch | None
     moments: int
     between: bool
     order: tuple[str, str]
@@ -118,7 +118,7 @@ class Attribution:
         known = [trial.worst for trial in rungs if trial.worst is not None]
         return known[-1] if known else self.gap
 
-    def last(self, trial: Trial) -> float | None:
+    def last(self, trial: FactorTrial) -> float | None:
         """The part of the gap that a factor explains if it comes last of the settings."""
         if trial.put_back is None or not self.gap:
             return None

@@ -10,8 +10,8 @@ from ...experiments.scenarios import Scenario
 from ...interface import Data, Model
 from ...traces import Trace, record
 from .factors import FACTORS
-from .gap import Curves, Gap, Ruler
-from .results import Touch
+from .gap import Curves, Deviation, Ruler
+from .results import FirstTouch
 from .sides import Changes, Side
 
 
@@ -78,7 +78,7 @@ class Runs:
             self.ended = f"{self.names[place]} does not stand: {_first(self._reasons[key])}"
         return self._curves[key]
 
-    def gaps(self, one: Changes, two: Changes) -> dict[str, Gap]:
+    def gaps(self, one: Changes, two: Changes) -> dict[str, Deviation]:
         """The gap with changes on both sides; nothing if one of them did not end well."""
         first, second = self.curves(0, one), self.curves(1, two)
         return self.ruler.gaps(first, second) if first and second else {}
@@ -102,7 +102,7 @@ class Runs:
         return self.gaps({}, {})[self.quantity].worst
 
     @property
-    def touch(self) -> Touch | None:
+    def touch(self) -> FirstTouch | None:
         """The first contact, where there was none from the start."""
         found = [watch for watch in self._watches if watch.time is not None]
         one, two = self._curves[0, ()], self._curves[1, ()]
@@ -113,7 +113,7 @@ class Runs:
         # A contact found at a moment acts from that moment on: the moment itself is before it.
         before = self.ruler.time <= soonest.time + 1e-9
         far = self.ruler.distances(self.quantity, one, two)[before]
-        return Touch(soonest.time, soonest.what, float(far.max()), int(before.sum()))
+        return FirstTouch(soonest.time, soonest.what, float(far.max()), int(before.sum()))
 
 
 class _Watch:

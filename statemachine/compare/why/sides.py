@@ -8,9 +8,11 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
+from ...comparison.text import milliseconds, rounded, significant
+from ...engines import part
+from ...engines.parts import Dials, DialsPart, Setting
 from ...errors import UnsupportedError
 from ...interface import Model
-from ...probes import dials_of, frictionless
 from .factors import FACTORS, Factor
 
 How = Literal["parity", "off"]
@@ -71,7 +73,8 @@ class Side(Protocol):
 
 def side_of(model: Model, options: Mapping[str, Any]) -> Side:
     """The side of a Model, in an experiment with some options."""
-    dials = dials_of(model, options)
+    own: DialsPart | None = part(model.backend, "dials")
+    dials = own.dials(model, options) if own else None
     return EngineSide(model, options, dials) if dials else ModelSide(model, options)
 
 
@@ -108,7 +111,7 @@ class ModelSide:
                 return "the other engine has nothing that corresponds"
             if factor.name == "surfaces":
                 able = _raw(self._as_it_comes, "geom_friction") is not None
-                able = able or frictionless(self._as_it_comes) is not None
+                able = able or part(self._base.backend, "dials") is not None
                 return "" if able else f"{self._base.backend} has no way to set friction"
             if missing:
                 return f"{self._base.backend} cannot leave it out"
@@ -161,7 +164,8 @@ class ModelSide:
         options = {**self._options, **options}
         model = model.replace(**options) if options else model
         smoothed = "surfaces" in changes and changes["surfaces"].how == "off"
-        return (frictionless(model) or model) if smoothed else model
+        dials: DialsPart | None = part(model.backend, "dials") if smoothed else None
+        return dials.frictionless(model) if dials else model
 
     def _off(self, factor: Factor) -> dict[str, Any]:
         if factor.name == "gravity":
@@ -177,17 +181,8 @@ class EngineSide:
     """A Model with `defaults="engine"`: its settings are dials between the engine's and ours."""
 
     fresh = True
-    _WORDS: Mapping[str, str] = {
-        "inertia": "of shapes",
-        "damping": "explicit, +0.04",
-        "armature": "none",
-        "frictionloss": "none",
-        "limits": "hard",
-        "integrator": "its own",
-        "contact": "its own",
-    }
 
-    def __init__(self, model: Model, options: Mapping[str, Any], dials: Any) -> None:
+    def __init__(self, model: Model, options: Mapping[str, Any], dials: Dials) -> None:
         self._dials, self._options = dials, dict(options)
         self._emulated = ModelSide(dials.emulated, {})
         self.label = f"{model.backend} {model.engine_version}, engine defaults"
@@ -211,7 +206,7 @@ class EngineSide:
             return "its motors" if on else "motors hold"
         if factor.name == "surfaces":
             return f"friction {_span(self._dials.frictions)}"
-        return self._WORDS[factor.name]
+        return self._dials.words[factor.name]
 
     def refuses(self, factor: Factor, how: How, values: Values, changes: Changes) -> str:
         if how == "off":
@@ -233,7 +228,9 @@ class EngineSide:
         return {name: change for name, change in changes.items() if name not in gone}
 
     def build(self, changes: Changes) -> Model:
-        settings = {name: "off" if c.how == "off" else "model" for name, c in changes.items()}
+        settings: dict[str, Setting] = {
+            name: "off" if c.how == "off" else "model" for name, c in changes.items()
+        }
         values: dict[str, Any] = {}
         for name, change in changes.items():
             if name == "timestep":
@@ -288,10 +285,10 @@ def _written(model: Model, values: Values) -> Model:
 
 def _in_words(factor: Factor, values: Values) -> str:
     if factor.name == "gravity":
-        return f"{np.linalg.norm(values['gravity']):.3g} m/s²"
+        return rounded(float(np.linalg.norm(values["gravity"])), "m/s²")
     if factor.name == "timestep":
         step, substeps = float(values["timestep"]), int(values["substeps"])
-        return f"{step * 1e3:.3g} ms" + (f" / {substeps}" if substeps > 1 else "")
+        return milliseconds(step, 3) + (f" / {substeps}" if substeps > 1 else "")
     if factor.name in ("armature", "damping", "frictionloss"):
         return _span(values[factor.facts[0]])
     if factor.name == "servo":
@@ -310,4 +307,4 @@ def _span(values: Any) -> str:
     found = np.unique(np.asarray(values)[np.asarray(values) != 0])
     if not found.size:
         return "none"
-    return f"{found[0]:.4g}" + (f" to {found[-1]:.4g}" if found.size > 1 else "")
+    return significant(found[0]) + (f" to {significant(found[-1])}" if found.size > 1 else "")

@@ -10,7 +10,7 @@ The script, ours and without a library, draws both runs in WebGL and moves the c
 from __future__ import annotations
 
 from .page import report
-from .scene import Look
+from .scene import SideDrawing
 from .writing import SUFFIXES, check_target, write_report
 
-__all__ = ["SUFFIXES", "Look", "check_target", "report", "write_report"]
+__all__ = ["SUFFIXES", "SideDrawing", "check_target", "report", "write_report"]

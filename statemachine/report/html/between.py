@@ -8,6 +8,7 @@ import numpy as np
 
 from ...compare import Series, series
 from ...compare.series import NORMAL
+from ...comparison import same_pairs
 from ...interface import Array, Ints, JointType
 from ...traces import Trace
 from .scene import slerp
@@ -88,9 +89,14 @@ def own_series(one: Trace, two: Trace, tip: str | None) -> dict[str, tuple[Serie
     """Each side's curves at all of its own rows, by name; of what both have."""
     sides = [{curve.name: curve for curve in series(trace, trace, tip)} for trace in (one, two)]
     found = {}
+    forces = [
+        {name.removesuffix(NORMAL): name for name in side if name.endswith(NORMAL)}
+        for side in sides
+    ]
+    called = {name: pair + NORMAL for pair, name in same_pairs(*forces).items()}
+    sides[1] = {called.get(name, name): curve for name, curve in sides[1].items()}
     for name in dict.fromkeys([*sides[0], *sides[1]]):
-        turned = " – ".join(reversed(name.removesuffix(NORMAL).split(" – "))) + NORMAL
-        pair = [side.get(name) or side.get(turned) for side in sides]
+        pair = [side.get(name) for side in sides]
         known = pair[0] or pair[1]
         if known is not None and known.kind == "force":  # a side that never touches presses nothing
             pair = [each or _nothing(known, t) for each, t in zip(pair, (one, two), strict=True)]

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...compare.why import Attribution, Trial
-from ..why import amount, conclusion, percent
-from .finding import capital, moves, title
+from ...compare.why import Attribution, FactorTrial
+from ...comparison.text import capital, listed, percent
+from ..why_words import amount, conclusion
+from .finding import moves, title
 from .markup import Html, joined, kept, tag
 from .sections import table
 
@@ -102,36 +103,36 @@ def agreement_steps(found: Attribution) -> Html | None:
         what = f"What remains is all of the gap, {same}."
     if rest:
         last = rest[-1]
-        listed = " and ".join(title(t.factor) for t in rest)
+        names = listed([title(t.factor) for t in rest])
         what += (
-            f" With {listed} left out on both ({last.did.removesuffix(', both')}) it is "
+            f" With {names} left out on both ({last.did.removesuffix(', both')}) it is "
             f"{amount(found, last.worst)}: that is each engine's own doing, and no setting that "
             "was tried brings it to the same."
         )
     return joined((first, tag("ol", *items) if items else "", tag("p", kept(what))))
 
 
-def _whose(found: Attribution, trial: Trial) -> str:
+def _whose(found: Attribution, trial: FactorTrial) -> str:
     one, two = found.names
     return two if trial.did == f"as {one}" else one
 
 
-def _left(found: Attribution, trial: Trial) -> str:
+def _left(found: Attribution, trial: FactorTrial) -> str:
     if trial.worst is None:
         return trial.note or "not known by itself"
     return amount(found, trial.worst)
 
 
-def _change(found: Attribution, trial: Trial) -> str:
+def _change(found: Attribution, trial: FactorTrial) -> str:
     had = trial.had if trial.did == f"as {found.names[0]}" else trial.had[::-1]
     return f"{had[1]} → {had[0]}"
 
 
-def _did(found: Attribution, trial: Trial) -> str:
+def _did(found: Attribution, trial: FactorTrial) -> str:
     return _change(found, trial) if trial.way == "parity" else trial.did or "–"
 
 
-def _star(found: Attribution, trials: Sequence[Trial]) -> list[Html]:
+def _star(found: Attribution, trials: Sequence[FactorTrial]) -> list[Html]:
     if not any(moves(trial) for trial in trials):
         return []
     text = (

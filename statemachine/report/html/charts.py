@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...compare import Agreement, Series
+from ...comparison import largest
+from ...comparison.text import figure, quantity, reading, short_time
 from ...interface import Array, Ints
-from ..figures_of import figure, quantity, scale_of, short_time
 from ..log_axis import LogAxis
 from .finding import name_of
 from .markup import Html, joined, tag
@@ -36,13 +37,13 @@ class Curve:
 
 def difference_chart(curve: Series, found: Agreement, points: int = 600) -> Html:
     """How far apart over time, with the tolerance as a band."""
-    scale = scale_of(curve.kind)[0]
+    scale = reading(curve.unit)[0]
     top = 1.08 * max(float(curve.difference.max()), found.tolerance) * scale
     said = (
         f"{name_of(curve.name)}, difference over time: at most "
-        f"{quantity(found.max, curve.kind)} at {short_time(found.at)}, settled at "
-        f"{quantity(found.settled, curve.kind)}; tolerance "
-        f"{quantity(found.tolerance, curve.kind)}, "
+        f"{quantity(found.max, curve.unit)} at {short_time(found.at)}, settled at "
+        f"{quantity(found.settled, curve.unit)}; tolerance "
+        f"{quantity(found.tolerance, curve.unit)}, "
         + ("never left." if found.since is None else f"left at {short_time(found.since)}.")
     )
     band = found.tolerance * scale
@@ -77,7 +78,7 @@ def values_chart(
     if not one.one.size or not two.one.size:
         return None
     until = min(float(one.time[-1]), float(two.time[-1]))
-    scale, unit = scale_of(one.kind)
+    scale, unit = reading(one.unit)
     curves, ends = [], []
     for side, look in ((one, "one"), (two, "two")):
         inside = side.time <= until + 1e-9
@@ -102,9 +103,9 @@ def values_chart(
 
 def data_table(curve: Series, found: Agreement, labels: tuple[str, str]) -> Html:
     """The figures of a chart: moments evenly spaced, and that of the largest difference."""
-    scale, unit = scale_of(curve.kind)
+    scale, unit = reading(curve.unit)
     rows = np.linspace(0, len(curve.time) - 1, min(_ROWS, len(curve.time))).round().astype(int)
-    worst = int(np.argmax(curve.difference))
+    _, worst = largest(curve.difference)
     rows = np.unique([*rows, worst])
     columns = []
     parts = "xyz" if curve.one.ndim == 2 and curve.one.shape[1] == 3 else ("",)

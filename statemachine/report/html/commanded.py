@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...comparison import largest
+from ...comparison.text import figure, quantity
 from ...interface import Array, JointType
 from ...traces import Trace
-from ..figures_of import figure
 from .markup import Html, kept, tag
 from .sections import table
 
@@ -86,7 +87,7 @@ def _misses(one: Trace, two: Trace, labels: tuple[str, str]) -> str:
     each = []
     for trace, label in zip((one, two), labels, strict=True):
         far = _ends(trace)
-        worst = int(np.argmax(far))
+        most, worst = largest(far)
         name = trace.header.actuators[worst]
-        each.append(f"{name} on {label}, by {figure(float(np.degrees(far[worst])))}°")
+        each.append(f"{name} on {label}, by {quantity(most, 'rad')}")
     return f" In the end farthest from that is {' and '.join(each)}."

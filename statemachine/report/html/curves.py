@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ...compare import Comparison, Series
-from ..figures_of import scale_of
+from ...comparison.text import reading
 from . import sections
 from .charts import data_table, difference_chart, logarithmic, values_chart
 from .finding import name_of
@@ -35,7 +35,7 @@ def curves_section(
     for curve in curves:
         found = by_name[curve.name]
         chart = values_chart(*own[curve.name], labels, points) if curve.name in own else None
-        unit = scale_of(curve.kind)[1].strip()
+        unit = reading(curve.unit)[1].strip()
         axis = "log axis; " if logarithmic(found) else ""
         said = f"how far apart, {unit}; {axis}shaded: within tolerance"
         row = tag(
@@ -54,7 +54,7 @@ def curves_section(
                 data_table(curve, found, labels), class_="data"),
             class_="quantity-row",
         )  # fmt: skip
-        shown[found.verdict].append((-found.max / found.tolerance, row))
+        shown[found.verdict].append((-found.tolerances, row))
     beyond = [row for v in ("differs", "settles") for _, row in sorted(shown[v], key=_first)]
     within = [row for _, row in sorted(shown["agrees"], key=_first)]
     key = tag(

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...compare import Agreement, Comparison, Series
 from ...compare.agreement import SETTLED
-from ..figures_of import quantity, short_time
+from ...compare.why import FACTORS, Attribution, FactorTrial
+from ...comparison.text import capital, milliseconds, percent, quantity, short_time, significant
+from ..why_words import amount
 from .timeline import Event
-
-if TYPE_CHECKING:
-    from ...compare.why import Attribution, Trial
 
 MOTION = ("joint", "slide", "tip", "tip rotation", "body", "body rotation")
 _SOME = 0.1  # share of the gap from which on a factor is a cause
@@ -24,7 +22,7 @@ _MOVES = 0.1  # share by which a difference may change in the end and be called 
 
 
 @dataclass(frozen=True)
-class Finding:
+class Headline:
     """What the page begins with.
 
     Attributes:
@@ -44,7 +42,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Subject:
+class MainDifference:
     """The difference to speak of: its name, the largest value as text, and when [s]."""
 
     named: str
@@ -58,23 +56,23 @@ def headline(
     events: Sequence[Event],
     attribution: Attribution | None = None,
     curves: Sequence[Series] = (),
-) -> Finding:
+) -> Headline:
     """The largest difference, what explains it, and what is left of it in the end."""
     if comparison.agrees:
         if all(found.max == 0 for found in comparison.agreements):
-            return Finding("The two runs are the same in every figure that was compared")
-        return Finding(
+            return Headline("The two runs are the same in every figure that was compared")
+        return Headline(
             f"The two runs agree for {comparison.until:g} s: nothing leaves its tolerance"
         )
     of = subject(comparison, attribution)
     if all(found.verdict == "agrees" for found in comparison.agreements):
         sides = [side.label for side in (comparison.one, comparison.two) if side.ended]
-        return Finding(
+        return Headline(
             f"The two runs agree for {comparison.until:g} s, and {' and '.join(sides)} ended "
             "before its time"
         )
     if of is None:
-        return Finding("The two runs differ")
+        return Headline("The two runs differ")
     if of.found is not None and of.found.kind == "contact":
         found = of.found
         lead = f"{name_of(found.name)}: {found.note or of.far + ' apart'}"
@@ -84,7 +82,7 @@ def headline(
         if names[0] != names[1]:
             lead += f" on {names[0]} and {names[1]}"
         lead += f", at {short_time(of.at)}"
-    return Finding(
+    return Headline(
         capital("; ".join([lead, *_parting(comparison, events)])),
         _causes(attribution),
         _in_the_end(comparison, curves),
@@ -129,13 +127,13 @@ def _in_the_end(comparison: Comparison, curves: Sequence[Series]) -> str:
         return ""  # what is no number is neither within its tolerance nor beyond it
     if not still:
         return f"{over}, all of the motion is within its tolerance." if motion else ""
-    most = max(still, key=lambda found: found.settled / found.tolerance)
-    text = f"{over} {named(most)} is still {quantity(most.settled, most.kind)} apart"
+    most = max(still, key=lambda found: found.settled / (found.tolerance or 1e-300))
+    text = f"{over} {named(most)} is still {quantity(most.settled, most.unit)} apart"
     curve = next((each for each in curves if each.name == most.name), None)
     last = None if curve is None else changing(curve, most)
     if last is None:
         return f"{text}."
-    return f"{text}, and still changing: {quantity(last, most.kind)} at the last moment."
+    return f"{text}, and still changing: {quantity(last, most.unit)} at the last moment."
 
 
 def changing(curve: Series, found: Agreement) -> float | None:
@@ -166,15 +164,15 @@ def _meets(what: str) -> str:
     return f"{one} touches {two}"
 
 
-def subject(comparison: Comparison, attribution: Attribution | None = None) -> Subject | None:
+def subject(
+    comparison: Comparison, attribution: Attribution | None = None
+) -> MainDifference | None:
     """The largest difference: that whose causes were looked for, else the leading one."""
     found = leading(comparison)
     if attribution is None or not attribution.alone:
         if found is None:
             return None
-        return Subject(named(found), quantity(found.max, found.kind), found.at, found)
-    from ..why import amount
-
+        return MainDifference(named(found), quantity(found.max, found.unit), found.at, found)
     gap = attribution.first[attribution.quantity]
     kinds = {"joints": "joint", "slides": "slide"}
     kind = kinds.get(attribution.quantity)
@@ -186,22 +184,21 @@ def subject(comparison: Comparison, attribution: Attribution | None = None) -> S
     ]
     far = amount(attribution, gap.worst)
     if same:
-        return Subject(named(same[0]), far, gap.at, same[0])
+        return MainDifference(named(same[0]), far, gap.at, same[0])
     who = f"one of the {attribution.quantity}" if kind else f"the {attribution.quantity}"
-    return Subject(who, far, gap.at, None)
+    return MainDifference(who, far, gap.at, None)
 
 
 def leading(comparison: Comparison) -> Agreement | None:
     """The quantity farthest beyond its tolerance; of the motion if any of that is beyond."""
     beyond = [each for each in comparison.agreements if each.verdict != "agrees"]
     motion = [each for each in beyond if each.kind in MOTION]
-    return max(motion or beyond, key=_tolerances, default=comparison.worst)
+    return max(motion or beyond, key=_finite_first, default=comparison.worst)
 
 
-def _tolerances(found: Agreement) -> float:
+def _finite_first(found: Agreement) -> float:
     """How many tolerances it is beyond; what is no number comes last."""
-    share = found.max / found.tolerance
-    return share if np.isfinite(share) else -1.0
+    return found.tolerances if np.isfinite(found.tolerances) else -1.0
 
 
 def parting(comparison: Comparison) -> float | None:
@@ -237,7 +234,7 @@ def in_words(
         if worst is not None and worst.max:
             text += (
                 f" Nearest to its tolerance comes {name_of(worst.name)}: "
-                f"{quantity(worst.max, worst.kind)} of {quantity(worst.tolerance, worst.kind)}."
+                f"{quantity(worst.max, worst.unit)} of {quantity(worst.tolerance, worst.unit)}."
             )
         found.append(text)
     else:
@@ -252,13 +249,13 @@ def in_words(
         if of is not None and of.found is not None and of.found.kind != "contact":
             text += (
                 f" The tolerance of {named(of.found)} is "
-                f"{quantity(of.found.tolerance, of.found.kind)}."
+                f"{quantity(of.found.tolerance, of.found.unit)}."
             )
         far = leading(comparison)
         if of is not None and of.found is None and far is not None:
             text += (
                 f" Farthest beyond its tolerance is {named(far)}: "
-                f"{quantity(far.max, far.kind)} of {quantity(far.tolerance, far.kind)}, at "
+                f"{quantity(far.max, far.unit)} of {quantity(far.tolerance, far.unit)}, at "
                 f"{short_time(far.at)}."
             )
         found.append(text)
@@ -279,10 +276,10 @@ def coarsely(comparison: Comparison) -> str:
     if apart is None:
         return ""
     steps = " and ".join(
-        f"{1000 * step:.3g}" for step in (comparison.one.timestep, comparison.two.timestep)
+        significant(1000 * step, 3) for step in (comparison.one.timestep, comparison.two.timestep)
     )
     return (
-        f"The sides step every {steps} ms and meet every {1000 * apart:.3g} ms. Figures are of "
+        f"The sides step every {steps} ms and meet every {milliseconds(apart, 3)}. Figures are of "
         "these common moments alone: times are no finer, and a peak between two of them is not "
         "seen, so a largest difference may be larger."
     )
@@ -296,8 +293,6 @@ def _causes(attribution: Attribution | None) -> tuple[str, ...]:
     """What takes the largest difference away, of the ladder; what is a proof comes first."""
     if attribution is None or not attribution.alone:
         return ()
-    from ..why import amount, percent
-
     counted = [trial for trial in attribution.ladder if trial.explains is not None]
     if max((trial.explains or 0.0 for trial in counted), default=0.0) < _SOME:
         return ("None of the factors that were tried explains a tenth of it.",)
@@ -332,18 +327,11 @@ def _all(attribution: Attribution) -> str:
     return f"the {attribution.quantity} is"
 
 
-def moves(trial: Trial) -> bool:
+def moves(trial: FactorTrial) -> bool:
     """Whether it moves the first side itself, so that the gap is of another motion."""
     return bool(trial.moved and trial.worst is not None and trial.way != "none")
 
 
 def title(factor: str) -> str:
     """A factor in words."""
-    from ...compare.why import FACTORS
-
     return FACTORS[factor].title if factor in FACTORS else factor
-
-
-def capital(text: str) -> str:
-    """With a capital letter first."""
-    return text[:1].upper() + text[1:]

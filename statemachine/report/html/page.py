@@ -7,36 +7,36 @@ import hashlib
 import re
 from collections.abc import Mapping, Sequence
 from importlib import resources
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ... import __version__
 from ...compare import Comparison, Series, Witness, default_tip, series
-from ...compare.series import NORMAL, same_pairs, total_forces
+from ...compare.series import NORMAL, total_forces
+from ...compare.why import Attribution
+from ...comparison import same_pairs
+from ...comparison.text import figure, sentence
 from ...page import Page, Verdict
 from ...traces import Trace
-from ..figures_of import figure
 from . import sections
 from .between import own_series, shown_series
 from .budget import Budget
+from .causes import agreement_steps, causes_section
 from .commanded import commanded
 from .curves import curves_section
-from .finding import Finding, headline, in_words, leading, subject
+from .finding import Headline, headline, in_words, leading, subject
 from .geometry import packed
 from .markup import Html, data_of, escaped, joined, kept, tag
 from .pressing import pressing_words
-from .scene import Look, scene_of
+from .scene import SideDrawing, scene_of
 from .sketch import sketch
 from .stage import quantity_data, stage
 from .timeline import events_of, frames_of
 
-if TYPE_CHECKING:
-    from ...compare.why import Attribution
-
 _SCRIPTS = ("gl.js", "scene.js", "page.js")
 LIMIT = 2_000_000  # bytes of a page
-_NO_LOOK = Look(None, "no model was given")
+_NO_LOOK = SideDrawing(None, "no model was given")
 
 
 def report(
@@ -44,7 +44,7 @@ def report(
     one: Trace,
     two: Trace,
     *,
-    looks: Sequence[Look] = (_NO_LOOK, _NO_LOOK),
+    looks: Sequence[SideDrawing] = (_NO_LOOK, _NO_LOOK),
     tip: str | None = None,
     attribution: Attribution | None = None,
     why_not: str = "",
@@ -97,7 +97,7 @@ def _report(
     one: Trace,
     two: Trace,
     *,
-    looks: Sequence[Look],
+    looks: Sequence[SideDrawing],
     tip: str | None,
     attribution: Attribution | None,
     why_not: str,
@@ -141,8 +141,6 @@ def _report(
         stage(comparison, drawn, events, frames, start, labels, still, site, scene.strongest),
     ]
     if attribution is not None:
-        from .causes import agreement_steps, causes_section
-
         parts.append(_section("why", "What causes it", causes_section(attribution)))
         steps = agreement_steps(attribution)
     elif why_not:
@@ -176,7 +174,7 @@ def _report(
         parts.append(_section("emulated", "What is emulated", emulated))
     if steps is not None:
         parts.append(_section("agree", "To make them agree", steps))
-    notes = [_sentence(line) for line in (*said, *comparison.notes, *scene.notes)]
+    notes = [sentence(line) for line in (*said, *comparison.notes, *scene.notes)]
     parts.append(
         _section(
             "origin",
@@ -213,7 +211,7 @@ def _head(
     comparison: Comparison,
     one: Trace,
     labels: tuple[str, str],
-    finding: Finding,
+    finding: Headline,
     never: Sequence[str],
     words: Sequence[str],
     command: Html | None,
@@ -335,8 +333,3 @@ def _assembled(title: str, body: Html, data: dict[str, Any]) -> str:
 
 def _file(name: str) -> str:
     return resources.files(__package__ or "").joinpath(name).read_text(encoding="utf-8")
-
-
-def _sentence(line: str) -> str:
-    text = line[:1].upper() + line[1:]
-    return text if text.endswith(".") else text + "."

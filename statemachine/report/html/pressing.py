@@ -10,9 +10,8 @@ import numpy as np
 from ...compare import Comparison
 from ...compare.agreement import SETTLED
 from ...compare.series import world_forces
+from ...comparison.text import figure, quantity, short_time
 from ...traces import Trace
-from ..figures_of import figure, short_time
-from .timeline import touching
 
 
 @dataclass(frozen=True)
@@ -45,8 +44,10 @@ def pressing(trace: Trace, until: float) -> Pressing | None:
     rows = trace["contact_row"][inside]
     if not len(rows):
         return Pressing({}, None, False, 0.0, 0.0, "", {})
-    names = touching(trace)
-    pairs = np.array([names[tuple(geoms)] for geoms in trace["contact_geom"][inside].tolist()])
+    pairs = np.empty(len(trace["contact_row"]), dtype=object)
+    for pair, places in trace.contact_pairs().items():
+        pairs[places] = pair
+    pairs = pairs[inside]
     normal = trace["contact_force"][inside][:, 0]
     end = np.flatnonzero((elapsed >= (1 - SETTLED) * until - 1e-9) & (elapsed <= until + 1e-9))
     late = np.isin(rows, end) & np.isfinite(normal)
@@ -92,7 +93,7 @@ def pressing_words(comparison: Comparison, traces: Sequence[Trace]) -> tuple[lis
     each = [_end(side, label) for side, label in zip((one, two), labels, strict=True)]
     said = [f"{over}, on average: {'; '.join(each)}."]
     deep = [
-        f"{figure(1000 * side.deepest)} mm on {label} ({side.deep}, at {short_time(side.deep_at)})"
+        f"{quantity(side.deepest, 'm')} on {label} ({side.deep}, at {short_time(side.deep_at)})"
         for side, label in zip((one, two), labels, strict=True)
         if side.deepest > 0
     ]

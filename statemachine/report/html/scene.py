@@ -24,7 +24,7 @@ ASPECT = 1.45  # width of the picture through its height
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class SideDrawing:
     """What a side is drawn as.
 
     Attributes:
@@ -61,7 +61,7 @@ def scene_of(
     one: Trace,
     two: Trace,
     frames: Frames,
-    looks: Sequence[Look],
+    looks: Sequence[SideDrawing],
     tip: str,
     budget: Budget,
     start: int = 0,
@@ -155,7 +155,9 @@ def _nearness(tips: tuple[Array, Array] | None, start: int, extent: float) -> di
     }
 
 
-def _drawings(traces: Sequence[Trace], looks: Sequence[Look]) -> tuple[list[str], list[Drawing]]:
+def _drawings(
+    traces: Sequence[Trace], looks: Sequence[SideDrawing]
+) -> tuple[list[str], list[Drawing]]:
     """A drawing for each side, of sticks where there is none better."""
     notes: list[str] = []
     found: list[Drawing] = []

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ...compare import Agreement, Comparison, Witness
+from ...comparison.text import capital, milliseconds, numbers, quantity, short_time
 from ...page import Code, Page, Printed, Table, Text, Verdict
 from ...traces import Header
-from ..figures_of import quantity, short_time
-from .finding import capital, coarsely, name_of, window
+from .finding import coarsely, name_of, window
 from .markup import Html, joined, kept, tag
 from .timeline import Event
 
@@ -61,7 +61,7 @@ def agreements(comparison: Comparison) -> Html:
     reasons: dict[tuple[str, str], str] = {}
     rows = []
     for found in comparison.agreements:
-        key = quantity(found.tolerance, found.kind), found.reason
+        key = quantity(found.tolerance, found.unit), found.reason
         letter = reasons.setdefault(key, _letter(len(reasons)))
         allowed = joined((key[0], tag("sup", tag("a", letter, href=f"#why-{letter}"))))
         rows.append((name_of(found.name), verdict_badge(found.verdict), *_figures(found), allowed))
@@ -111,12 +111,12 @@ def small(value: float, found: Agreement) -> str:
     """A difference as text; what is a millionth of its tolerance is rounding."""
     if 0 < abs(value) < ROUNDING * found.tolerance:
         return "≈ 0"
-    return quantity(value, found.kind)
+    return quantity(value, found.unit)
 
 
 def _figures(found: Agreement) -> tuple[object, ...]:
     if found.kind == "contact":
-        return found.note or quantity(found.max, "contact"), go(found.at), "–", "–", "–"
+        return found.note or quantity(found.max, found.unit), go(found.at), "–", "–", "–"
     return (
         small(found.max, found),
         go(found.at),
@@ -235,8 +235,8 @@ def provenance(headers: tuple[Header, Header], comparison: Comparison) -> Html:
     row("defaults", *(header.defaults for header in headers))
     row("options", *(_options(header) for header in headers))
     row("starts in", *(h.keyframe or "the default state" for h in headers))
-    row("timestep", *(f"{1000 * h.timestep:.4g} ms" + _substeps(h) for h in headers))
-    row("gravity", *(" ".join(f"{g:g}" for g in h.gravity) + " m/s²" for h in headers))
+    row("timestep", *(milliseconds(h.timestep) + _substeps(h) for h in headers))
+    row("gravity", *(numbers(h.gravity) + " m/s²" for h in headers))
     row("rows", f"{comparison.one.rows}", f"{comparison.two.rows}")
     row("seed", *("none drawn" if p.seed is None else p.seed for p in (a, b)))
     row("energies by", *(header.energy_by or "–" for header in headers))

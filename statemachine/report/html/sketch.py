@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...comparison.text import short_time
 from ...interface import Array
 from ...traces import Trace
-from ..figures_of import short_time
 from .markup import Html, tag
 from .scene import ASPECT, OPENING, Scene, axes_of
 from .timeline import Frames

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...compare import Comparison, Series
-from ..figures_of import figure, scale_of, short_time
+from ...comparison.text import figure, reading, short_time
 from .charts import time_axis
 from .finding import name_of
 from .geometry import packed
@@ -245,7 +245,7 @@ def _beyond(curve: Series, comparison: Comparison) -> list[list[float]]:
 def quantity_data(curve: Series, comparison: Comparison) -> dict[str, Any]:
     """What the script shows of a quantity at each moment shown, and when it is beyond."""
     found = next(each for each in comparison.agreements if each.name == curve.name)
-    scale, unit = scale_of(curve.kind)
+    scale, unit = reading(curve.unit)
     data: dict[str, Any] = {
         "name": name_of(curve.name),
         "unit": unit.replace(" ", "\u00a0"),

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from ...compare import Comparison
-from ...compare.align import common_moments
+from ...comparison import common_moments, same_pairs
 from ...interface import Array, Ints
 from ...traces import Trace
 
@@ -107,12 +106,11 @@ def events_of(comparison: Comparison, one: Trace, two: Trace) -> list[Event]:
     found: list[Event] = []
     until = comparison.until
     first = [_touches(trace, until) for trace in (one, two)]
+    first[1] = same_pairs(*first)
     for pair in dict.fromkeys([*first[0], *first[1]]):
-        times = [side.get(pair) for side in first]
-        what = next(side[pair][1] for side in first if pair in side)
-        for side, each in enumerate(times):
-            if each is not None:
-                found.append(Event(each[0], "touch", f"first touch: {what}", side, what))
+        for side, times in enumerate(first):
+            if pair in times:
+                found.append(Event(times[pair], "touch", f"first touch: {pair}", side, pair))
     since: dict[float, list[str]] = {}
     largest: dict[float, list[str]] = {}
     for agreement in comparison.agreements:
@@ -134,39 +132,8 @@ def events_of(comparison: Comparison, one: Trace, two: Trace) -> list[Event]:
     return sorted(found, key=lambda event: event.time)
 
 
-def _touches(trace: Trace, until: float) -> dict[tuple[int, int], tuple[float, str]]:
-    """When each pair of bodies first touches, and what there touches what."""
-    found: dict[tuple[int, int], tuple[float, str]] = {}
-    if "contact_row" not in trace:
-        return found
-    header = trace.header
-    for row, geoms in zip(
-        trace["contact_row"].tolist(), trace["contact_geom"].tolist(), strict=True
-    ):
-        bodies = [header.geom_bodyid[geom] for geom in geoms]
-        pair = min(bodies), max(bodies)
-        time = float(trace.time[row] - trace.time[0])
-        if pair in found or time > until + 1e-9:
-            continue
-        found[pair] = time, _pair(trace, geoms)
-    return found
-
-
-def touching(trace: Trace) -> dict[tuple[int, int], str]:
-    """What each pair of geoms that touches is called, as "gripper on floor"."""
-    found: dict[tuple[int, int], str] = {}
-    for one, two in np.unique(trace["contact_geom"], axis=0).tolist():
-        found[one, two] = _pair(trace, (one, two))
-    return found
-
-
-def _pair(trace: Trace, geoms: Sequence[int]) -> str:
-    bodies = [trace.header.geom_bodyid[geom] for geom in geoms]
-    order = sorted(range(2), key=lambda k: -bodies[k])  # what hangs further out comes first
-    return " on ".join(_name(trace, geoms[k], bodies[k]) for k in order)
-
-
-def _name(trace: Trace, geom: int, body: int) -> str:
-    """A body's name; of what stands in the world, its own."""
-    name = trace.header.geoms[geom]
-    return name if body == 0 and name else trace.header.bodies[body]
+def _touches(trace: Trace, until: float) -> dict[str, float]:
+    """When each pair of bodies first touches [s], of those that do by then."""
+    time = trace.time - trace.time[0]
+    first = {pair: float(time[np.argmax(rows)]) for pair, rows in trace.touches().items()}
+    return {pair: at for pair, at in first.items() if at <= until + 1e-9}

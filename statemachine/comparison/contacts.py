@@ -1,0 +1,84 @@
+"""What a contact is called: "gripper on floor", the same in every room."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TypeVar
+
+from ..interface import Model
+
+_T = TypeVar("_T")
+
+
+class ContactNames:
+    """Names for the contacts of one model.
+
+    A contact is between two bodies: the one that has more bodies between itself and the world
+    comes first; of two with as many, that with the larger id. What is fixed to the world has
+    the name of its geom. So a robot is on what it touches, and everything is on the floor.
+    """
+
+    def __init__(
+        self,
+        bodies: Sequence[str],
+        geoms: Sequence[str],
+        geom_bodyid: Sequence[int],
+        body_parentid: Sequence[int],
+    ) -> None:
+        """Of names by id, "" for none; the body of each geom, and the parent of each body."""
+        self._bodies = [name or f"body {k}" for k, name in enumerate(bodies)]
+        self._geoms = list(geoms)
+        self._body_of = [int(body) for body in geom_bodyid]
+        self._parents = [int(parent) for parent in body_parentid]
+        self._pairs: dict[tuple[int, int], str] = {}
+
+    @classmethod
+    def of(cls, model: Model) -> ContactNames:
+        """The names of a Model."""
+        return cls(
+            model.body_names,
+            model.geom_names,
+            model.geom_bodyid.tolist(),
+            model.body_parentid.tolist(),
+        )
+
+    def pair(self, one: int, two: int) -> str:
+        """The bodies of two geoms that touch: "gripper on floor"."""
+        if (one, two) not in self._pairs:
+            self._pairs[one, two] = " on ".join(map(self._owner, self._ordered(one, two)))
+        return self._pairs[one, two]
+
+    def geoms(self, one: int, two: int) -> str:
+        """The same, and which of a body's geoms it is: "gripper on floor (fixed_stud_1)"."""
+        names = [self._geoms[geom] for geom in self._ordered(one, two)]
+        owners = map(self._owner, self._ordered(one, two))
+        told = [name for name, owner in zip(names, owners, strict=True) if name not in ("", owner)]
+        return self.pair(one, two) + (f" ({', '.join(told)})" if told else "")
+
+    def _owner(self, geom: int) -> str:
+        body = self._body_of[geom]
+        return self._bodies[body] if body else self._geoms[geom] or self._bodies[0]
+
+    def _ordered(self, one: int, two: int) -> list[int]:
+        return sorted((one, two), key=self._distance, reverse=True)
+
+    def _distance(self, geom: int) -> tuple[int, int]:
+        """How many bodies are between a geom and the world, and the number of its own."""
+        body = above = self._body_of[geom]
+        for count in range(len(self._parents)):
+            if not above:
+                return count, body
+            above = self._parents[above]
+        return len(self._parents), body  # a file may say that a body hangs on itself
+
+
+def same_pairs(one: Mapping[str, _T], two: Mapping[str, _T]) -> dict[str, _T]:
+    """What `two` has by pair of bodies, the pairs called as in `one`.
+
+    Two models may number the same bodies in another order.
+    """
+    found = {}
+    for pair, value in two.items():
+        turned = " on ".join(reversed(pair.split(" on ")))
+        found[turned if turned in one and pair not in one else pair] = value
+    return found

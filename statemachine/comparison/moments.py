@@ -1,0 +1,70 @@
+"""Two runs at common moments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ..errors import TraceError
+from ..interface import Array, Ints
+
+SAME = 1e-6  # of a timestep: two moments nearer than this are one
+_FEW = 20  # common moments below which a comparison says nothing
+
+
+class Sampled(Protocol):
+    """A run as rows of one moment each, as a Trace."""
+
+    @property
+    def time(self) -> Array:
+        """(n,) ascending [s]."""
+        ...
+
+    @property
+    def timestep(self) -> float:
+        """Simulated time between two rows [s]."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Common:
+    """The moments that two runs share, counted from the start of each.
+
+    Attributes:
+        time: (n,) since the start [s].
+        one, two: (n,) rows of the runs.
+    """
+
+    time: Array
+    one: Ints
+    two: Ints
+
+
+def common_moments(one: Sampled, two: Sampled) -> Common:
+    """Rows of the same moment: nothing is interpolated.
+
+    Timesteps of 1/200 and 1/240 s meet every 25 ms; what happens between is left out.
+
+    Raises:
+        TraceError: They share too few moments.
+    """
+    times = [run.time - run.time[0] for run in (one, two)]
+    near = nearest(times[1], times[0])
+    # A time is a sum of timesteps: its rounding grows with their number.
+    slack = SAME * min(one.timestep, two.timestep) + 1e-12 * np.arange(len(times[0]))
+    rows = np.flatnonzero(np.abs(times[1][near] - times[0]) <= slack)
+    if len(rows) < min(_FEW, *map(len, times)):
+        raise TraceError(
+            f"timesteps of {one.timestep:g} and {two.timestep:g} s have only {len(rows)} moments "
+            "in common: record one of them with the other's timestep"
+        )
+    return Common(times[0][rows], rows, near[rows])
+
+
+def nearest(time: Array, wanted: Array) -> Ints:
+    """The row of the time (n,), ascending, that is nearest to each that is wanted (k,)."""
+    near = np.clip(np.searchsorted(time, wanted), 0, len(time) - 1)
+    near -= (near > 0) & (np.abs(time[near - 1] - wanted) < np.abs(time[near] - wanted))
+    return near

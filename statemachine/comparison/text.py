@@ -1,0 +1,177 @@
+"""Numbers and lists as text, in the units that a reader thinks in: degrees and millimetres."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+NONE = "–"  # where there is no number
+TINY = 1e-6  # what is less, in the unit that is read, is only called so
+_READ = {"rad": (180.0 / math.pi, "°"), "m": (1e3, "mm"), "s": (1e3, "ms")}
+
+
+def reading(unit: str) -> tuple[float, str]:
+    """From an SI unit to the one that is read: the factor, and the unit as it follows a figure."""
+    factor, name = _READ.get(unit, (1.0, unit))
+    return factor, after(name)
+
+
+def after(unit: str) -> str:
+    """A unit as it follows a figure: " mm", "°"."""
+    return unit if unit in ("", "°") else f" {unit}"
+
+
+def quantity(value: float | None, unit: str) -> str:
+    """A value [SI unit] with three significant digits, in the unit that is read."""
+    if value is None:
+        return NONE
+    if math.isnan(value):
+        return "none"
+    factor, name = reading(unit)
+    return f"{figure(value * factor)}{name}"
+
+
+def rounded(value: float, unit: str, digits: int = 3) -> str:
+    """A value [SI unit] to some significant digits, without zeros at the end."""
+    factor, name = reading(unit)
+    return f"{significant(value * factor, digits)}{name}"
+
+
+def distance(size: float, unit: str, digits: int = 3) -> str:
+    """The same of a size; what is below a millionth is only called so."""
+    factor, name = reading(unit)
+    return rounded(size, unit, digits) if size * factor >= TINY else f"below {TINY:g}{name}"
+
+
+def rough(value: float, unit: str = "") -> str:
+    """A size [SI unit] to two digits, or its order of magnitude where it is tiny."""
+    factor, name = reading(unit)
+    value *= factor
+    if not math.isfinite(value):
+        return f"beyond all{name}"
+    if value >= 100:
+        return f"{value:.0f}{name}"
+    return f"{value:.2g}{name}" if value >= 1e-3 or value == 0 else f"{value:.0e}{name}"
+
+
+def figure(value: float) -> str:
+    """A number with three significant digits; tiny ones with their power of ten."""
+    if value == 0:
+        return "0"
+    if not math.isfinite(value):
+        return "no number" if math.isnan(value) else str(value)
+    size = abs(value)
+    if size < 1e-3 or size >= 1e5:
+        return f"{value:.0e}".replace("e-0", "e-").replace("e+0", "e")
+    digits = max(0, 2 - math.floor(math.log10(size)))
+    return f"{value:.{min(digits, 4)}f}"
+
+
+def significant(value: float, digits: int = 4) -> str:
+    """A number to some significant digits; zero has no sign."""
+    return f"{value + 0.0:.{digits}g}"
+
+
+def fixed(value: float, decimals: int) -> str:
+    """A number to some decimals; what rounds to zero has no sign."""
+    text = f"{value:.{decimals}f}"
+    return text.removeprefix("-") if float(text) == 0 else text
+
+
+def signed(value: float | None, decimals: int = 4) -> str:
+    """A number with its sign; what rounds to zero has none."""
+    if value is None:
+        return NONE
+    text = f"{value:+.{decimals}f}"
+    return text[1:] if float(text) == 0 else text
+
+
+def vector(values: Iterable[float], decimals: int = 4) -> str:
+    """Components in brackets; what rounds to zero has no sign."""
+    return "[" + " ".join(fixed(float(value), decimals) for value in values) + "]"
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Numbers in a row, as short as they are exact to six digits."""
+    return " ".join(f"{value:g}" for value in values)
+
+
+def apart(size: float, slide: bool) -> str:
+    """A difference of a joint's positions [rad; of a slide, m]."""
+    return distance(size, "m" if slide else "rad", 2)
+
+
+def degrees(radians: float, decimals: int = 2) -> str:
+    """An angle in degrees."""
+    return f"{fixed(math.degrees(radians), decimals)}°"
+
+
+def millimetres(metres: float, decimals: int = 2) -> str:
+    """A length in millimetres."""
+    return f"{fixed(metres * 1e3, decimals)} mm"
+
+
+def position(value: float, slide: bool, decimals: int = 2) -> str:
+    """A joint's position: a hinge's [rad] in degrees, a slide's [m] in millimetres."""
+    return millimetres(value, decimals) if slide else degrees(value, decimals)
+
+
+def milliseconds(seconds: float, digits: int = 4) -> str:
+    """A timestep, to some significant digits."""
+    return f"{significant(1000 * seconds, digits)} ms"
+
+
+def short_time(seconds: float) -> str:
+    """A time of a run, to the millisecond."""
+    return f"{seconds:.3f} s"
+
+
+def duration(seconds: float) -> str:
+    """A wall time in the unit that reads best."""
+    for factor, unit in ((1e6, "µs"), (1e3, "ms")):
+        if seconds * factor < 1000:
+            return f"{seconds * factor:.3g} {unit}"
+    return f"{seconds:.3g} s"
+
+
+def percent(part: float | None) -> str:
+    """A part of a whole; tiny ones with their power of ten."""
+    if part is None:
+        return NONE
+    value = 100 * part
+    if value == 0:
+        return "0 %"
+    if abs(value) < 1e-6:
+        return "< 1e-6 %"
+    if abs(value) < 0.05:
+        return f"{value:.0e} %".replace("e-0", "e-")
+    if 99.95 <= value < 100:
+        return "> 99.9 %"
+    return f"{value:.1f} %" if abs(value) < 1000 else f"{value:.0f} %"
+
+
+def count(number: int, thing: str, zero: str = "0") -> str:
+    """A number of things: "1 step", "2,000 steps"."""
+    return f"{f'{number:,}' if number else zero} {thing}" + ("" if number == 1 else "s")
+
+
+def listed(words: Sequence[str]) -> str:
+    """Words in a row: "a, b and c"."""
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def few(words: Sequence[str], most: int = 3, between: str = ", ") -> str:
+    """The first of some words, and how many there are more: "a, b, c and 4 more"."""
+    more = f" and {len(words) - most} more" if len(words) > most else ""
+    return between.join(words[:most]) + more
+
+
+def capital(text: str) -> str:
+    """A text that begins with a capital."""
+    return text[:1].upper() + text[1:]
+
+
+def sentence(text: str) -> str:
+    """A text with a capital first and a full stop last."""
+    text = capital(text)
+    return text if text.endswith(".") else f"{text}."

@@ -1,0 +1,150 @@
+"""What the part "calls" of a room tells of its engine: its functions, and what calls change.
+
+`statemachine.calls` replaces the functions by ones that count and look. The part has `watch()`,
+which gives a `CallWatch`, and `WORDS`, a `CallWords`. It imports the engine's backend: what that
+takes from the engine must be the engine's own, and not a wrapper that nobody takes away again.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import types
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from ..interface import Model
+
+FUNCTIONS = (types.BuiltinFunctionType, types.FunctionType)
+Contents = dict[str, bytes]  # all that is in something, by name
+
+
+@dataclass(frozen=True)
+class CallWords:
+    """What a page says of the calls of an engine.
+
+    Attributes:
+        shown: What is looked at before and after each call.
+        step: How the names of the functions that step begin.
+        note: What else a reader should know; "" for nothing.
+        roles: What it says of a world of our own, by the words that are in its label; "{}" is
+            how often it was stepped.
+        helpers: Other engines that a backend calls too, each with a sentence; "{}" is how
+            often their own step was called.
+    """
+
+    shown: str
+    step: str
+    note: str = ""
+    roles: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    helpers: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+
+class CallsPart(Protocol):
+    """The part "calls"; see the module."""
+
+    WORDS: CallWords
+
+    def watch(self) -> CallWatch:
+        """A watch on the engine."""
+        ...
+
+
+class WatchedObject(ABC):
+    """Something that calls can change: an object of the engine's, or a world.
+
+    Attributes:
+        kind: What it is, for one that has no label.
+        label: How it is called for a reader; empty until a variable leads to it.
+        named: Whether a variable of the code leads to it.
+        seen: What was in it when it was last looked at.
+    """
+
+    def __init__(self, kind: str, label: str = "") -> None:
+        self.kind, self.label, self.named = kind, label, False
+        self.seen: Contents | None = None
+
+    @property
+    @abstractmethod
+    def gone(self) -> bool:
+        """Whether it is no more."""
+
+    @property
+    def title(self) -> str:
+        """Its label, or what there is to say of one that no variable ever led to."""
+        return self.label or f"{self.kind} {'for a moment' if self.gone else 'without a name'}"
+
+    @abstractmethod
+    def look(self, thoroughly: bool = False) -> Contents | None:
+        """All that is in it, as bytes by name; None if it is gone."""
+
+    @abstractmethod
+    def spelled(self, field: str) -> str:
+        """A field as code would spell it."""
+
+    def differing(self, before: Contents, now: Contents) -> list[str]:
+        """The fields of both looks that differ."""
+        return [field for field, value in now.items() if before.get(field, value) != value]
+
+    def due(self) -> bool:
+        """Whether, since it was last asked, all that is derived became something to compute."""
+        return False
+
+    def entry(self, field: str, before: bytes, after: bytes) -> str:
+        """A field, or which entries of it differ."""
+        return field
+
+
+class CallWatch(ABC):
+    """What the recorder must know of an engine."""
+
+    engine: str
+
+    @abstractmethod
+    def functions(self) -> Iterator[tuple[Any, str, str]]:
+        """Owner and attribute of every function to be replaced, and its name for a reader."""
+
+    @abstractmethod
+    def concerned(self, function: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
+        """The subjects that a call is about, the first of them foremost; None: not ours."""
+
+    @abstractmethod
+    def made(self, function: str, args: Sequence[Any], result: Any) -> WatchedObject | None:
+        """The subject that a call has made."""
+
+    @abstractmethod
+    def name(self, namespace: Mapping[str, Any]) -> None:
+        """Label the subjects that variables lead to."""
+
+    @abstractmethod
+    def living(self) -> Sequence[WatchedObject]:
+        """The subjects that are still there."""
+
+
+def entries(field: str, before: bytes, after: bytes, size: int) -> str:
+    """Which entries of a flat array of items of a size differ: "qpos[1]", "ctrl[0:2]"."""
+    if len(before) != len(after):
+        return field
+    count = len(after) // size
+    differ = [
+        i for i in range(count) if before[i * size : (i + 1) * size] != after[i * size :][:size]
+    ]
+    first, end = differ[0], differ[-1] + 1
+    if len(differ) == count or len(differ) != end - first:
+        return field
+    return f"{field}[{first}]" if end == first + 1 else f"{field}[{first}:{end}]"
+
+
+def named(namespace: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Names and values, Models first; what is in a list, tuple or dict too."""
+    found = []
+    for name, value in namespace.items():
+        if name.startswith("__"):
+            continue
+        found.append((name, value))
+        if isinstance(value, (list, tuple)):
+            found += [(f"{name}[{i}]", each) for i, each in enumerate(value)]
+        elif isinstance(value, dict):
+            found += [(f"{name}[{key!r}]", each) for key, each in value.items()]
+    yield from sorted(found, key=lambda pair: not isinstance(pair[1], Model))

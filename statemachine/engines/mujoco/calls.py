@@ -1,0 +1,197 @@
+"""What the recorder must know of MuJoCo: an MjData and an MjModel show all that is in them."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...backends import mujoco_backend
+from ...interface import DERIVED, INPUTS, Data, Model
+from ..call_watch import FUNCTIONS, CallWatch, CallWords, Contents, WatchedObject, entries, named
+
+WORDS = CallWords(
+    shown="the arrays, counts and options of MjData and MjModel",
+    step="mj_step",
+)
+
+_OURS = ("time", *INPUTS, *DERIVED)
+# What comes before the rest in a list of what changed.
+_FIRST = (*_OURS, "contact", "ncon", "act", "sensordata", "qacc_warmstart", "xmat", "geom_xpos")
+# How MuJoCo manages its memory, and clocks: no part of any result.
+_LEFT_OUT = {"narena", "nbuffer", "parena", "pbase", "pstack", "signature", "threadpool", "timer"}
+_CONTACT = ("dist", "pos", "frame", "geom")
+_LARGE = 1 << 16  # bytes
+
+
+class _Object(WatchedObject):
+    """An MjData or MjModel; held weakly, so that it lives no longer than without us."""
+
+    def __init__(self, thing: Any, kind: str) -> None:
+        super().__init__(kind)
+        self._thing = weakref.ref(thing)
+        self._raw = False  # whether the variable is the engine's own object
+
+    @property
+    def thing(self) -> Any:
+        """The object; None if it is gone."""
+        return self._thing()
+
+    @property
+    def gone(self) -> bool:
+        return self.thing is None
+
+    def lead(self, label: str, raw: bool) -> None:
+        """A variable leads here: by its `raw`, or because it is the object."""
+        self.label, self.named, self._raw = label, True, raw
+
+    def spelled(self, field: str) -> str:
+        ours = field.partition("[")[0] in _OURS and isinstance(self, _MjData)
+        return f"{self.title}.{field}" if ours or self._raw else f"{self.title}.raw.{field}"
+
+
+class _MjData(_Object):
+    _fields: tuple[str, ...] = ()
+
+    def look(self, thoroughly: bool = False) -> Contents | None:
+        data = self.thing
+        if data is None:
+            return None
+        if not _MjData._fields:
+            _MjData._fields = _fields(data)
+        found = {}
+        for name in _MjData._fields:
+            value = getattr(data, name)
+            found[name] = value.tobytes() if isinstance(value, np.ndarray) else _bytes(value)
+        contact = data.contact
+        found["contact"] = b"".join(getattr(contact, part).tobytes() for part in _CONTACT)
+        return found
+
+    def entry(self, field: str, before: bytes, after: bytes) -> str:
+        value = getattr(self.thing, field)
+        whole = not isinstance(value, np.ndarray) or value.ndim != 1
+        return field if whole else entries(field, before, after, value.itemsize)
+
+
+class _MjModel(_Object):
+    def __init__(self, thing: Any, kind: str) -> None:
+        super().__init__(thing, kind)
+        arrays = {
+            name: value.nbytes
+            for name in dir(type(thing))
+            if isinstance(value := getattr(thing, name), np.ndarray)
+        }
+        self._small = [name for name, size in arrays.items() if size <= _LARGE]
+        self._all = list(arrays)
+        self._options = [name for name in dir(thing.opt) if not name.startswith("_")]
+
+    def look(self, thoroughly: bool = False) -> Contents | None:
+        model = self.thing
+        if model is None:
+            return None
+        options = model.opt
+        found = {f"opt.{name}": _bytes(getattr(options, name)) for name in self._options}
+        for name in self._all if thoroughly else self._small:
+            found[name] = getattr(model, name).tobytes()
+        return found
+
+
+def _bytes(value: Any) -> bytes:
+    return np.asarray(value).tobytes()
+
+
+def _fields(data: Any) -> tuple[str, ...]:
+    """Names of the numbers and arrays of an MjData, those of the interface first."""
+    found = [
+        name
+        for name in dir(type(data))
+        if not name.startswith(("_", "maxuse_"))
+        and name not in _LEFT_OUT
+        and isinstance(getattr(data, name), (np.ndarray, int, float))
+    ]
+    order = [name for name in _FIRST if name in found]
+    return (*order, *(name for name in found if name not in order))
+
+
+class _MujocoWatch(CallWatch):
+    engine = "mujoco"
+
+    def __init__(self) -> None:
+        self._module: Any = mujoco_backend.mujoco
+        self._known: dict[int, _Object] = {}
+
+    def functions(self) -> Iterator[tuple[Any, str, str]]:
+        for name, value in vars(self._module).items():
+            if isinstance(value, FUNCTIONS) and not name.startswith("_"):
+                yield self._module, name, name
+        for owner in (self._module.MjModel, self._module.MjData, self._module.MjSpec):
+            for name, value in vars(owner).items():
+                public = not name.startswith("_") or name in ("__copy__", "__deepcopy__")
+                if public and type(value).__name__ in _METHODS:
+                    yield owner, name, f"{owner.__name__}.{name}"
+            if type(vars(owner)["__init__"]).__name__ in _METHODS:
+                yield owner, "__init__", owner.__name__
+
+    def concerned(self, function: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
+        if function in ("MjModel", "MjData", "MjSpec"):  # the first is not an object yet
+            args = args[1:]
+        things = [*args, *kwargs.values()]
+        found = [self._subject(thing) for thing in things if isinstance(thing, self._kinds)]
+        return sorted(found, key=lambda subject: isinstance(subject, _MjModel))
+
+    @property
+    def _kinds(self) -> tuple[type, type]:
+        return self._module.MjModel, self._module.MjData
+
+    def made(self, function: str, args: Sequence[Any], result: Any) -> WatchedObject | None:
+        thing = args[0] if function in ("MjModel", "MjData") else result
+        return self._subject(thing) if isinstance(thing, self._kinds) else None
+
+    def _subject(self, thing: Any) -> _Object:
+        known = self._known.get(id(thing))
+        if known is None or known.thing is not thing:
+            if isinstance(thing, self._module.MjModel):
+                known = _MjModel(thing, "an MjModel")
+            else:
+                known = _MjData(thing, "an MjData")
+            self._known[id(thing)] = known
+        return known
+
+    def name(self, namespace: Mapping[str, Any]) -> None:
+        for known in self._known.values():
+            known.named = False
+        for label, value in named(namespace):
+            if isinstance(value, Model):
+                self._name_model(label, value)
+            elif isinstance(value, Data):
+                self._name_model(f"{label}.model", value.model)
+                raw = getattr(value, "_raw", None)  # of a closed one there is none
+                if isinstance(raw, self._kinds):
+                    self._label(raw, label)
+            elif isinstance(value, self._kinds):
+                self._label(value, label, raw=True)
+
+    def _name_model(self, label: str, model: Model) -> None:
+        if isinstance(model.raw, self._kinds):
+            self._label(model.raw, label)
+        elif isinstance(model.compiled, self._kinds):
+            self._label(model.compiled, f"the description of {label}", raw=True)
+
+    def _label(self, thing: Any, label: str, raw: bool = False) -> None:
+        subject = self._subject(thing)
+        if not subject.named:
+            subject.lead(label, raw)
+
+    def living(self) -> Sequence[WatchedObject]:
+        self._known = {key: each for key, each in self._known.items() if each.thing is not None}
+        return list(self._known.values())
+
+
+_METHODS = ("instancemethod", "staticmethod", "function")
+
+
+def watch() -> CallWatch:
+    """A watch on MuJoCo."""
+    return _MujocoWatch()

@@ -1,0 +1,218 @@
+"""What MuJoCo does with tiny models, as its own users load and step them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ...installed import require
+from ...interface import Array
+from ..measured import Futures, LetGo, Measurement, OneStep, ReadTwice, Sliding
+from ..samples import floor, joint_tree, marked, pendulum
+from . import pile
+
+
+def _loaded(text: str) -> tuple[Any, Any, Any]:
+    """The engine, a Model of an MJCF text and a fresh Data."""
+    mj = require("mujoco")
+    model = mj.MjModel.from_xml_string(text)
+    return mj, model, mj.MjData(model)
+
+
+def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
+    """Four numbers into the qpos of a free joint."""
+    mj, model, data = _loaded(marked.MJCF)
+    turned = []
+    for four in fours:
+        data.qpos[3:] = four
+        mj.mj_kinematics(model, data)
+        turned.append((np.array(data.site_xpos), np.array(data.xquat[1])))
+    return turned
+
+
+def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Array, Array]:
+    """Six numbers into the qvel of a free joint, and one short step."""
+    mj, model, data = _loaded(marked.MJCF)
+    model.opt.timestep = seconds
+    data.qpos[:], data.qvel[:] = (*place, *four), six
+    mj.mj_kinematics(model, data)
+    before = np.array(data.site_xpos)
+    mj.mj_step(model, data)
+    mj.mj_kinematics(model, data)
+    return before, np.array(data.site_xpos)
+
+
+def gravity(steps: int) -> tuple[Array, Array]:
+    """A body in a model that says nothing of gravity, let go."""
+    mj, model, data = _loaded(
+        '<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>'
+    )
+    mj.mj_step(model, data, steps)
+    return np.array(model.opt.gravity), data.qvel[:3] / data.time
+
+
+def timestep() -> OneStep:
+    """A body at 1 m/s, one step."""
+    mj, model, data = _loaded(marked.MJCF)
+    data.qvel[0] = 1
+    mj.mj_step(model, data)
+    return OneStep(model.opt.timestep, float(data.qpos[0]), "data.time", float(data.time))
+
+
+def actuation(seconds: float) -> list[LetGo]:
+    """Without an actuator, and with one that is never written to."""
+    runs = []
+    for part, actuator in (
+        ("no actuator", ""),
+        ("a position actuator", '<actuator><position joint="j" kp="1000" kv="50"/></actuator>'),
+    ):
+        mj, model, data = _loaded(pendulum.MJCF % actuator)
+        mj.mj_step(model, data, round(seconds / model.opt.timestep))
+        torque = Measurement("it exerts", float(data.qfrc_actuator[0]), "N·m")
+        runs.append(LetGo(part, float(data.qpos[0]), data.time, (torque,) if actuator else ()))
+    return runs
+
+
+def command(torque: float) -> dict[str, list[float]]:
+    """A motor, without gravity."""
+    mj, model, data = _loaded(pendulum.MJCF % '<actuator><motor joint="j"/></actuator>')
+    model.opt.gravity[:] = 0
+    data.ctrl[0] = torque
+    speeds = [float(data.qvel[0])]
+    for _ in range(2):
+        mj.mj_step(model, data)
+        speeds.append(float(data.qvel[0]))
+    return {"ctrl": speeds}
+
+
+def damping(seconds: float, fast: float) -> tuple[float, float]:
+    """A free body for a while; a joint for a step."""
+    mj, model, data = _loaded(marked.MJCF)
+    data.qvel[0] = 1
+    mj.mj_step(model, data, round(seconds / model.opt.timestep))
+    _, joint, turning = _loaded(pendulum.MJCF % "")
+    joint.opt.gravity[:] = 0
+    turning.qvel[0] = fast
+    mj.mj_step(joint, turning)
+    return float(data.qvel[0]), float(turning.qvel[0])
+
+
+def _depth(data: Any) -> float:
+    """How deep the deepest contact is that the engine tells of; 0 where there is none [m]."""
+    return max((-float(contact.dist) for contact in data.contact), default=0.0)
+
+
+def write(angle: float, deep: float) -> list[ReadTwice]:
+    """Write qpos of a pendulum, then of a ball that is put into the floor."""
+    mj, model, data = _loaded(pendulum.MJCF % "")
+    mj.mj_forward(model, data)
+    data.qpos[0] = angle
+    read = np.array(data.site("tip").xpos)
+    mj.mj_forward(model, data)
+    tip = ReadTwice("the tip", read, np.array(data.site("tip").xpos), pendulum.tip_at(angle))
+
+    mj, model, data = _loaded(floor.BALL)
+    mj.mj_forward(model, data)
+    data.qpos[2] = floor.RADIUS - deep
+    depth = _depth(data)
+    mj.mj_forward(model, data)
+    return [tip, ReadTwice("the contact", depth, _depth(data), deep)]
+
+
+def step(speed: float, deep: float) -> list[ReadTwice]:
+    """A pendulum on its way, and a ball on its way out of the floor."""
+    mj, model, data = _loaded(pendulum.MJCF % "")
+    data.qvel[0] = speed
+    mj.mj_step(model, data)
+    read = np.array(data.site("tip").xpos)
+    mj.mj_kinematics(model, data)
+    true = pendulum.tip_at(data.qpos[0])
+    tip = ReadTwice("the tip", read, np.array(data.site("tip").xpos), true)
+
+    mj, model, data = _loaded(floor.BALL)
+    data.qpos[2], data.qvel[2] = floor.RADIUS - deep, speed
+    mj.mj_step(model, data)
+    depth = _depth(data)
+    mj.mj_forward(model, data)
+    now = max(floor.RADIUS - float(data.qpos[2]), 0.0)
+    return [tip, ReadTwice("the contact", depth, _depth(data), now)]
+
+
+def joints() -> dict[str, list[str]]:
+    """The ids of the joints, from a URDF and from an MJCF."""
+    names = {}
+    for form, text in (("URDF", joint_tree.URDF), ("MJCF", joint_tree.MJCF)):
+        mj, model, _ = _loaded(text)
+        name = partial(mj.mj_id2name, model, mj.mjtObj.mjOBJ_JOINT)
+        names[form] = [name(joint) for joint in range(model.njnt)]
+    return names
+
+
+def reset() -> dict[str, dict[str, bool]]:
+    """Every quantity changed, then mj_resetData."""
+    mj, model, data = pile.build()
+    bodies = model.nbody
+    mj.mj_step(model, data, 300)
+    written = pile.write(model, data, 0.125)
+    mj.mj_resetData(model, data)
+    same = pile.same(written, pile.read(model, data))
+    return {"mj_resetData": {**same, "bodies": model.nbody == bodies}}
+
+
+def friction() -> dict[str, Sliding]:
+    """A block on a floor, with elliptic cones: the same friction in every direction."""
+
+    def speed(block: float, ground: float, lean: float, priority: int = 0) -> float:
+        x, y, z = floor.BLOCK
+        mj, model, data = _loaded(
+            f'<mujoco><option gravity="0 0 {-floor.GRAVITY}" cone="elliptic"/><worldbody>'
+            f'<geom type="plane" size="9 9 1" friction="{ground}"/>'
+            f'<body pos="0 0 {z}"><freejoint/><geom type="box" size="{x} {y} {z}" '
+            f'friction="{block}" priority="{priority}"/></body></worldbody></mujoco>'
+        )
+        mj.mj_step(model, data, round(floor.REST / model.opt.timestep))
+        model.opt.gravity[0] = lean * floor.GRAVITY
+        mj.mj_step(model, data, round(floor.PULL / model.opt.timestep))
+        return float(data.qvel[0])
+
+    return {"equal priority": speed, "the block has priority": partial(speed, priority=1)}
+
+
+def save() -> dict[str, dict[str, bool]]:
+    """Every quantity changed, saved, changed again, restored."""
+    mj, model, data = pile.build()
+    mj.mj_step(model, data, 100)
+    back = {}
+    for name, way in pile.ways_to_save(mj, model, data).items():
+        before = pile.write(model, data, 0.125)
+        restore = way()
+        pile.write(model, data, 0.125)
+        restore()
+        back[name] = pile.same(before, pile.read(model, data))
+    return back
+
+
+def future(moments: Sequence[float], steps: int) -> Mapping[str, Sequence[Futures]]:
+    """Boxes that fall, set back to the start or to moments in the middle."""
+    mj, model, data = pile.build()
+
+    def run(count: int = steps) -> Array:
+        return pile.run(mj, model, data, count)
+
+    def middle(save: Callable[[], Callable[[], None]], moment: float) -> Futures:
+        mj.mj_resetData(model, data)
+        run(round(moment / model.opt.timestep))
+        restore = save()
+        first = run()
+        restore()
+        return first, run()
+
+    first = run()
+    mj.mj_resetData(model, data)
+    trials = {"mj_resetData": [(first, run())]}
+    for name, save in pile.ways_to_save(mj, model, data).items():
+        trials[name] = [middle(save, moment) for moment in moments]
+    return trials

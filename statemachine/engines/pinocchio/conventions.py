@@ -1,0 +1,152 @@
+"""What Pinocchio computes of tiny models; it has no step, and its Data no state."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...installed import require
+from ...interface import Array
+from ..measured import Absent, LetGo, Measurement, Past, ReadTwice
+from ..samples import joint_tree, marked, pendulum
+from .names import names_with
+
+
+def _marks(pin: Any, model: Any, data: Any, q: Array) -> Array:
+    """The marks in the world (3, 3) [m]."""
+    pin.framesForwardKinematics(model, data, q)
+    frames = [model.getFrameId(f"mark{k}") for k in range(len(marked.MARKS))]
+    return np.array([data.oMf[frame].translation for frame in frames])
+
+
+def _free_body() -> tuple[Any, Any, Any]:
+    """The engine, a Model of the marked body on a free-flyer, and a Data."""
+    pin = require("pinocchio")
+    model = pin.buildModelFromXML(marked.URDF, pin.JointModelFreeFlyer())
+    return pin, model, model.createData()
+
+
+def _absent(*words: str, part: str = "", figures: tuple[Measurement, ...] = ()) -> Absent:
+    return Absent(words, names_with(require("pinocchio"), *words), part, figures)
+
+
+def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
+    """Four numbers into the q of a free-flyer."""
+    pin, model, data = _free_body()
+    return [
+        (
+            _marks(pin, model, data, np.array([0, 0, 0, *four])),
+            np.array(pin.SE3ToXYZQUAT(data.oMi[1])[3:]),
+        )
+        for four in fours
+    ]
+
+
+def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Array, Array]:
+    """Six numbers, times a short time, into integrate."""
+    pin, model, data = _free_body()
+    q = np.array([*place, *four])
+    before = _marks(pin, model, data, q)
+    return before, _marks(pin, model, data, pin.integrate(model, q, six * seconds))
+
+
+def gravity(_steps: int) -> tuple[Array, Array]:
+    """The acceleration of a free body on which nothing else acts."""
+    pin, model, data = _free_body()
+    still = np.zeros(model.nv)
+    # At a pose without turn the body's axes are the world's.
+    fall = pin.aba(model, data, pin.neutral(model), still, still)
+    return np.array(model.gravity.linear), np.array(fall[:3])
+
+
+def timestep() -> Absent:
+    """Whether there is a step at all; integrate takes the time from its caller."""
+    pin, model, _ = _free_body()
+    q, v = pin.neutral(model), np.zeros(model.nv)
+    v[0] = 1
+    moved = float(pin.integrate(model, q, v)[0] - q[0])
+    given = Measurement("integrate at 1 m/s moves by", f"{moved:g} m")
+    return _absent("step", "simul", part="one step", figures=(given,))
+
+
+def actuation(_seconds: float) -> list[LetGo]:
+    """The acceleration at zero torque: there is nothing else that could act."""
+    pin = require("pinocchio")
+    model = pin.buildModelFromXML(pendulum.URDF)
+    rest = np.zeros(model.nv)
+    started = float(pin.aba(model, model.createData(), pin.neutral(model), rest, rest)[0])
+    return [LetGo("aba at zero torque", started, None)]
+
+
+def command(_torque: float) -> Absent:
+    """Whether it steps at all; a torque is an argument of each call."""
+    return _absent("step", "simul")
+
+
+def damping(_seconds: float, _fast: float) -> Absent:
+    """Whether it steps at all."""
+    return _absent("step", "simul")
+
+
+def write(angle: float, _deep: float) -> list[ReadTwice]:
+    """Another q, handed to one function after the other."""
+    pin = require("pinocchio")
+    model = pin.buildModelFromXML(pendulum.URDF)
+    data, tip = model.createData(), model.getFrameId("tip")
+    pin.framesForwardKinematics(model, data, pin.neutral(model))
+    q = np.array([angle])
+    reads = {"the tip": np.array(data.oMf[tip].translation)}
+    pin.forwardKinematics(model, data, q)
+    reads["the tip, after forwardKinematics"] = np.array(data.oMf[tip].translation)
+    pin.updateFramePlacements(model, data)
+    now, true = np.array(data.oMf[tip].translation), pendulum.tip_at(angle)
+    return [ReadTwice(part, read, now, true) for part, read in reads.items()]
+
+
+def step(_speed: float, _deep: float) -> Absent:
+    """Whether there is a step at all."""
+    return _absent("step", "simul")
+
+
+def joints() -> dict[str, list[str]]:
+    """The names of the joints after the universe, from a URDF and from an MJCF."""
+    pin = require("pinocchio")
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "tree.xml"  # of an MJCF it takes files only
+        file.write_text(joint_tree.MJCF, encoding="utf-8")
+        models = {
+            "URDF": pin.buildModelFromXML(joint_tree.URDF),
+            "MJCF": pin.buildModelFromMJCF(str(file)),
+        }
+    return {form: list(model.names)[1:] for form, model in models.items()}
+
+
+def reset() -> Absent:
+    """Whether there is anything of the name; its Data has no state to go back to."""
+    return _absent("reset")
+
+
+def friction() -> Absent:
+    """Whether anything slides at all."""
+    return _absent("step", "simul")
+
+
+def save() -> Past:
+    """Whether its Data holds a state: whether anything of its past shows in what comes out."""
+    pin = require("pinocchio")
+    model = pin.buildModelFromXML(pendulum.URDF)
+    used, new = model.createData(), model.createData()
+    q = pin.neutral(model)
+    v, torque = np.full(model.nv, 0.3), np.full(model.nv, 0.1)
+    pin.aba(model, used, pin.integrate(model, q, v), 2 * v, 5 * torque)
+    first, second = (np.array(pin.aba(model, data, q, v, torque)) for data in (used, new))
+    return Past(float(np.abs(first - second).max()))
+
+
+def future(_moments: Sequence[float], _steps: int) -> Past:
+    """Whether a used Data computes anything else than a new one, of the same q and v."""
+    return save()

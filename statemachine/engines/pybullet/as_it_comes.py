@@ -1,0 +1,290 @@
+"""What PyBullet itself calls things and does, probed on the raw engine.
+
+Nothing here goes through the adapter that emulates the contract: each function loads the
+model into a client of its own, as the engine's users do, and lets it be.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import cast
+
+import numpy as np
+
+from ...backends._bullet_client import pb
+from ...backends._bullet_plan import Plan
+from ...backends._bullet_world import ENGINE_TIMESTEP, Tree, World
+from ...backends.pybullet_backend import PybulletModel
+from ...interface import Array, Model
+from ..parts import LeftAlone, Term, WayBack
+
+# Before a state is taken, while the jaws still touch what they hold; and after it.
+_BEFORE, _AFTER = 10, 100
+
+
+@contextmanager
+def _raw(model: Model, gravity: bool = True, damping: bool = True) -> Iterator[World]:
+    """The model in a fresh client, as loadURDF leaves it, with the model's gravity."""
+    plan = cast("PybulletModel", model).plan
+    if not damping:
+        raw = copy.copy(plan.raw)
+        raw.dof_damping[:] = 0
+        plan = Plan(raw)
+    world = World(plan, "engine")
+    if not gravity:
+        pb.setGravity(0, 0, 0, world.client)
+    try:
+        yield world
+    finally:
+        world.close()
+
+
+def terms(model: Model) -> tuple[Term, ...]:
+    """What the interface's names are on this engine, by looking at a loaded model."""
+    raw = model.compiled
+    found = []
+    with _raw(model) as world:
+        for tree in world.trees:
+            names = [pb.getJointInfo(tree.body, i, world.client) for i in _all_joints(world, tree)]
+            for index, place in zip(tree.joints, raw.dof_jntid[tree.dofs], strict=False):
+                slot = int(raw.jnt_qposadr[place])
+                found.append(
+                    Term(
+                        f"joint {model.joint_names[place]}",
+                        f"qpos[{slot}]",
+                        f"joint {index} of body {tree.body}",
+                    )
+                )
+            fixed = [f"{info[1].decode()} is {info[0]}" for info in names if info[3] < 0]
+            if fixed:
+                found.append(Term("fixed joints", "none", f"take an index too: {', '.join(fixed)}"))
+        for tree in world.trees:
+            if tree.free:
+                found += _free_terms(world, tree, model)
+        for tree in world.trees:
+            found += _frame_terms(world, tree, model)
+    return tuple(found)
+
+
+def _all_joints(world: World, tree: Tree) -> range:
+    return range(pb.getNumJoints(tree.body, world.client))
+
+
+def _free_terms(world: World, tree: Tree, model: Model) -> Iterator[Term]:
+    """A quarter turn about z, and a spin about the body's own x."""
+    qpos, qvel = np.zeros(model.nq), np.zeros(model.nv)
+    for _, start in model._quaternions:
+        qpos[start : start + 4] = (np.sqrt(0.5), 0, 0, np.sqrt(0.5))
+    qvel[tree.qvel] = (0, 0, 0, 1, 0, 0)
+    world.put(qpos, qvel)
+    name = model.body_names[tree.root]
+    _, quat = pb.getBasePositionAndOrientation(tree.body, world.client)
+    _, spin = pb.getBaseVelocity(tree.body, world.client)
+    yield Term(
+        f"{name}, turned by 90° about z",
+        f"w x y z: {_figures(qpos[tree.qpos][3:])}",
+        f"x y z w: {_figures(quat)}",
+    )
+    yield Term(
+        f"{name}, spinning about its x",
+        f"own axes: {_figures(qvel[tree.qvel][3:])}",
+        f"world axes: {_figures(spin)}",
+    )
+
+
+def _frame_terms(world: World, tree: Tree, model: Model) -> Iterator[Term]:
+    """How far apart a link's frame and what the engine calls its position are."""
+    apart = {}
+    for body, link in tree.links.items():
+        if link >= 0:
+            state = pb.getLinkState(tree.body, link, physicsClientId=world.client)
+            apart[body] = float(np.linalg.norm(np.subtract(state[0], state[4])))
+    if apart:
+        body = max(apart, key=lambda each: apart[each])
+        yield Term(
+            f"position of {model.body_names[body]}",
+            "its frame",
+            f"its centre of mass, {apart[body] * 1e3:.1f} mm away",
+        )
+
+
+def _figures(values: Array) -> str:
+    return " ".join(f"{value + 0.0:.4g}" for value in np.round(values, 12))
+
+
+def left_alone(model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...]:
+    """A joint of a freshly loaded arm that nobody commands, and what its motor exerts.
+
+    Args:
+        model: The model; its gravity is set, where a run says so.
+        seconds: Simulated time, in the engine's own timestep.
+        joint: Id of a hinge or slide.
+    """
+    steps = max(1, round(seconds / ENGINE_TIMESTEP))
+    found, fresh = [], _fresh_gravity()
+    for label, gravity, motors, damping in (
+        ("as loadURDF leaves it", False, True, True),
+        ("gravity set", True, True, True),
+        ("gravity set, motors off", True, False, True),
+        ("… and no joint damping", True, False, False),
+    ):
+        with _raw(model, gravity, damping) as world:
+            # The engine's own timestep, whatever the model's file says.
+            pb.setTimeStep(ENGINE_TIMESTEP, world.client)
+            tree, index = _joint(world, model, joint)
+            if not motors:
+                for each in tree.joints:
+                    pb.setJointMotorControl2(
+                        tree.body, each, pb.VELOCITY_CONTROL, force=0, physicsClientId=world.client
+                    )
+            ratio = _explicit(world, tree)
+            speeds = []
+            for _ in range(steps):
+                pb.stepSimulation(world.client)
+                speeds.append(pb.getJointState(tree.body, index, world.client)[1])
+            state = pb.getJointState(tree.body, index, world.client)
+            places = [s[0] for s in pb.getJointStates(tree.body, tree.joints, world.client)]
+            found.append(
+                LeftAlone(
+                    label=label,
+                    time=steps * ENGINE_TIMESTEP,
+                    position=float(state[0]),
+                    motor=float(state[3]),
+                    explicit=ratio,
+                    gravity=fresh,
+                    widest=float(np.abs(places).max()),
+                    turns=int((np.diff(np.sign(speeds)) != 0).sum()),
+                    steps=steps,
+                )
+            )
+    return tuple(found)
+
+
+def _fresh_gravity() -> float:
+    """The length of the gravity that a world has before anybody sets it."""
+    client = pb.connect(pb.DIRECT)
+    try:
+        told = pb.getPhysicsEngineParameters(client)
+        return float(np.linalg.norm([told[f"gravityAcceleration{axis}"] for axis in "XYZ"]))
+    finally:
+        pb.disconnect(client)
+
+
+def _explicit(world: World, tree: Tree) -> float:
+    """The largest eigenvalue of h·D/M where the tree stands."""
+    states = pb.getJointStates(tree.body, tree.joints, world.client)
+    places = [state[0] for state in states]
+    mass = np.array(pb.calculateMassMatrix(tree.body, places, physicsClientId=world.client))
+    damping = [pb.getJointInfo(tree.body, i, world.client)[6] for i in tree.joints]
+    return float(
+        np.linalg.eigvals(np.linalg.solve(mass, np.diag(damping))).real.max() * ENGINE_TIMESTEP
+    )
+
+
+def _joint(world: World, model: Model, joint: int) -> tuple[Tree, int]:
+    dof = int(model.jnt_dofadr[joint])
+    tree = next(tree for tree in world.trees if tree.joints and dof in tree.dofs)
+    return tree, tree.joints[tree.dofs.tolist().index(dof)]
+
+
+def ways_back(model: Model) -> tuple[WayBack, ...]:
+    """Which of the engine's own ways to go back is exact, in the middle of contact.
+
+    Each run starts in a new client from keyframe 0 (or the default pose), squeezes by
+    POSITION_CONTROL, goes on, goes back, and goes on again: are the two futures the same?
+    """
+    start = model.keyframes[0] if model.keyframes else None
+    qpos = start.qpos if start else model.compiled.qpos0
+    target = start.ctrl if start else np.zeros(model.nu)
+    zero = np.zeros(model.nv)
+    touching: list[int] = []
+
+    def run(world: World, steps: int) -> Array:
+        trace = []
+        for _ in range(steps):
+            _command(world, model, target)
+            pb.stepSimulation(world.client)
+            trace.append(_joints(world))
+        return np.array(trace)
+
+    def begin(world: World) -> None:
+        world.put(qpos, zero)
+
+    def difference(back: Callable[[World], Callable[[], None]]) -> float:
+        with _raw(model) as world:
+            begin(world)
+            run(world, _BEFORE)
+            touching.append(sum(point[8] <= 0 for point in world.contact_points()))
+            restore = back(world)
+            first = run(world, _AFTER)
+            restore()
+            return float(np.abs(run(world, _AFTER) - first).max(initial=0.0))
+
+    def saved(world: World) -> Callable[[], None]:
+        state = pb.saveState(world.client)
+        return lambda: pb.restoreState(state, physicsClientId=world.client)
+
+    def written(world: World) -> Callable[[], None]:
+        now, rate = _state(world, model)
+        return lambda: world.put(now, rate)
+
+    futures = []
+    for _ in range(2):
+        with _raw(model) as world:
+            begin(world)
+            futures.append(run(world, _BEFORE + _AFTER))
+    again = float(np.abs(futures[1] - futures[0]).max(initial=0.0))
+    with _raw(model) as world:
+        begin(world)
+        first = run(world, _AFTER)
+        begin(world)
+        same_client = float(np.abs(run(world, _AFTER) - first).max(initial=0.0))
+    kept, put = difference(saved), difference(written)
+    moment = f"after {_BEFORE} steps, {touching[0]} contacts"
+    return (
+        WayBack("a new client, loaded again", again),
+        WayBack("resetJointState, resetBase… to the start", same_client),
+        WayBack(f"saveState, restoreState {moment}", kept),
+        WayBack(f"written back {moment}", put),
+    )
+
+
+def _command(world: World, model: Model, target: Array) -> None:
+    for tree in world.trees:
+        for index, dof in zip(tree.joints, tree.dofs, strict=False):
+            for actuator in np.flatnonzero(model.actuator_jntid >= 0):
+                if model.jnt_dofadr[model.actuator_jntid[actuator]] == dof:
+                    pb.setJointMotorControl2(
+                        tree.body,
+                        index,
+                        pb.POSITION_CONTROL,
+                        targetPosition=float(target[actuator]),
+                        physicsClientId=world.client,
+                    )
+
+
+def _joints(world: World) -> list[float]:
+    """Positions of all joints, and of all bases."""
+    found: list[float] = []
+    for tree in world.trees:
+        if tree.joints:
+            found += [s[0] for s in pb.getJointStates(tree.body, tree.joints, world.client)]
+        if tree.free:
+            pos, quat = pb.getBasePositionAndOrientation(tree.body, world.client)
+            found += [*pos, *quat]
+    return found
+
+
+def _state(world: World, model: Model) -> tuple[Array, Array]:
+    qpos, qvel = np.zeros(model.nq), np.zeros(model.nv)
+    for _, start in model._quaternions:
+        qpos[start] = 1.0
+    for tree in world.trees:
+        if tree.joints:
+            states = pb.getJointStates(tree.body, tree.joints, world.client)
+            qpos[tree.qpos], qvel[tree.qvel] = [s[0] for s in states], [s[1] for s in states]
+        if tree.free:
+            qpos[tree.qpos], qvel[tree.qvel] = world.read_free(tree)
+    return qpos, qvel

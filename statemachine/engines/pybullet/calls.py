@@ -1,0 +1,256 @@
+"""What the recorder must know of PyBullet: worlds that are told apart by a number only.
+
+A world shows what its getters tell without computing anything anew. Beside the engine's
+worlds a Data has arrays of its own, which change without any call.
+"""
+
+from __future__ import annotations
+
+import marshal
+import types
+import weakref
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, cast
+
+from ...backends._hidden_data import Machine
+from ...backends.pybullet_backend import PybulletData, PybulletModel
+from ...installed import require
+from ...interface import DERIVED, INPUTS
+from ..call_watch import FUNCTIONS, CallWatch, CallWords, Contents, WatchedObject, entries, named
+
+WORDS = CallWords(
+    shown="what its getters tell without computing anything anew",
+    step="stepSimulation",
+    note="On pybullet a Data's arrays are the interface's own: it copies between them and the "
+    "engine's hidden world, which is outside the engine's functions.",
+    roles={
+        "the still copy": "The still copy is the robot with its true inertias, in a world of its "
+        "own; the one that is stepped carries extra inertia for its servos. The interface asks "
+        "the copy for poses, the mass matrix and the bias. In this run it was {}.",
+        "the look-ahead": "The look-ahead is another copy. It is put where your data is and takes "
+        "one step, so that contacts and forces can be read after forward and no time passes in "
+        "yours. In this run it was {}.",
+    },
+    helpers={
+        "mujoco": "On pybullet the interface uses MuJoCo as a library: its parser reads the "
+        "model's file, and it solves small linear systems. Its own step was {} there.",
+    },
+)
+
+# How many arguments come before `physicsClientId` where it is given by its place, which the
+# engine's functions do not tell. It is the last one in all of these.
+_BEFORE_CLIENT = {
+    "calculateInverseDynamics": 5,
+    "calculateMassMatrix": 3,
+    "changeDynamics": 24,
+    "disconnect": 0,
+    "getBasePositionAndOrientation": 1,
+    "getBaseVelocity": 1,
+    "getBodyInfo": 1,
+    "getBodyUniqueId": 1,
+    "getContactPoints": 4,
+    "getDynamicsInfo": 2,
+    "getJointInfo": 2,
+    "getJointState": 2,
+    "getJointStates": 2,
+    "getLinkState": 4,
+    "getLinkStates": 4,
+    "getNumBodies": 0,
+    "getNumJoints": 1,
+    "getPhysicsEngineParameters": 0,
+    "isConnected": 0,
+    "loadURDF": 7,
+    "performCollisionDetection": 0,
+    "removeBody": 1,
+    "resetBasePositionAndOrientation": 3,
+    "resetBaseVelocity": 3,
+    "resetJointState": 4,
+    "resetJointStatesMultiDof": 4,
+    "resetSimulation": 1,
+    "saveState": 0,
+    "setCollisionFilterGroupMask": 4,
+    "setCollisionFilterPair": 5,
+    "setGravity": 3,
+    "setJointMotorControlArray": 8,
+    "setTimeStep": 1,
+    "stepSimulation": 0,
+}
+_BODIES = "number of bodies"
+_JOINT = ("joint positions", "joint velocities", "joint reaction forces", "joint motor torques")
+
+
+class _World(WatchedObject):
+    """One world of the engine's, from its `connect` to its `disconnect`."""
+
+    def __init__(self, engine: Any, client: int) -> None:
+        super().__init__("a world")
+        self._pb, self._client, self._open = engine, client, True
+
+    @property
+    def gone(self) -> bool:
+        # Once gone for good: the engine gives the number to another world.
+        self._open = self._open and bool(self._pb.isConnected(self._client))
+        return not self._open
+
+    def look(self, thoroughly: bool = False) -> Contents | None:
+        if self.gone:
+            return None
+        pb, client = self._pb, self._client
+        bodies = [pb.getBodyUniqueId(i, client) for i in range(pb.getNumBodies(client))]
+        poses = [pb.getBasePositionAndOrientation(body, client) for body in bodies]
+        speeds = [pb.getBaseVelocity(body, client) for body in bodies]
+        joints: list[Any] = [[], [], [], []]
+        links, dynamics = [], []
+        for body in bodies:
+            numbers = list(range(pb.getNumJoints(body, client)))
+            dynamics += [pb.getDynamicsInfo(body, link, client) for link in (-1, *numbers)]
+            if numbers:
+                for kept, values in zip(
+                    joints,
+                    zip(*pb.getJointStates(body, numbers, client), strict=True),
+                    strict=True,
+                ):
+                    kept.append(values)
+                links.append(pb.getLinkStates(body, numbers, 0, 0, client))
+        found = {
+            _BODIES: bodies,
+            **dict(zip(_JOINT, joints, strict=True)),
+            "base poses": poses,
+            "base velocities": speeds,
+            "link poses": links,
+            "contact points": pb.getContactPoints(physicsClientId=client),
+            "masses, frictions and dampings": dynamics,
+            "constraints": pb.getNumConstraints(client),
+        }
+        found |= pb.getPhysicsEngineParameters(client)
+        return {name: marshal.dumps(value, 2) for name, value in found.items()}
+
+    def differing(self, before: Contents, now: Contents) -> list[str]:
+        # Another body makes every list a longer one: that is not what changed.
+        return [_BODIES] if before[_BODIES] != now[_BODIES] else super().differing(before, now)
+
+    def spelled(self, field: str) -> str:
+        return f"{self.title}: {field}"
+
+
+class _Arrays(WatchedObject):
+    """The interface's own arrays of a Data: copies, and what was computed for a reader."""
+
+    def __init__(self, machine: Machine, label: str) -> None:
+        super().__init__("a Data", label)
+        self._machine = weakref.ref(machine)  # a Data ends when the code lets go of it
+        self._moment = machine.moment
+
+    @property
+    def gone(self) -> bool:
+        return self._machine() is None
+
+    def look(self, thoroughly: bool = False) -> Contents | None:
+        machine = self._machine()
+        if machine is None:
+            return None
+        found = {name: getattr(machine, name).tobytes() for name in INPUTS}
+        found["time"] = marshal.dumps(machine.time, 2)
+        # Not by asking the Data, which would compute what nobody has read.
+        for name, value in machine.derived.items():
+            whole = name in DERIVED
+            parts = [value] if whole else [value.geom, value.dist, value.pos, value.force]
+            found[name] = b"".join(part.tobytes() for part in parts)
+        return found
+
+    def differing(self, before: Contents, now: Contents) -> list[str]:
+        # What was never read is what a fresh Data says: zeros.
+        return [name for name, new in now.items() if before.get(name, bytes(len(new))) != new]
+
+    def due(self) -> bool:
+        machine = self._machine()
+        if machine is None or machine.moment is self._moment:
+            return False
+        self._moment = machine.moment
+        return not machine.derived
+
+    def entry(self, field: str, before: bytes, after: bytes) -> str:
+        return entries(field, before, after, 8) if field in INPUTS else field
+
+    def spelled(self, field: str) -> str:
+        return f"{self.label}.{field}"
+
+
+class _BulletWatch(CallWatch):
+    engine = "pybullet"
+
+    def __init__(self) -> None:
+        self._module: Any = require("pybullet")
+        # Looks must not come by way of what is replaced.
+        self._bare = types.SimpleNamespace(**vars(self._module))
+        self._worlds: dict[int, _World] = {}
+        self._arrays: weakref.WeakKeyDictionary[Machine, _Arrays] = weakref.WeakKeyDictionary()
+
+    def functions(self) -> Iterator[tuple[Any, str, str]]:
+        for name, value in vars(self._module).items():
+            if isinstance(value, FUNCTIONS) and not name.startswith("_"):
+                yield self._module, name, name
+
+    def concerned(self, function: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
+        if function == "connect":
+            return []
+        client = client_of(function, args, kwargs)
+        world = self._worlds.get(-1 if client is None else client)
+        if world is None and function == "disconnect":
+            return None  # of a Data from before that is collected just now
+        return [world] if world else []
+
+    def made(self, function: str, args: Sequence[Any], result: Any) -> WatchedObject | None:
+        if function != "connect" or result < 0:
+            return None
+        world = _World(self._bare, result)
+        self._worlds[result] = world
+        return world
+
+    def name(self, namespace: Mapping[str, Any]) -> None:
+        for known in (*self._worlds.values(), *self._arrays.values()):
+            known.named = False
+        arrays: weakref.WeakKeyDictionary[Machine, _Arrays] = weakref.WeakKeyDictionary()
+        for label, value in named(namespace):
+            if isinstance(value, PybulletModel):
+                self._name_model(label, value)
+            elif isinstance(value, PybulletData):
+                self._name_model(f"{label}.model", cast("PybulletModel", value.model))
+                self._label(value.machine.world.raw, f"the world of {label}")
+                machine = value.machine
+                if machine not in arrays:
+                    kept = self._arrays.get(machine) or _Arrays(machine, label)
+                    kept.label, kept.named = label, True
+                    arrays[machine] = kept
+        self._arrays = arrays  # the others no variable leads to
+
+    def _name_model(self, label: str, model: PybulletModel) -> None:
+        for name, world in model.shared_worlds.items():
+            self._label(world, f"the {name} of {label}")
+
+    def _label(self, world: Any, label: str) -> None:
+        # Of one that is closed the number may be another's by now.
+        if world.closed:
+            return
+        known = self._worlds.get(world.client)
+        if known is not None and not known.named:
+            known.label, known.named = label, True
+
+    def living(self) -> Sequence[WatchedObject]:
+        self._worlds = {c: world for c, world in self._worlds.items() if not world.gone}
+        return [*self._worlds.values(), *self._arrays.values()]
+
+
+def client_of(function: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> int | None:
+    """The number of the world that a call is about; None where that cannot be told."""
+    if "physicsClientId" in kwargs:
+        return int(kwargs["physicsClientId"])
+    place = _BEFORE_CLIENT.get(function)
+    if place is None:
+        return None if args else 0
+    return int(args[place]) if len(args) > place else 0  # the engine's own default
+
+
+def watch() -> CallWatch:
+    """A watch on PyBullet."""
+    return _BulletWatch()

@@ -1,0 +1,286 @@
+"""What PyBullet does with tiny models, as its own users load and step them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ...backends._bullet_client import pb
+from ...interface import Array
+from ..measured import Futures, LetGo, Measurement, OneStep, ReadTwice, Sliding
+from ..samples import floor, joint_tree, marked, pendulum
+from . import pile
+from .world import limp, load, put_floor, world
+from .world import timestep as step_of
+
+
+def _marks(client: int, body: int) -> Array:
+    """The marks in the world (3, 3) [m]."""
+    return np.array(
+        [
+            pb.getLinkState(body, k, computeForwardKinematics=1, physicsClientId=client)[0]
+            for k in range(len(marked.MARKS))
+        ]
+    )
+
+
+def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
+    """Four numbers into resetBasePositionAndOrientation."""
+    turned = []
+    with world() as client:
+        body = load(client, marked.URDF)
+        for four in fours:
+            pb.resetBasePositionAndOrientation(body, (0, 0, 0), four, client)
+            marks = _marks(client, body)
+            told = np.array(pb.getBasePositionAndOrientation(body, client)[1])
+            # Which point was put at 0 0 0 is another question.
+            turned.append((marks - marks[0], told))
+    return turned
+
+
+def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Array, Array]:
+    """Three and three numbers into resetBaseVelocity, in this order, and one short step."""
+    with world() as client:
+        body = load(client, marked.URDF)
+        pb.setTimeStep(seconds, client)
+        pb.resetBasePositionAndOrientation(body, place.tolist(), four.tolist(), client)
+        pb.resetBaseVelocity(body, six[:3].tolist(), six[3:].tolist(), client)
+        before = _marks(client, body)
+        pb.stepSimulation(client)
+        return before, _marks(client, body)
+
+
+def gravity(steps: int) -> tuple[list[float], Array]:
+    """A body in a world that was told nothing, let go; without the damping that bodies have."""
+    with world() as client:
+        body = load(client, marked.URDF)
+        pb.changeDynamics(body, -1, linearDamping=0, physicsClientId=client)
+        told = pb.getPhysicsEngineParameters(client)
+        for _ in range(steps):
+            pb.stepSimulation(client)
+        fall = np.array(pb.getBaseVelocity(body, client)[0]) / (steps * told["fixedTimeStep"])
+        return [told[f"gravityAcceleration{axis}"] for axis in "XYZ"], fall
+
+
+def timestep() -> OneStep:
+    """A body at 1 m/s, one step; and whatever number of the world's has changed in it."""
+    with world() as client:
+        body = load(client, marked.URDF)
+        pb.changeDynamics(body, -1, linearDamping=0, physicsClientId=client)
+        start = pb.getBasePositionAndOrientation(body, client)[0][0]
+        pb.resetBaseVelocity(body, (1, 0, 0), (0, 0, 0), client)
+        told = pb.getPhysicsEngineParameters(client)
+        pb.stepSimulation(client)
+        moved = pb.getBasePositionAndOrientation(body, client)[0][0] - start
+        after = pb.getPhysicsEngineParameters(client)
+        changed = {name: after[name] - told[name] for name in told if after[name] != told[name]}
+        name, ticked = next(iter(changed.items()), ("", 0.0))
+        return OneStep(told["fixedTimeStep"], moved, name, ticked)
+
+
+def actuation(seconds: float) -> list[LetGo]:
+    """As loadURDF leaves the joint, with gravity set, and with its motor switched off."""
+    runs = []
+    for part, off in (("as loaded", False), ("motor off", True)):
+        with world() as client:
+            body = load(client, pendulum.URDF, fixed=True)
+            pb.setGravity(0, 0, -pendulum.GRAVITY, client)
+            if off:
+                limp(body, client)
+            step = step_of(client)
+            steps = round(seconds / step)
+            for _ in range(steps):
+                pb.stepSimulation(client)
+            angle, _, _, torque = pb.getJointState(body, 0, client)
+            forces = (
+                Measurement("its motor exerts", torque, "N·m"),
+                Measurement("gravity", pendulum.TORQUE, "N·m"),
+            )
+            runs.append(LetGo(part, angle, steps * step, forces))
+    return runs
+
+
+def command(torque: float) -> dict[str, list[float]]:
+    """A torque, and a velocity motor that cannot reach its target so soon; without gravity."""
+    modes = {"TORQUE_CONTROL": {}, "VELOCITY_CONTROL": {"targetVelocity": 1e3}}
+    speeds: dict[str, list[float]] = {mode: [] for mode in modes}
+    for mode, values in modes.items():
+        with world() as client:
+            body = load(client, pendulum.URDF, fixed=True)
+            limp(body, client)
+            pb.setJointMotorControl2(
+                body, 0, getattr(pb, mode), force=torque, physicsClientId=client, **values
+            )
+            speeds[mode].append(pb.getJointState(body, 0, client)[1])
+            for _ in range(2):
+                pb.stepSimulation(client)
+                speeds[mode].append(pb.getJointState(body, 0, client)[1])
+    return speeds
+
+
+def damping(seconds: float, fast: float) -> tuple[float, float]:
+    """As loadURDF leaves them; of the joint, the motor is switched off."""
+    with world() as client:
+        body = load(client, marked.URDF)
+        pb.resetBaseVelocity(body, (1, 0, 0), (0, 0, 0), client)
+        for _ in range(round(seconds / step_of(client))):
+            pb.stepSimulation(client)
+        end = pb.getBaseVelocity(body, client)[0][0]
+    with world() as client:
+        body = load(client, pendulum.URDF, fixed=True)
+        limp(body, client)
+        pb.resetJointState(body, 0, 0, fast, physicsClientId=client)
+        pb.stepSimulation(client)
+        return end, pb.getJointState(body, 0, client)[1]
+
+
+def _tip(client: int, body: int, compute: bool = False) -> Array:
+    """Where the pendulum's tip is (3,) [m]."""
+    if not compute:
+        return np.array(pb.getLinkState(body, 1, physicsClientId=client)[4])
+    state = pb.getLinkState(body, 1, computeForwardKinematics=1, physicsClientId=client)
+    return np.array(state[4])
+
+
+def _put_ball(client: int, height: float) -> int:
+    """The floor, and the ball at a height [m]; its number."""
+    put_floor(client)
+    ball = pb.createCollisionShape(pb.GEOM_SPHERE, radius=floor.RADIUS, physicsClientId=client)
+    return pb.createMultiBody(1, ball, basePosition=(0, 0, height), physicsClientId=client)
+
+
+def _depth(client: int) -> float:
+    """How deep the deepest contact is that the engine tells of; 0 where there is none [m]."""
+    return max((-point[8] for point in pb.getContactPoints(physicsClientId=client)), default=0.0)
+
+
+def write(angle: float, deep: float) -> list[ReadTwice]:
+    """Write by resetJointState to a pendulum, then a ball that is put into the floor."""
+    with world() as client:
+        body = load(client, pendulum.URDF, fixed=True)
+        _tip(client, body, compute=True)
+        pb.resetJointState(body, 0, angle, 0, client)
+        read = _tip(client, body)
+        tip = ReadTwice("the tip", read, _tip(client, body, compute=True), pendulum.tip_at(angle))
+    with world() as client:
+        ball = _put_ball(client, 1)
+        pb.performCollisionDetection(client)
+        at = (0, 0, floor.RADIUS - deep)
+        pb.resetBasePositionAndOrientation(ball, at, (0, 0, 0, 1), client)
+        depth = _depth(client)
+        pb.performCollisionDetection(client)
+        return [tip, ReadTwice("the contact", depth, _depth(client), deep)]
+
+
+def step(speed: float, deep: float) -> list[ReadTwice]:
+    """A limp pendulum on its way, and a ball on its way out of the floor."""
+    with world() as client:
+        body = load(client, pendulum.URDF, fixed=True)
+        limp(body, client)
+        pb.resetJointState(body, 0, 0, speed, client)
+        pb.stepSimulation(client)
+        read, again = _tip(client, body), _tip(client, body, compute=True)
+        angle = pb.getJointState(body, 0, client)[0]
+        tip = ReadTwice("the tip", read, again, pendulum.tip_at(angle))
+    with world() as client:
+        ball = _put_ball(client, floor.RADIUS - deep)
+        pb.resetBaseVelocity(ball, (0, 0, speed), (0, 0, 0), client)
+        pb.stepSimulation(client)
+        depth = _depth(client)
+        pb.performCollisionDetection(client)
+        now = max(floor.RADIUS - pb.getBasePositionAndOrientation(ball, client)[0][2], 0.0)
+        return [tip, ReadTwice("the contact", depth, _depth(client), now)]
+
+
+def joints() -> dict[str, list[str]]:
+    """The indices of the joints, from a URDF."""
+    with world() as client:
+        body = load(client, joint_tree.URDF, fixed=True)
+        count = pb.getNumJoints(body, client)
+        return {"URDF": [pb.getJointInfo(body, k, client)[1].decode() for k in range(count)]}
+
+
+def reset() -> dict[str, dict[str, bool]]:
+    """Every quantity changed, then resetSimulation, or everything put where it began."""
+    return {name: _kept_after(way) for name, way in pile.RESETS.items()}
+
+
+def _kept_after(way: pile.Restart) -> dict[str, bool]:
+    # Half of anything is not what it has at the start.
+    kept = {quantity: pile.survives(quantity, 0.5, way) for quantity in pile.QUANTITIES}
+    with world() as client:
+        scene = pile.build(client)
+        bodies = pb.getNumBodies(client)
+        way.call(scene)
+        return {**kept, "bodies": pb.getNumBodies(client) == bodies}
+
+
+def friction() -> dict[str, Sliding]:
+    """A block on a floor."""
+
+    def speed(block: float, ground: float, lean: float) -> float:
+        with world() as client:
+            below = put_floor(client)
+            box = pb.createCollisionShape(
+                pb.GEOM_BOX, halfExtents=floor.BLOCK, physicsClientId=client
+            )
+            at = (0, 0, floor.BLOCK[2])
+            body = pb.createMultiBody(1, box, basePosition=at, physicsClientId=client)
+            pb.changeDynamics(below, -1, lateralFriction=ground, physicsClientId=client)
+            pb.changeDynamics(body, -1, lateralFriction=block, physicsClientId=client)
+            step = step_of(client)
+            for seconds, tangent in ((floor.REST, 0.0), (floor.PULL, lean)):
+                pb.setGravity(tangent * floor.GRAVITY, 0, -floor.GRAVITY, client)
+                for _ in range(round(seconds / step)):
+                    pb.stepSimulation(client)
+            return pb.getBaseVelocity(body, client)[0][0]
+
+    return {"": speed}
+
+
+def save() -> dict[str, dict[str, bool]]:
+    """Each quantity changed, saved, changed again, restored, in a world of its own."""
+
+    def comes_back(quantity: str, saved: pile.Saved) -> bool:
+        def there_and_back(scene: pile.Pile) -> pile.Pile:
+            with saved(scene) as restore:
+                if quantity == "applied force":  # there is one until the next step
+                    pb.stepSimulation(scene.client)
+                else:
+                    pile.QUANTITIES[quantity].write(scene, -0.25)
+                restore()
+            return scene
+
+        return pile.survives(quantity, 0.5, there_and_back)
+
+    return {
+        name: {quantity: comes_back(quantity, saved) for quantity in pile.QUANTITIES}
+        for name, saved in pile.WAYS_TO_SAVE.items()
+    }
+
+
+def future(moments: Sequence[float], steps: int) -> Mapping[str, Sequence[Futures]]:
+    """Boxes that fall, set back to the start or to the middle; each trial in its own world."""
+
+    def middle(saved: pile.Saved, moment: float) -> Futures:
+        with world() as client:
+            scene = pile.build(client)
+            pile.run(scene, round(moment / step_of(client)))
+            with saved(scene) as restore:
+                first = pile.run(scene, steps)
+                restore()
+                return first, pile.run(scene, steps)
+
+    def start(way: pile.Restart) -> Futures:
+        with world() as client:
+            scene = pile.build(client)
+            return pile.run(scene, steps), pile.run(way(scene), steps)
+
+    return {
+        **{name: [start(way)] for name, way in pile.RESETS.items()},
+        **{
+            name: [middle(saved, moment) for moment in moments]
+            for name, saved in pile.WAYS_TO_SAVE.items()
+        },
+    }
