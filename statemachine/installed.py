@@ -59,7 +59,12 @@ class Engine:
     wheels: tuple[Wheel, ...]  # pyproject.toml says the same as markers, which a test compares
     places: str  # the same in words
     probe: str  # an attribute that only the right package of that name has
+    role: str  # what it is here for
 
+
+DEFAULT = "mujoco"  # what runs where nothing else is asked for; it compiles MJCF for all others
+WITNESS = "pinocchio"  # what computes places independently
+PAIR = ("mujoco", "pybullet")  # what is compared where nothing else is asked for
 
 ENGINES = {
     engine.name: engine
@@ -71,6 +76,7 @@ ENGINES = {
             wheels=(Wheel("mujoco"),),
             places="Linux, Windows, and macOS on Apple silicon",
             probe="MjModel",
+            role="runs every lesson",
         ),
         Engine(
             name="pybullet",
@@ -85,6 +91,7 @@ ENGINES = {
             ),
             places="Linux x86-64, Windows x64 and macOS, with CPython 3.11 to 3.13",
             probe="DIRECT",
+            role="the second engine of every lesson",
         ),
         Engine(
             name="pinocchio",
@@ -93,6 +100,7 @@ ENGINES = {
             wheels=(Wheel("pin", "linux"), Wheel("pin", "darwin")),
             places="Linux and macOS",
             probe="buildModelFromMJCF",
+            role="the witness of `statemachine fingertip`",
         ),
     )
 }

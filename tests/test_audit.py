@@ -23,13 +23,15 @@ import statemachine as sm
 from statemachine import audit
 from statemachine.audit import apart, elsewhere, falls, look, repeat, restore
 from statemachine.audit.conclusions import conclude
-from statemachine.audit.drivers import Driver, Run, drivers
-from statemachine.audit.drivers.mujoco_driver import MujocoDriver
-from statemachine.audit.findings import Finding, Gap, Layout, gap
+from statemachine.audit.drivers import drivers
+from statemachine.audit.findings import AuditFinding
 from statemachine.audit.points import points
 from statemachine.backends import mujoco_backend
 from statemachine.backends.mujoco_backend import MujocoData
 from statemachine.cli import main
+from statemachine.engines.auditing import Driver, ReferenceRun
+from statemachine.engines.futures import Coordinates, FutureGap, gap
+from statemachine.engines.mujoco.audit import MujocoDriver
 from statemachine.errors import BadInputError
 from statemachine.installed import require
 from statemachine.report import audit as report
@@ -42,7 +44,7 @@ Patch = Callable[[pytest.MonkeyPatch], None]
 
 # Gaps, against closed forms.
 
-HINGE, FREE = Layout((0,), (), ()), Layout((), (0, 1, 2), (3,))
+HINGE, FREE = Coordinates((0,), (), ()), Coordinates((), (0, 1, 2), (3,))
 
 
 def test_what_is_compared_are_bytes() -> None:
@@ -50,7 +52,7 @@ def test_what_is_compared_are_bytes() -> None:
     other = zero.copy()
     assert gap(zero, other, HINGE).exact
     other[2, 1] = -0.0
-    assert gap(zero, other, HINGE) == Gap(3, 2, 0.0, 0.0)
+    assert gap(zero, other, HINGE) == FutureGap(3, 2, 0.0, 0.0)
     other[2, 1] = 5e-324  # the last bit
     assert gap(zero, other, HINGE).first == 2
     lost = np.full((4, 2), math.nan)
@@ -61,7 +63,7 @@ def test_what_is_compared_are_bytes() -> None:
 def test_the_first_row_is_before_any_step() -> None:
     one, other = np.zeros((3, 2)), np.ones((3, 2))
     assert gap(one, other, HINGE).first == 0
-    assert gap(one, other, HINGE, np.array([0, 7, 8])) == Gap(8, 0, 1.0, 0.0)
+    assert gap(one, other, HINGE, np.array([0, 7, 8])) == FutureGap(8, 0, 1.0, 0.0)
     other[0] = 0
     assert gap(one, other, HINGE, np.array([0, 7, 8])).first == 7
 
@@ -303,18 +305,18 @@ QUESTIONS = {
 
 def asked(
     question: str, backend: str = "mujoco", only: Iterable[str] = ("keyframe", "limp")
-) -> list[Finding]:
+) -> list[AuditFinding]:
     """What a question finds of an engine and of the interface to it, in few steps."""
     model = sm.load(SCENE, backend=backend)
     places = tuple(point for point in points(model, 0)[0] if point.name in only)
-    found: list[Finding] = []
+    found: list[AuditFinding] = []
     for driver in drivers(model, 0):
         for point in places:
             found += QUESTIONS[question](driver, driver.run(point, 30))
     return found
 
 
-def broken(findings: Iterable[Finding]) -> set[tuple[str, str]]:
+def broken(findings: Iterable[AuditFinding]) -> set[tuple[str, str]]:
     """Layer and case of all that is promised and does not hold."""
     return {(each.layer, each.case) for each in findings if not each.holds}
 
@@ -539,7 +541,7 @@ def test_a_thread_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch) -> No
             nudge(machine.data)
         right(self, machine, nstep)
 
-    def found() -> list[Finding]:
+    def found() -> list[AuditFinding]:
         driver, runs = _engine()
         return list(apart.threads(driver, runs))
 
@@ -548,7 +550,7 @@ def test_a_thread_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch) -> No
     assert broken(found()) == {("engine", "a pool of 4 threads")}
 
 
-def _engine() -> tuple[Driver, tuple[Run, ...]]:
+def _engine() -> tuple[Driver, tuple[ReferenceRun, ...]]:
     model = sm.load(SCENE)
     driver = drivers(model, 0)[0]
     return driver, tuple(
@@ -591,7 +593,7 @@ def test_another_process_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_process_that_fails_is_one_line() -> None:
-    job = elsewhere.Job(sm.load(SCENE), -1, 10, {})  # no seed
+    job = elsewhere.Job(sm.load(SCENE), -1, 10, {}, ())  # no seed
     with pytest.raises(sm.errors.EngineError, match="a fresh process failed: ValueError"):
         elsewhere.run(job)
 
@@ -603,9 +605,9 @@ def test_conclusions_follow_from_findings(of_mujoco: audit.Audit) -> None:
     """Another engine would get other sentences."""
     engine = of_mujoco.audited[0]
 
-    def without_warm_start(each: Finding) -> Finding:
+    def without_warm_start(each: AuditFinding) -> AuditFinding:
         if each.case == "warmstart":
-            return dataclasses.replace(each, gap=Gap(each.gap.steps, None, 0.0, 0.0))
+            return dataclasses.replace(each, gap=FutureGap(each.gap.steps, None, 0.0, 0.0))
         return each
 
     changed = [without_warm_start(each) for each in engine.findings]

@@ -25,11 +25,11 @@ from statemachine.errors import MissingEngineError
 from statemachine.grading import exercise, recording
 from statemachine.grading.answers import Answer
 from statemachine.grading.calls import FaultError
-from statemachine.grading.examine import Verdict, answers_of, answers_of_file, judged
+from statemachine.grading.examine import FunctionVerdict, answers_of, answers_of_file, judged
 from statemachine.grading.judges import JUDGES, judge_of
 from statemachine.grading.transcript import decode, encode
 from statemachine.grading.watch import engine_watched
-from statemachine.grading.worlds import Scenes, World
+from statemachine.grading.worlds import ExerciseWorld, Scenes
 
 from .conftest import ROOT, Cli, need_engine
 from .exercises import RIGHT, WRONG, Attempt
@@ -45,10 +45,10 @@ def _name(attempt: Attempt) -> str:
     return attempt.name
 
 
-Prepared = tuple[list[World], list[Any]]
+Prepared = tuple[list[ExerciseWorld], list[Any]]
 
 
-def _verdict(attempt: Attempt, prepared: Prepared) -> Verdict:
+def _verdict(attempt: Attempt, prepared: Prepared) -> FunctionVerdict:
     worlds, rights = prepared
     if attempt.raw:  # which may leave the engine's own model changed
         with tempfile.TemporaryDirectory() as folder:
@@ -83,7 +83,7 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], P
 Prepare = Callable[[str, str], Prepared]
 
 
-def _texts(verdict: Verdict) -> list[str]:
+def _texts(verdict: FunctionVerdict) -> list[str]:
     return [remark.text for remark in verdict.remarks]
 
 
@@ -354,7 +354,7 @@ def test_a_judge_that_is_replaced_is_another_process_s(tmp_path: Path) -> None:
         "for name in judges.JUDGES:",
         "    judges.judge_of(name).judge = lambda *_: [calls.Remark('patched', True)]",
         "    judges.judge_of(name).right = lambda worlds: [None for _ in worlds]",
-        "examine.judged = lambda *_: examine.Verdict((calls.Remark('patched', True),))",
+        "examine.judged = lambda *_: examine.FunctionVerdict((calls.Remark('patched', True),))",
         *(f"def {name}(*_): return 1" for name in JUDGES),
     )
     for judgement in found.values():

@@ -11,7 +11,7 @@ import pytest
 
 import statemachine as sm
 from statemachine import rotations
-from statemachine.drawing import Drawing, Part, Shape, _shapes, drawing_of
+from statemachine.drawing import Drawing, Part, Surface, _shapes, drawing_of
 
 from .conftest import need_engine
 
@@ -44,18 +44,18 @@ ALL = """
 """
 
 
-def _volume(shape: Shape | Part) -> float:
+def _volume(shape: Surface | Part) -> float:
     """By the divergence theorem: positive if every normal points outward."""
     a, b, c = (shape.vertices[shape.faces[:, k]].astype(float) for k in range(3))
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
 
 
-def _area(shape: Shape | Part) -> float:
+def _area(shape: Surface | Part) -> float:
     a, b, c = (shape.vertices[shape.faces[:, k]].astype(float) for k in range(3))
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
-def _is_closed(shape: Shape | Part) -> bool:
+def _is_closed(shape: Surface | Part) -> bool:
     """Every edge is walked once each way: no hole, and all faces wound alike."""
     f = shape.faces
     edges = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])

@@ -18,7 +18,7 @@ from rich.cells import cell_len
 from statemachine import load
 from statemachine.compare.models import Compared, Difference, compare, read, split
 from statemachine.compare.models.ledger import SUBJECTS, digits_of
-from statemachine.compare.models.tree import Tree
+from statemachine.compare.models.tree import GroupTree
 from statemachine.errors import ModelError, UnknownNameError
 from statemachine.kinematics import Kinematics
 from statemachine.models import models_dir
@@ -268,8 +268,8 @@ def test_fixed_links_weigh_what_mujoco_makes_of_them(
     path = tmp_path_factory.mktemp("urdf") / "r.urdf"
     path.write_text("".join(texts) + "</robot>")
     ours, theirs = (
-        Tree(read(path)).groups[1].inertial,
-        Tree(read(path, "mujoco")).groups[1].inertial,
+        GroupTree(read(path)).groups[1].inertial,
+        GroupTree(read(path, "mujoco")).groups[1].inertial,
     )
     assert ours.mass == pytest.approx(theirs.mass, rel=1e-12)
     assert np.allclose(ours.com, theirs.com, atol=1e-12)
@@ -279,7 +279,7 @@ def test_fixed_links_weigh_what_mujoco_makes_of_them(
 
 def test_poses_of_a_urdf_are_the_witnesses(pair: Pair, pinocchio: None) -> None:
     one, _ = pair({"upper_axis": "0.6 0 0.8", "fore_axis": "0 0.28 0.96"})
-    tree, witness = Tree(read(one)), Kinematics(one)
+    tree, witness = GroupTree(read(one)), Kinematics(one)
     for qpos in np.random.default_rng(0).uniform(-1, 1, (20, 3)):
         poses = tree.poses(dict(zip(witness.joint_names, qpos, strict=True)))
         number, place = tree.frames["gripper_frame_link"]
@@ -299,7 +299,7 @@ def test_references_of_joints_and_several_on_one_body(tmp_path: Path) -> None:
       <site name="tip" pos="0.3 0.2 0.1"/></body></worldbody></mujoco>"""
     path = tmp_path / "many.xml"
     path.write_text(text)
-    tree, model = Tree(read(path)), load(path)
+    tree, model = GroupTree(read(path)), load(path)
     from statemachine import forward, make_data
 
     data = make_data(model)
@@ -533,7 +533,7 @@ def test_deep_and_large_files_end_soon(tmp_path: Path) -> None:
     path = tmp_path / "long.urdf"
     nested = "<x>" * 100_000 + "</x>" * 100_000
     path.write_text(f'<robot name="r">{links}{joints}{nested}</robot>')
-    assert len(Tree(read(path)).groups) == 1500
+    assert len(GroupTree(read(path)).groups) == 1500
     many = "".join(f'<link name="l{k}"/>' for k in range(3000))
     path.write_text(f'<robot name="r">{many}</robot>')
     with pytest.raises(ModelError, match="3,000 links"):

@@ -19,7 +19,7 @@ from statemachine import cli as command_line
 from statemachine.errors import BadInputError, EngineError
 from statemachine.grading.mutants import MUTANTS, Mutant, run
 from statemachine.grading.mutants.faults import FAULTS
-from statemachine.grading.mutants.run import Examination, Failure, Trial, examine
+from statemachine.grading.mutants.run import Examination, Failure, MutantTrial, examine
 from statemachine.page import Table
 from statemachine.report import mutants as report
 
@@ -324,7 +324,9 @@ def test_the_page_keeps_to_its_columns(capsys: pytest.CaptureFixture[str]) -> No
 
     name = "test_" + "a_name_that_goes_on_and_on_" * 4
     one = Failure(name, "why")
-    trials = tuple(Trial(mutant, (one,) * (k % 3 * 6)) for k, mutant in enumerate(MUTANTS.values()))
+    trials = tuple(
+        MutantTrial(mutant, (one,) * (k % 3 * 6)) for k, mutant in enumerate(MUTANTS.values())
+    )
     page = report.page(Examination("test_x.py", "mujoco", "4", (name, "test_b"), (), trials))
     assert not page.holds
     terminal.show(page)

@@ -19,9 +19,13 @@ import pytest
 
 import statemachine as sm
 from statemachine.compare import compare
+from statemachine.drawing.camera import Camera, framed
+from statemachine.drawing.shots import Shot
+from statemachine.engines.mujoco import _opengl
+from statemachine.engines.pybullet import rendering as pybullet_rendering
 from statemachine.errors import BadInputError, MissingEngineError, TraceError, UnknownNameError
-from statemachine.rendering import Camera, Timing, framed, frames, motion_of, probe, timing_of
-from statemachine.rendering.compose import Shot, compose, halved
+from statemachine.rendering import Timing, frames, motion_of, probe, timing_of
+from statemachine.rendering.compose import compose, halved
 from statemachine.rendering.motion import corners, rows_at
 from statemachine.report.film import Film, write_film
 from statemachine.report.film_overlay import Overlay, Strip
@@ -62,7 +66,7 @@ def renderer(request: pytest.FixtureRequest) -> probe.Renderer:
     return request.getfixturevalue("mujoco_here")
 
 
-both_renderers = pytest.mark.parametrize("renderer", probe.RENDERERS, indirect=True)
+both_renderers = pytest.mark.parametrize("renderer", probe.renderers(), indirect=True)
 
 
 def _differ(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -404,9 +408,9 @@ def _environment_of(tmp_path: Path) -> dict[str, str]:
 
 
 def test_what_draws_is_chosen_by_what_works(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(probe, "offscreen_opengl", lambda: "egl")
+    monkeypatch.setattr(_opengl, "offscreen_opengl", lambda: "egl")
     assert probe.renderer_here() == probe.Renderer("mujoco", "egl")
-    monkeypatch.setattr(probe, "offscreen_opengl", lambda: None)
+    monkeypatch.setattr(_opengl, "offscreen_opengl", lambda: None)
     with pytest.raises(MissingEngineError, match=r"apt-get|driver"):
         probe.renderer_here("mujoco")
     with pytest.raises(UnknownNameError, match="Did you mean 'mujoco'"):
@@ -416,11 +420,11 @@ def test_what_draws_is_chosen_by_what_works(monkeypatch: pytest.MonkeyPatch) -> 
         if name == "pybullet":
             raise MissingEngineError("pybullet is not installed here", engine=name)
 
-    monkeypatch.setattr(probe, "require", require)
+    monkeypatch.setattr(pybullet_rendering, "require", require)
     with pytest.raises(MissingEngineError, match="nothing here can draw") as caught:
         probe.renderer_here()
     assert "\n" not in str(caught.value)
-    monkeypatch.setattr(probe, "require", lambda name: None)
+    monkeypatch.setattr(pybullet_rendering, "require", lambda name: None)
     assert probe.renderer_here() == probe.Renderer("pybullet")
 
 

@@ -16,7 +16,9 @@ POSIX = pytest.mark.skipif(os.name != "posix", reason="limits and sessions are P
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
 
 
-def _python(code: str, cpu: float = 20.0, wall: float = 120.0, **more: object) -> sandbox.Outcome:
+def _python(
+    code: str, cpu: float = 20.0, wall: float = 120.0, **more: object
+) -> sandbox.ProcessOutcome:
     return sandbox.run([sys.executable, "-c", code], cpu=cpu, wall=wall, **more)  # type: ignore[arg-type]
 
 
@@ -173,7 +175,7 @@ def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
 
 def _shut_in(
     folder: Path, code: str, cpu: float = 20.0, wall: float = 120.0, **more: object
-) -> sandbox.Outcome:
+) -> sandbox.ProcessOutcome:
     return _python(code, cpu, wall, cwd=folder, writable=folder, **more)
 
 

@@ -12,12 +12,12 @@ import pytest
 
 from statemachine.grading.answers import Answer, Thing, plain
 from statemachine.grading.transcript import decode, encode
-from statemachine.grading.watch import Inputs, Run
+from statemachine.grading.watch import EngineRun, Inputs
 
 
 def _answer() -> Answer:
     row = np.array([1.5, np.nan, -0.0])
-    run = Run(0, True, row, row, row[:0], 0.5, row, row, 1.5, 3, None)
+    run = EngineRun(0, True, row, row, row[:0], 0.5, row, row, 1.5, 3, None)
     inputs = Inputs(0, row, row, row[:1])
     result = (
         [True, None, "text", 3, 2.5, float("inf")],

@@ -12,16 +12,17 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
+from ..engines.auditing import Driver, Measured, ReferenceRun, SavePoint
 from ..errors import BadInputError, DivergedError
 from ..experiments._common import Progress, Provenance, provenance, silent
 from ..interface import Model
 from ..interface.checks import as_count
 from . import apart, elsewhere, falls, look, repeat, restore
 from .conclusions import Conclusion, conclude
-from .drivers import Driver, Run, Seen, drivers
-from .drivers.interface_driver import InterfaceDriver
-from .findings import Finding
-from .points import Point, points
+from .drivers import drivers
+from .findings import AuditFinding
+from .interface_driver import InterfaceDriver
+from .points import points
 
 STEPS = 60  # of each future
 
@@ -42,8 +43,8 @@ class Audited:
     layer: str
     name: str
     legend: str
-    points: tuple[Seen, ...]
-    findings: tuple[Finding, ...]
+    points: tuple[Measured, ...]
+    findings: tuple[AuditFinding, ...]
     conclusion: Conclusion
 
 
@@ -92,8 +93,8 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
     states = {each.point.name: interface.state(each.point) for each in runs[interface]}
     if not states:
         raise BadInputError(f"nothing can be saved in {model.path.name}: {'; '.join(diverged)}")
-    job = elsewhere.Job(model, seed, nstep, states)
-    found: dict[Driver, list[Finding]] = {driver: [] for driver in everyone}
+    job = elsewhere.Job(model, seed, nstep, states, tuple(map(type, everyone)))
+    found: dict[Driver, list[AuditFinding]] = {driver: [] for driver in everyone}
     with ThreadPoolExecutor(1) as pool:
         answer = pool.submit(elsewhere.run, job)
         work = [(driver, each) for driver in everyone for each in runs[driver]]
@@ -112,7 +113,7 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
         found[interface] += elsewhere.pickled(answer.result(), interface, runs[interface], states)
     audited = []
     for driver in everyone:
-        seen = tuple(driver.see(each.point) for each in runs[driver])
+        seen = tuple(driver.measure(each.point) for each in runs[driver])
         findings = tuple(found[driver])
         audited.append(
             Audited(driver.layer, driver.name, driver.legend, seen, findings, conclude(findings))
@@ -121,7 +122,7 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
 
 
 # Each asks a driver about one save point, given the run from there that nothing disturbed.
-_OF_A_RUN: tuple[Callable[[Driver, Run], Iterator[Finding]], ...] = (
+_OF_A_RUN: tuple[Callable[[Driver, ReferenceRun], Iterator[AuditFinding]], ...] = (
     repeat.again,
     repeat.after_reset,
     repeat.pieces,
@@ -134,10 +135,10 @@ _OF_A_RUN: tuple[Callable[[Driver, Run], Iterator[Finding]], ...] = (
 
 
 def _runs(
-    everyone: Sequence[Driver], places: Sequence[Point], steps: int
-) -> tuple[dict[Driver, list[Run]], tuple[str, ...]]:
+    everyone: Sequence[Driver], places: Sequence[SavePoint], steps: int
+) -> tuple[dict[Driver, list[ReferenceRun]], tuple[str, ...]]:
     """The undisturbed runs, from points at which nobody diverges; and a line for each other."""
-    runs: dict[Driver, list[Run]] = {driver: [] for driver in everyone}
+    runs: dict[Driver, list[ReferenceRun]] = {driver: [] for driver in everyone}
     without: list[str] = []
     for point in places:
         try:

@@ -6,18 +6,17 @@ import pickle
 import sys
 from pathlib import Path
 
-from .drivers import drivers
-from .drivers.interface_driver import InterfaceDriver
-from .elsewhere import Answer, Job, Traces
+from .elsewhere import ChildRuns, Job, Traces
+from .interface_driver import InterfaceDriver
 from .points import points
 
 
-def answer(job: Job) -> Answer:
+def answer(job: Job) -> ChildRuns:
     """All runs from the start, and a future of each State."""
     runs: Traces = {}
     futures = {}
     places, _ = points(job.model, job.seed)
-    for driver in drivers(job.model, job.seed):
+    for driver in (kind(job.model, job.seed) for kind in job.drivers):
         # A point without a State is one at which somebody diverged.
         for point in places:
             name = point.name
@@ -26,7 +25,7 @@ def answer(job: Job) -> Answer:
             runs[driver.layer, name] = driver.run(point, job.steps).future
             if isinstance(driver, InterfaceDriver):
                 futures[name] = driver.future(point, job.states[name], job.steps)
-    return Answer(runs, futures)
+    return ChildRuns(runs, futures)
 
 
 def main(asked: str, answered: str) -> None:

@@ -7,17 +7,16 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from ..engines.auditing import Driver, ReferenceRun, SavePoint
 from ..interface import Array
-from .drivers import Driver, Run
-from .findings import Finding
-from .points import Point
+from .findings import AuditFinding, finding_of
 
 BESIDE, THREADS, POOLS = "two at once", "threads", "pools"
 _THREADS = 4
 _EACH = 2  # runs of each point
 
 
-def beside(driver: Driver, run: Run) -> Iterator[Finding]:
+def beside(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
     """Stepped turn by turn with another one of the same Model, which has another past."""
     with driver.at(run.point) as machine, driver.used(run.point) as other:
         trace = [driver.read(machine)]
@@ -25,13 +24,13 @@ def beside(driver: Driver, run: Run) -> Iterator[Finding]:
             trace.append(driver.drive(machine, run.point, 1)[-1])
             driver.advance(other)
     off = driver.gap(run, np.array(trace))
-    yield driver.found(BESIDE, run, "turn by turn with another", "alone", off)
+    yield finding_of(driver, BESIDE, run, "turn by turn with another", "alone", off)
 
 
-def threads(driver: Driver, runs: Sequence[Run]) -> Iterator[Finding]:
+def threads(driver: Driver, runs: Sequence[ReferenceRun]) -> Iterator[AuditFinding]:
     """All points at once, twice each, on a pool of threads; one machine a run."""
 
-    def once(point: Point, steps: int) -> Array:
+    def once(point: SavePoint, steps: int) -> Array:
         with driver.at(point) as machine:
             return driver.drive(machine, point, steps)
 
@@ -39,13 +38,13 @@ def threads(driver: Driver, runs: Sequence[Run]) -> Iterator[Finding]:
         jobs = [[pool.submit(once, run.point, run.steps) for _ in range(_EACH)] for run in runs]
         for run, of in zip(runs, jobs, strict=True):
             off = driver.gap(run, *(job.result() for job in of))
-            yield driver.found(THREADS, run, f"a pool of {_THREADS} threads", "alone", off)
+            yield finding_of(driver, THREADS, run, f"a pool of {_THREADS} threads", "alone", off)
 
 
-def pools(driver: Driver, run: Run) -> Iterator[Finding]:
+def pools(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
     """The engine's own ways to run several at once, where it has any."""
     if run.point.swings:  # they take no controller
         return
     for name, several in driver.pools().items():
         off = driver.gap(run, *several(run.point, run.steps))
-        yield driver.found(POOLS, run, name, "alone, step by step", off)
+        yield finding_of(driver, POOLS, run, name, "alone, step by step", off)

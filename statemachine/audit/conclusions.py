@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from .drivers import ONLY
-from .findings import EACH_OTHER, Finding, Gap, worst
+from ..engines.auditing import ONLY
+from ..engines.futures import FutureGap, worst
+from .findings import EACH_OTHER, AuditFinding
 from .restore import FORGETS, ITSELF, NO_CONTACTS, NOT_RESTORED, RESTORE, WITHOUT
 
 _NEARLY = 1e-6  # of a difference: what is left of it is rounding
@@ -26,7 +27,7 @@ class Missing:
     field: str
     points: tuple[str, ...]
     itself: tuple[str, ...]
-    gap: Gap
+    gap: FutureGap
 
 
 @dataclass(frozen=True)
@@ -48,13 +49,13 @@ class Conclusion:
     """
 
     suffice: tuple[str, ...]
-    fail: dict[str, Gap]
+    fail: dict[str, FutureGap]
     agree: tuple[str, ...]
     missing: tuple[Missing, ...]
     idle: tuple[str, ...]
     smallest: bool | None
     forgotten: dict[str, tuple[str, ...]]
-    touching: dict[str, tuple[Gap, Gap]]
+    touching: dict[str, tuple[FutureGap, FutureGap]]
     not_read_back: dict[str, tuple[str, ...]]
 
     @property
@@ -67,7 +68,7 @@ class Conclusion:
         )
 
 
-def conclude(findings: Sequence[Finding]) -> Conclusion:
+def conclude(findings: Sequence[AuditFinding]) -> Conclusion:
     """Draw the conclusion of one driver's findings."""
     against = [each for each in findings if each.into != EACH_OTHER]
     tried = _by_case(each for each in against if each.experiment == RESTORE)
@@ -94,24 +95,24 @@ def conclude(findings: Sequence[Finding]) -> Conclusion:
     )
 
 
-def _by_case(findings: Iterable[Finding]) -> dict[str, list[Finding]]:
-    found: dict[str, list[Finding]] = {}
+def _by_case(findings: Iterable[AuditFinding]) -> dict[str, list[AuditFinding]]:
+    found: dict[str, list[AuditFinding]] = {}
     for each in findings:
         found.setdefault(each.case, []).append(each)
     return found
 
 
-def _differing(findings: Iterable[Finding]) -> tuple[str, ...]:
+def _differing(findings: Iterable[AuditFinding]) -> tuple[str, ...]:
     """Save points at which one differs, each once."""
     return tuple(dict.fromkeys(each.point for each in findings if not each.gap.exact))
 
 
-def _missing(name: str, findings: Sequence[Finding]) -> Missing:
+def _missing(name: str, findings: Sequence[AuditFinding]) -> Missing:
     itself = _differing(each for each in findings if each.into == ITSELF)
     return Missing(name, _differing(findings), itself, worst([each.gap for each in findings]))
 
 
-def _forgotten(findings: Iterable[Finding]) -> dict[str, tuple[str, ...]]:
+def _forgotten(findings: Iterable[AuditFinding]) -> dict[str, tuple[str, ...]]:
     found: dict[str, dict[str, None]] = {}
     for each in findings:
         if each.experiment == FORGETS and each.into != NOT_RESTORED:
@@ -121,7 +122,7 @@ def _forgotten(findings: Iterable[Finding]) -> dict[str, tuple[str, ...]]:
     return {way: tuple(of) for way, of in found.items()}
 
 
-def _touching(findings: Sequence[Finding]) -> dict[str, tuple[Gap, Gap]]:
+def _touching(findings: Sequence[AuditFinding]) -> dict[str, tuple[FutureGap, FutureGap]]:
     found = {}
     for off in findings:
         if off.experiment == NO_CONTACTS:

@@ -11,11 +11,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..engines.auditing import Driver, ReferenceRun
+from ..engines.futures import gap
 from ..errors import EngineError
 from ..interface import Array, Model, State
-from .drivers import Driver, Run
-from .drivers.interface_driver import InterfaceDriver
-from .findings import Finding, gap
+from .findings import AuditFinding, finding_of
+from .interface_driver import InterfaceDriver
 
 PROCESS, PICKLED = "process", "pickled State"
 _PATIENCE = 300.0  # seconds
@@ -32,17 +33,18 @@ class Job:
     seed: int
     steps: int
     states: dict[str, State]
+    drivers: tuple[type[Driver], ...]
 
 
 @dataclass(frozen=True)
-class Answer:
+class ChildRuns:
     """What it did: runs from the start, and futures of the States by point."""
 
     runs: Traces
     futures: dict[str, Array]
 
 
-def run(job: Job) -> Answer:
+def run(job: Job) -> ChildRuns:
     """Do a job in a fresh Python, whose strings hash otherwise; nothing of it is left.
 
     Raises:
@@ -75,18 +77,25 @@ def run(job: Job) -> Answer:
         return pickle.loads(answered.read_bytes())
 
 
-def findings(answer: Answer, driver: Driver, runs: Sequence[Run]) -> Iterator[Finding]:
+def findings(
+    answer: ChildRuns, driver: Driver, runs: Sequence[ReferenceRun]
+) -> Iterator[AuditFinding]:
     """The other process's runs against those of this one."""
     for run in runs:
         off = driver.gap(run, answer.runs[driver.layer, run.point.name])
-        yield driver.found(PROCESS, run, "a fresh process", "this process", off)
+        yield finding_of(driver, PROCESS, run, "a fresh process", "this process", off)
 
 
 def pickled(
-    answer: Answer, driver: InterfaceDriver, runs: Sequence[Run], states: dict[str, State]
-) -> Iterator[Finding]:
+    answer: ChildRuns,
+    driver: InterfaceDriver,
+    runs: Sequence[ReferenceRun],
+    states: dict[str, State],
+) -> Iterator[AuditFinding]:
     """The future of a State that was pickled to another process, against its future here."""
     for run in runs:
         here = driver.future(run.point, states[run.point.name], run.steps)
-        off = gap(here, answer.futures[run.point.name], driver.layout)
-        yield driver.found(PICKLED, run, "a pickled State, in a fresh one", "in this process", off)
+        off = gap(here, answer.futures[run.point.name], driver.coordinates)
+        yield finding_of(
+            driver, PICKLED, run, "a pickled State, in a fresh one", "in this process", off
+        )

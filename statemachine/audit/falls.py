@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from ..backends import load
+from ..engines.auditing import Driver, SavePoint
 from ..interface import Model
 from . import look
-from .drivers import Driver
-from .findings import Finding
-from .points import Point
+from .findings import AuditFinding
 
 FALL = "fall"  # save points are called so, with a number
 BOXES, DROPS, STEPS = 4, 4, 300
@@ -24,7 +23,7 @@ _BOX = '<body><freejoint/><geom type="box" size="{0} {0} {0}" mass=".2"/></body>
 _ASIDE, _TILTED = 0.03, 0.4  # at most, at the start [m], [rad]
 
 
-def findings(driver: Driver) -> Iterator[Finding]:
+def findings(driver: Driver) -> Iterator[AuditFinding]:
     """Each look of an engine before each step of a few falls, against the run without.
 
     Args:
@@ -43,7 +42,7 @@ def _boxes(backend: str) -> Model:
         return load(path, backend=backend)
 
 
-def _drops(model: Model, seed: int) -> Iterator[Point]:
+def _drops(model: Model, seed: int) -> Iterator[SavePoint]:
     random = np.random.default_rng(seed)
     for number in range(1, DROPS + 1):
         poses = np.zeros((BOXES, 7))
@@ -54,4 +53,4 @@ def _drops(model: Model, seed: int) -> Iterator[Point]:
         poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
         still, none = np.zeros(model.nv), np.zeros(model.nu)
         how = f"{BOXES} boxes, one above the other, let go"
-        yield Point(f"{FALL} {number}", how, model, poses.ravel(), still, none, 0)
+        yield SavePoint(f"{FALL} {number}", how, model, poses.ravel(), still, none, 0)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from .drivers import Driver, Run
-from .findings import Finding
+from ..engines.auditing import Driver, ReferenceRun
+from .findings import AuditFinding, finding_of
 
 LOOK = "look"
 
 
-def ask(driver: Driver, run: Run) -> Iterator[Finding]:
+def ask(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
     """Each call before each step, against the run without."""
-    for look in driver.looks(run.point):
+    for look in driver.disturbances(run.point):
         with driver.at(run.point) as machine:
             future = driver.drive(machine, run.point, run.steps, look)
         off = driver.gap(run, future)
-        yield driver.found(LOOK, run, look.name, "the run without", off, look.promised)
+        yield finding_of(driver, LOOK, run, look.name, "the run without", off, look.promised)

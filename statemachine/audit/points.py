@@ -7,10 +7,10 @@ They are found by running a model, so that any model has some. What a moment is 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
+from ..engines.auditing import STIR, SavePoint, within
 from ..errors import UnsupportedError
 from ..interface import Array, JointType, Keyframe, Model, make_data
 
@@ -18,47 +18,12 @@ _SETTLE, _FALL, _WAY = 1.0, 0.8, 0.1  # seconds before a run is saved
 _LONGEST = 400  # steps before it, at most
 _ABOVE = 3.0  # what is free to move is lifted so far [m]
 _THROWN = (0.3, 0.2, 0.0, 2.0, 1.0, 3.0)  # and has this velocity [m/s, rad/s]
-_STIR = 0.3  # how far a command is from that of rest [rad or m], where the range allows it
 _MOVE = (0.4, -0.2)  # added to a keyframe's command: of the lesson on replay
-_RATE = 2.0  # of a command that swings [rad/s]
 _REACH = 0.01  # from a limit, where a joint starts towards it [rad or m]
 _ARRIVAL = 5  # in how many steps it is there
 
 
-@dataclass(frozen=True, eq=False)
-class Point:
-    """A save point: where a run starts, and how long it runs before it is saved.
-
-    Attributes:
-        name: A word.
-        how: How one gets there.
-        model: The model, or a variant of it.
-        qpos, qvel, ctrl: The start; the command stays.
-        run_in: Steps before the save.
-        powered: Whether the servos are on.
-        swings: Whether a controller writes the command before each step, from the time.
-        at_limit: Whether joints have arrived at their limits.
-    """
-
-    name: str
-    how: str
-    model: Model
-    qpos: Array
-    qvel: Array
-    ctrl: Array
-    run_in: int
-    powered: bool = True
-    swings: bool = False
-    at_limit: bool = False
-
-    def commanded(self, time: float) -> Array:
-        """What the controller of a point that swings writes at a time [s]."""
-        ctrl = self.ctrl.copy()
-        ctrl[0] += _STIR * np.sin(_RATE * time)
-        return _within(self.model, ctrl)
-
-
-def points(model: Model, seed: int) -> tuple[tuple[Point, ...], tuple[str, ...]]:
+def points(model: Model, seed: int) -> tuple[tuple[SavePoint, ...], tuple[str, ...]]:
     """Save points of a model, and a line for each that it does not have.
 
     Args:
@@ -67,7 +32,7 @@ def points(model: Model, seed: int) -> tuple[tuple[Point, ...], tuple[str, ...]]
     """
     with make_data(model) as data:
         zero = data.qpos.copy()
-    makers: dict[str, Callable[[], Point | str]] = {
+    makers: dict[str, Callable[[], SavePoint | str]] = {
         "default": lambda: _default(model, zero),
         "motion": lambda: _motion(model, zero, seed),
         "keyframe": lambda: _keyframe(model),
@@ -81,48 +46,48 @@ def points(model: Model, seed: int) -> tuple[tuple[Point, ...], tuple[str, ...]]
             made = make()
         except UnsupportedError as error:
             made = str(error)
-        if isinstance(made, Point):
+        if isinstance(made, SavePoint):
             found.append(made)
         else:
             without.append(f"{name}: {made}")
     return tuple(found), tuple(without)
 
 
-def _default(model: Model, zero: Array) -> Point:
+def _default(model: Model, zero: Array) -> SavePoint:
     how = "default pose, no command, and time to settle"
-    still, none = np.zeros(model.nv), _within(model, np.zeros(model.nu))
-    return Point("default", how, model, zero, still, none, _steps(model, _SETTLE))
+    still, none = np.zeros(model.nv), within(model, np.zeros(model.nu))
+    return SavePoint("default", how, model, zero, still, none, _steps(model, _SETTLE))
 
 
-def _motion(model: Model, zero: Array, seed: int) -> Point:
+def _motion(model: Model, zero: Array, seed: int) -> SavePoint:
     qpos, qvel = _lifted(model, zero)
-    stir = np.random.default_rng(seed).uniform(-_STIR, _STIR, model.nu)
+    stir = np.random.default_rng(seed).uniform(-STIR, STIR, model.nu)
     ways = ["free bodies thrown"] if list(_free(model)) else []
     ways += ["each servo on its way"] if model.nu else []
     how = ", ".join(ways) or "default pose, let go"
-    return Point("motion", how, model, qpos, qvel, _within(model, stir), _steps(model, _WAY))
+    return SavePoint("motion", how, model, qpos, qvel, within(model, stir), _steps(model, _WAY))
 
 
-def _keyframe(model: Model) -> Point | str:
+def _keyframe(model: Model) -> SavePoint | str:
     if not model.keyframes:
         return "the model has no keyframe"
     key, ctrl = model.keyframes[0], model.keyframes[0].ctrl.copy()
     ctrl[: len(_MOVE)] += _MOVE[: model.nu]
     how = f"{_named(key)}, command moved away from it"
     steps = _steps(model, 2 * _WAY)
-    return Point("keyframe", how, model, key.qpos, key.qvel, _within(model, ctrl), steps)
+    return SavePoint("keyframe", how, model, key.qpos, key.qvel, within(model, ctrl), steps)
 
 
-def _limp(model: Model, zero: Array) -> Point | str:
+def _limp(model: Model, zero: Array) -> SavePoint | str:
     if not model.nu:
         return "the model has no servo to switch off"
     how = "default pose, servos off, and time to fall"
     still, none = np.zeros(model.nv), np.zeros(model.nu)
     limp = model.replace(actuation=False)
-    return Point("limp", how, limp, zero, still, none, _steps(model, _FALL), powered=False)
+    return SavePoint("limp", how, limp, zero, still, none, _steps(model, _FALL), powered=False)
 
 
-def _limit(model: Model, zero: Array) -> Point | str:
+def _limit(model: Model, zero: Array) -> SavePoint | str:
     qpos, qvel = _lifted(model, zero)
     scalar = np.isin(model.jnt_type, (JointType.HINGE, JointType.SLIDE))
     limited = np.flatnonzero(model.jnt_limited & scalar)
@@ -135,10 +100,12 @@ def _limit(model: Model, zero: Array) -> Point | str:
     how = "servos off, each joint run into its upper limit"
     none = np.zeros(model.nu)
     loose = model.replace(actuation=False) if model.nu else model
-    return Point("limit", how, loose, qpos, qvel, none, _ARRIVAL + 3, powered=False, at_limit=True)
+    return SavePoint(
+        "limit", how, loose, qpos, qvel, none, _ARRIVAL + 3, powered=False, at_limit=True
+    )
 
 
-def _clock(model: Model, zero: Array) -> Point | str:
+def _clock(model: Model, zero: Array) -> SavePoint | str:
     if not model.nu:
         return "the model has no actuator"
     qpos, qvel, ctrl = zero, np.zeros(model.nv), np.zeros(model.nu)
@@ -148,7 +115,7 @@ def _clock(model: Model, zero: Array) -> Point | str:
         qpos, qvel, ctrl, start = key.qpos, key.qvel, key.ctrl, _named(key)
     how = f"{start}, a controller that reads the time before each step"
     steps = _steps(model, 2 * _WAY)
-    return Point("clock", how, model, qpos, qvel, ctrl, steps, swings=True)
+    return SavePoint("clock", how, model, qpos, qvel, ctrl, steps, swings=True)
 
 
 def _named(key: Keyframe) -> str:
@@ -171,7 +138,3 @@ def _lifted(model: Model, zero: Array) -> tuple[Array, Array]:
 def _free(model: Model) -> Iterator[tuple[int, int]]:
     for joint in np.flatnonzero(model.jnt_type == int(JointType.FREE)):
         yield int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
-
-
-def _within(model: Model, ctrl: Array) -> Array:
-    return np.clip(ctrl, *model.actuator_ctrlrange.T)

@@ -6,21 +6,22 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .drivers import Driver, Run
-from .findings import Finding, gap
+from ..engines.auditing import Driver, ReferenceRun
+from ..engines.futures import gap
+from .findings import AuditFinding, finding_of
 
 AGAIN, RESET, PIECES = "again", "reset", "step(n)"
 _PIECES = (7, 1, 22)  # steps a call, over and over
 
 
-def again(driver: Driver, run: Run) -> Iterator[Finding]:
+def again(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
     """From another new machine."""
     with driver.at(run.point) as machine:
         future = driver.drive(machine, run.point, run.steps)
-    yield driver.found(AGAIN, run, "in a new one", "the first run", driver.gap(run, future))
+    yield finding_of(driver, AGAIN, run, "in a new one", "the first run", driver.gap(run, future))
 
 
-def after_reset(driver: Driver, run: Run) -> Iterator[Finding]:
+def after_reset(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
     """From one that has another past, and was reset."""
     if not driver.resets:
         return
@@ -28,10 +29,10 @@ def after_reset(driver: Driver, run: Run) -> Iterator[Finding]:
         driver.reset(machine)
         driver.arrive(machine, run.point)
         future = driver.drive(machine, run.point, run.steps)
-    yield driver.found(RESET, run, "a used one, reset", "a new one", driver.gap(run, future))
+    yield finding_of(driver, RESET, run, "a used one, reset", "a new one", driver.gap(run, future))
 
 
-def pieces(driver: Driver, run: Run) -> Iterator[Finding]:
+def pieces(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
     """Several steps by one call, against as many calls of one step."""
     if not driver.several or run.point.swings:  # its controller writes before each step
         return
@@ -43,5 +44,5 @@ def pieces(driver: Driver, run: Run) -> Iterator[Finding]:
             for nstep in np.diff(counts).tolist():
                 driver.advance(machine, nstep)
                 trace.append(driver.read(machine))
-        off = gap(run.future[counts], np.array(trace), driver.layout, counts)
-        yield driver.found(PIECES, run, name, "n times step(1)", off)
+        off = gap(run.future[counts], np.array(trace), driver.coordinates, counts)
+        yield finding_of(driver, PIECES, run, name, "n times step(1)", off)

@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import combinations
 
+from ..engines.auditing import Driver, Machine, ReferenceRun, Restore, Save, SaveMethod
+from ..engines.futures import gap, worst
 from ..interface import Array
-from .drivers import Driver, Machine, Restore, Run, Save, Way
-from .findings import EACH_OTHER, Finding, gap, worst
+from .findings import EACH_OTHER, AuditFinding, finding_of
 
 RESTORE, WITHOUT, FORGETS, NO_CONTACTS = "restore", "leave one out", "forgets", "contacts off"
 # What is restored.
@@ -17,13 +18,15 @@ NOT_RESTORED = "not restored"
 AGAIN = "the run itself, again"  # where nothing else can be
 
 
-def ask(driver: Driver, run: Run) -> Iterator[Finding]:
+def ask(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
     """Each way to save, restored into the run itself, a fresh machine and a used one."""
-    for way in driver.ways(run.point):
+    for way in driver.save_methods(run.point):
         yield from _tried(driver, run, way)
 
 
-def smallest(driver: Driver, runs: Sequence[Run], findings: Sequence[Finding]) -> Iterator[Finding]:
+def smallest(
+    driver: Driver, runs: Sequence[ReferenceRun], findings: Sequence[AuditFinding]
+) -> Iterator[AuditFinding]:
     """Only the components without which something differed, tried at each point."""
     broke = [each.case for each in findings if each.experiment == WITHOUT and not each.gap.exact]
     way = driver.only(tuple(dict.fromkeys(broke)))
@@ -32,18 +35,18 @@ def smallest(driver: Driver, runs: Sequence[Run], findings: Sequence[Finding]) -
             yield from _tried(driver, run, way)
 
 
-def _tried(driver: Driver, run: Run, way: Way) -> Iterator[Finding]:
+def _tried(driver: Driver, run: ReferenceRun, way: SaveMethod) -> Iterator[AuditFinding]:
     """One way to save, against the future of the run that was saved, and against itself."""
     experiment, case = (WITHOUT, way.left_out) if way.left_out else (RESTORE, way.name)
     futures = _futures(driver, run, way)
     for into, future in futures.items():
         off = driver.gap(run, future)
-        yield driver.found(experiment, run, case, into, off, way.promised)
-    among = worst([gap(*pair, driver.layout) for pair in combinations(futures.values(), 2)])
-    yield driver.found(experiment, run, case, EACH_OTHER, among, way.agree)
+        yield finding_of(driver, experiment, run, case, into, off, way.promised)
+    among = worst([gap(*pair, driver.coordinates) for pair in combinations(futures.values(), 2)])
+    yield finding_of(driver, experiment, run, case, EACH_OTHER, among, way.agree)
 
 
-def _futures(driver: Driver, run: Run, way: Way) -> dict[str, Array]:
+def _futures(driver: Driver, run: ReferenceRun, way: SaveMethod) -> dict[str, Array]:
     """What follows from a restore, by what was restored."""
     point, found = run.point, {}
     with driver.at(point) as machine, way.save(machine) as restore:
@@ -58,15 +61,15 @@ def _futures(driver: Driver, run: Run, way: Way) -> dict[str, Array]:
     return found
 
 
-def forgets(driver: Driver, runs: Sequence[Run]) -> Iterator[Finding]:
+def forgets(driver: Driver, runs: Sequence[ReferenceRun]) -> Iterator[AuditFinding]:
     """What is changed after a save, and is still changed after the restore.
 
     Against the same without the change, so that nothing else can make the difference; and, to
     know whether the change shows at all, without a restore. At the point with most contacts:
     where nothing touches, nobody would miss a friction.
     """
-    run = max(runs, key=lambda each: driver.see(each.point).contacts, default=None)
-    hiding = driver.hides(run.point) if run else None
+    run = max(runs, key=lambda each: driver.measure(each.point).contacts, default=None)
+    hiding = driver.hidden_state(run.point) if run else None
     if run is None or hiding is None:
         return
 
@@ -81,8 +84,8 @@ def forgets(driver: Driver, runs: Sequence[Run]) -> Iterator[Finding]:
     for name, save in ways.items():
         unchanged = future(save, None)
         for what, change in hiding.changes.items():
-            off = gap(unchanged, future(save, change), driver.layout)
-            yield driver.found(FORGETS, run, what, name, off, promised=False)
+            off = gap(unchanged, future(save, change), driver.coordinates)
+            yield finding_of(driver, FORGETS, run, what, name, off, promised=False)
 
 
 @contextmanager
@@ -91,9 +94,9 @@ def _nothing(_machine: Machine) -> Iterator[Restore]:
     yield lambda _other: None
 
 
-def contacts_off(driver: Driver, run: Run) -> Iterator[Finding]:
+def contacts_off(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
     """How far off the best that can be written is where nothing touches any more."""
-    hiding = driver.hides(run.point)
+    hiding = driver.hidden_state(run.point)
     if hiding is None:
         return
     with driver.at(run.point) as machine, hiding.best.save(machine) as restore:
@@ -103,5 +106,5 @@ def contacts_off(driver: Driver, run: Run) -> Iterator[Finding]:
             restore(other)
             hiding.let_pass(other)
             future = driver.drive(other, run.point, run.steps)
-    off = gap(alone, future, driver.layout)
-    yield driver.found(NO_CONTACTS, run, hiding.best.name, FRESH, off, promised=False)
+    off = gap(alone, future, driver.coordinates)
+    yield finding_of(driver, NO_CONTACTS, run, hiding.best.name, FRESH, off, promised=False)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol, cast
 
 from ..errors import BadInputError, MissingEngineError, unknown_name
-from ..installed import raise_if_interrupted, require
+from ..installed import DEFAULT, raise_if_interrupted, require
 from ..interface import Model
 from ..models import resolve
 from ._hidden_data import HiddenData, HiddenModel
@@ -91,7 +91,7 @@ def register(name: str, loader: str) -> None:
 
 def load(
     model: str | os.PathLike[str],
-    backend: str = "mujoco",
+    backend: str = DEFAULT,
     *,
     defaults: Literal["model", "engine"] = "model",
     menagerie: str | os.PathLike[str] | None = None,
@@ -126,6 +126,16 @@ def load(
             f"backend {backend!r} cannot be loaded from {entry.loader!r}: {error}", engine=backend
         ) from error
     return loader(path, defaults=defaults)
+
+
+def on_default(model: Model) -> Model:
+    """A model on the engine that compiles MJCF: itself, or what that engine makes of its file.
+
+    Raises:
+        MissingEngineError: That engine is not installed here.
+        ModelError: It cannot read the file.
+    """
+    return model if model.backend == DEFAULT else load(model.path)
 
 
 def _find(name: str) -> Backend:

@@ -102,25 +102,25 @@ class CallRecorder:
         due: list[str] = []
         for watch in self._watches:
             watch.name(namespace)
-            for subject in watch.living():
-                self._note_writes(subject, thoroughly=True)
-                if subject.due():
-                    due.append(subject.title)
+            for watched in watch.living():
+                self._note_writes(watched, thoroughly=True)
+                if watched.due():
+                    due.append(watched.title)
         merged: dict[tuple[str, str, str], tuple[int, dict[str, None]]] = {}
         for (engine, function, on), tally in self._tallies.items():
             key = engine, function, on.title if on else ""
             count, names = merged.get(key, (0, {}))
-            for subject, field in tally.changed:
-                names[field if subject is on else subject.spelled(field)] = None
+            for watched, field in tally.changed:
+                names[field if watched is on else watched.spelled(field)] = None
             merged[key] = count + tally.count, names
         calls = tuple(
             Call(function, on, count, tuple(names), engine)
             for (engine, function, on), (count, names) in merged.items()
         )
         changed = tuple(
-            subject.spelled(field if len(entries) > 1 else next(iter(entries)))
-            for (subject, field), entries in self._written.items()
-            if subject.named
+            watched.spelled(field if len(entries) > 1 else next(iter(entries)))
+            for (watched, field), entries in self._written.items()
+            if watched.named
         )
         return calls, changed, tuple(due)
 
@@ -129,45 +129,45 @@ class CallRecorder:
     ) -> Any:
         self._listening = False
         try:
-            subjects = watch.concerned(function, args, kwargs)
-            if subjects is None:
+            objects = watch.concerned(function, args, kwargs)
+            if objects is None:
                 return bare(*args, **kwargs)
-            for subject in subjects:
-                self._note_writes(subject)
+            for watched in objects:
+                self._note_writes(watched)
             made = None
             try:
                 result = bare(*args, **kwargs)
                 made = watch.made(function, args, result)
                 return result
             finally:
-                on = made or (subjects[0] if subjects else None)
+                on = made or (objects[0] if objects else None)
                 tally = self._tallies.setdefault((watch.engine, function, on), _Tally())
                 tally.count += 1
                 if made:
                     made.seen = made.look()
                     tally.changed[made, NEW] = None
-                for subject in subjects:
-                    for field in _changed(subject):
-                        tally.changed[subject, field] = None
+                for watched in objects:
+                    for field in _changed(watched):
+                        tally.changed[watched, field] = None
         finally:
             self._listening = True
 
-    def _note_writes(self, subject: WatchedObject, thoroughly: bool = False) -> None:
+    def _note_writes(self, watched: WatchedObject, thoroughly: bool = False) -> None:
         """Whatever differs from the last look was changed by no call."""
-        before, now = subject.seen, subject.look(thoroughly)
+        before, now = watched.seen, watched.look(thoroughly)
         if now is None:
             return
         if before is not None:
-            for field in subject.differing(before, now):
-                entries = self._written.setdefault((subject, field), set())
-                entries.add(subject.entry(field, before.get(field, b""), now[field]))
-        subject.seen = {**(before or {}), **now}
+            for field in watched.differing(before, now):
+                entries = self._written.setdefault((watched, field), set())
+                entries.add(watched.entry(field, before.get(field, b""), now[field]))
+        watched.seen = {**(before or {}), **now}
 
 
-def _changed(subject: WatchedObject) -> list[str]:
+def _changed(watched: WatchedObject) -> list[str]:
     """What differs from the look before a call."""
-    before, now = subject.seen, subject.look()
+    before, now = watched.seen, watched.look()
     if now is None or before is None:
         return [CLOSED] if now is None else []
-    subject.seen = {**before, **now}
-    return subject.differing(before, now)
+    watched.seen = {**before, **now}
+    return watched.differing(before, now)

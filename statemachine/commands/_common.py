@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ..errors import MissingEngineError, ModelError, StateMachineError, UnsupportedError
+from ..installed import DEFAULT
 
 PROGRAM = "statemachine"
 # Exit codes: the result says no; bad input; an engine is missing; nowhere to write.
@@ -37,12 +38,12 @@ def add_json(parser: argparse.ArgumentParser, what: str = "result", default: Any
 
 
 def add_backend(
-    parser: argparse.ArgumentParser, everyone: bool = True, default: str = "mujoco"
+    parser: argparse.ArgumentParser, everyone: bool = True, default: str = DEFAULT
 ) -> None:
     """The option --backend."""
     text = "an engine, or all" if everyone else "an engine"
     parser.add_argument(
-        "--backend", default=default, metavar="NAME", help=f"{text} (default mujoco)"
+        "--backend", default=default, metavar="NAME", help=f"{text} (default {DEFAULT})"
     )
 
 

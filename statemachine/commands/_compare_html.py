@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError, MissingEngineError, StateMachineError
+from ..installed import PAIR
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -147,7 +148,7 @@ def _look(request: Any, trace: Any) -> Any:
 def _typed(options: argparse.Namespace, request: Any) -> str:
     """The command as typed, without folders of this machine."""
     words = ["statemachine compare", *(Path(word).name for word in request.what)]
-    if tuple(request.backends) != ("mujoco", "pybullet"):
+    if tuple(request.backends) != PAIR:
         words += ["--backends", *request.backends]
     for flag, value, usual in (
         ("--defaults", request.defaults, "model"),

@@ -11,7 +11,6 @@ from typing import Any
 from ..errors import BadInputError, ModelFileError, UnknownNameError
 from ._common import complain
 
-_RENDERERS = ("auto", "mujoco", "pybullet")
 _OF_FILM = {"fps": 30.0, "slow": 1.0, "size": (640, 480), "renderer": "auto"}
 
 
@@ -41,8 +40,8 @@ def add_film(group: Any) -> None:
     group.add_argument(
         "--renderer",
         default=None,
-        choices=_RENDERERS,
-        help="of the film; auto: mujoco, and where it has no OpenGL pybullet's software",
+        metavar="NAME",
+        help="of the film: an engine that draws, or auto: the first that can here",
     )
 
 
@@ -86,7 +85,7 @@ def checked(options: argparse.Namespace) -> Pictures:
         _check_place(plot)
     renderer = None
     if film is not None:
-        from ..rendering import renderer_here
+        from ..rendering import renderer_here, renderers
         from ..rendering.pictures import check_size, check_speed
         from ..report import film as films
         from ..report.progress import progress
@@ -97,7 +96,7 @@ def checked(options: argparse.Namespace) -> Pictures:
         _check_place(film)
         with progress("looking for OpenGL"):
             renderer = renderer_here(None if options.renderer == "auto" else options.renderer)
-        if options.renderer == "auto" and renderer.name != "mujoco":
+        if options.renderer == "auto" and renderer.name != renderers()[0]:
             complain(f"no OpenGL here: the film is drawn by {renderer}", 0)
     return Pictures(plot, film, options.fps, options.slow, options.size, renderer)
 

@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from ..errors import BadInputError
+from ..installed import PAIR
 from . import _compare_html, _compare_models
 from . import _compare_pictures as pictures
 from ._common import PROGRAM, add_json, add_menagerie, complain, show
@@ -103,7 +104,7 @@ def request_of(options: argparse.Namespace) -> Any:
     """What was asked for, as a Request."""
     from ..compare import Request
 
-    one, two = options.backends or ("mujoco", "pybullet")
+    one, two = options.backends or PAIR
     return Request(
         what=tuple(options.what),
         backends=(one, two),

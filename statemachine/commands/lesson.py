@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..errors import BadInputError
+from ..installed import DEFAULT
 from ..lessons import LESSONS, STATIONS
 from ..lessons.records import Lesson
 from ._common import (
@@ -53,7 +54,7 @@ def by_number(word: str) -> str:
 
 def _add_shared(parser: argparse.ArgumentParser, default: Any = None) -> None:
     """Options that come before a station's name or after it; the later one counts."""
-    add_backend(parser, default=default or "mujoco")
+    add_backend(parser, default=default or DEFAULT)
     add_menagerie(parser, default)
     add_json(parser, default=default or False)
     parser.add_argument(

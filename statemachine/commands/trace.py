@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError
+from ..installed import DEFAULT
 from . import _compare_pictures as pictures
 from ._common import (
     PROGRAM,
@@ -298,7 +299,7 @@ def _typed(options: argparse.Namespace) -> str:
         file, colon, name = options.controller.partition(":")
         words += ["--controller", Path(file).name + colon + name]
     for flag, usual in (
-        ("backend", "mujoco"),
+        ("backend", DEFAULT),
         ("defaults", "model"),
         ("keyframe", None),
         ("model", None),

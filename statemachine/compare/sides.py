@@ -11,6 +11,7 @@ from ..backends import backend_names, load
 from ..errors import BadInputError, MissingEngineError, StateMachineError, unknown_name
 from ..experiments._common import Progress, part_of, silent
 from ..experiments.scenarios import SCENARIOS, scenario
+from ..installed import DEFAULT, PAIR
 from ..traces import Trace, model_file, play, read, record_scenario, shipped
 from ..traces.files import SUFFIXES
 
@@ -30,7 +31,7 @@ class Request:
     """
 
     what: Sequence[str]
-    backends: tuple[str, str] = ("mujoco", "pybullet")
+    backends: tuple[str, str] = PAIR
     defaults: Literal["model", "engine"] = "model"
     model: str | None = None
     menagerie: str | None = None
@@ -105,7 +106,7 @@ def sides_of(
         for k, name in enumerate(request.backends)
     ]
     if all(trace.header.recorded for trace in traces):
-        raise MissingEngineError("no engine of the two is installed here", engine="mujoco")
+        raise MissingEngineError("no engine of the two is installed here", engine=DEFAULT)
     return (traces[0], traces[1]), tuple(said)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import StateMachineError
 from ..experiments._common import model_files
+from ..installed import WITNESS
 from ..kinematics import Kinematics
 from ..traces import Header, Trace, model_file
 from .series import default_tip
@@ -62,7 +63,7 @@ def witness(one: Trace, two: Trace, path: Path | None = None) -> Witness | None:
             return None
     except StateMachineError:
         return None
-    return Witness(f"pinocchio {kinematics.version}", site, *gaps, rows=len(one) + len(two))
+    return Witness(f"{WITNESS} {kinematics.version}", site, *gaps, rows=len(one) + len(two))
 
 
 def _readable(file: Path, header: Header) -> Kinematics | None:

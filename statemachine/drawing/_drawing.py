@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import rotations
-from ..backends import load
-from ..installed import require
+from ..backends import on_default
 from ..interface import Model
 from . import _shapes
-from ._shapes import Shape
+from ._shapes import Surface
 
+# MuJoCo's mjtGeom, in its order.
+_KINDS = ["plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf"]
 _SEEN_GROUPS = 3  # MuJoCo's viewer shows groups 0 to 2; 3 to 5 are for what only touches
 _UNSET = np.array([0.5, 0.5, 0.5, 1], dtype=np.float32)  # the rgba of a geom that names none
 _WIDE = 4  # half an endless plane is so many times the model's extent
@@ -102,8 +103,7 @@ def drawing_of(model: Model) -> Drawing:
         MissingEngineError: MuJoCo is not installed here.
         ModelError: MuJoCo cannot read the file.
     """
-    types = require("mujoco").mjtGeom
-    raw = model.raw if model.backend == "mujoco" else load(model.path).raw
+    raw = on_default(model).raw
     seen = raw.geom_group < _SEEN_GROUPS
     if not raw.geom_bodyid[seen].any():
         seen[:] = True
@@ -113,7 +113,7 @@ def drawing_of(model: Model) -> Drawing:
         rgba = _colour(raw, geom)
         if rgba[3] == 0:
             continue
-        kind = types(int(raw.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
+        kind = _KINDS[int(raw.geom_type[geom])]
         shape = _shape(raw, geom, kind)
         if shape is None:
             left_out.append(f"geom {geom}, a {kind}")
@@ -144,7 +144,7 @@ def drawing_of(model: Model) -> Drawing:
     )
 
 
-def _shape(raw: Any, geom: int, kind: str) -> Shape | None:
+def _shape(raw: Any, geom: int, kind: str) -> Surface | None:
     """A geom in its own frame; None if there are no triangles to be had of it."""
     size = raw.geom_size[geom].tolist()
     data = int(raw.geom_dataid[geom])
@@ -169,7 +169,7 @@ def _shape(raw: Any, geom: int, kind: str) -> Shape | None:
         return _shapes.terrain(top * heights, half_x, half_y)
     if kind in ("mesh", "sdf") and data >= 0:
         vert, face = int(raw.mesh_vertadr[data]), int(raw.mesh_faceadr[data])
-        return Shape(
+        return Surface(
             raw.mesh_vert[vert : vert + int(raw.mesh_vertnum[data])],
             raw.mesh_face[face : face + int(raw.mesh_facenum[data])],
         )

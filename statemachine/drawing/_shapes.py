@@ -18,7 +18,7 @@ _BOX = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class Surface:
     """A surface of triangles; read-only.
 
     Attributes:
@@ -36,38 +36,38 @@ class Shape:
             vars(self)[name] = array
 
 
-def box(size: Sequence[float]) -> Shape:
+def box(size: Sequence[float]) -> Surface:
     """A box; `size` are half of its edges."""
     faces = [triangle for a, b, c, d in _BOX for triangle in ((a, b, c), (a, c, d))]
     return _shape(_CORNERS * np.asarray(size)[:3], faces)
 
 
-def rectangle(half_x: float, half_y: float) -> Shape:
+def rectangle(half_x: float, half_y: float) -> Surface:
     """A rectangle in the plane z = 0, seen from above."""
     corners = [(-half_x, -half_y, 0), (half_x, -half_y, 0), (half_x, half_y, 0)]
     return _shape([*corners, (-half_x, half_y, 0)], [(0, 1, 2), (0, 2, 3)])
 
 
-def ellipsoid(size: Sequence[float], around: int = AROUND) -> Shape:
+def ellipsoid(size: Sequence[float], around: int = AROUND) -> Surface:
     """An ellipsoid; `size` are its semi-axes. A sphere has three equal ones."""
     turn = np.linspace(0, np.pi, around // 2 + 1)
     unit = lathe(np.sin(turn), -np.cos(turn), around)
     return _shape(unit.vertices * np.asarray(size)[:3], unit.faces)
 
 
-def cylinder(radius: float, half: float, around: int = AROUND) -> Shape:
+def cylinder(radius: float, half: float, around: int = AROUND) -> Surface:
     """A cylinder along z of length 2·`half`."""
     return lathe([0, radius, radius, 0], [-half, -half, half, half], around)
 
 
-def capsule(radius: float, half: float, around: int = AROUND) -> Shape:
+def capsule(radius: float, half: float, around: int = AROUND) -> Surface:
     """A cylinder along z of length 2·`half`, with half a ball at each end."""
     turn = np.linspace(0, np.pi / 2, max(around // 4, 2) + 1)
     out, up = radius * np.sin(turn), radius * np.cos(turn) + half
     return lathe([*out, *out[::-1]], [*-up, *up[::-1]], around)
 
 
-def lathe(radii: ArrayLike, heights: ArrayLike, around: int = AROUND) -> Shape:
+def lathe(radii: ArrayLike, heights: ArrayLike, around: int = AROUND) -> Surface:
     """A profile turned about z, from its lower end on the axis to its upper one.
 
     Args:
@@ -95,7 +95,7 @@ def lathe(radii: ArrayLike, heights: ArrayLike, around: int = AROUND) -> Shape:
     return _shape(np.concatenate([poles[0], rings.reshape(-1, 3), poles[1]]), np.concatenate(faces))
 
 
-def terrain(heights: ArrayLike, half_x: float, half_y: float) -> Shape:
+def terrain(heights: ArrayLike, half_x: float, half_y: float) -> Surface:
     """The upper side of a height field.
 
     Args:
@@ -113,7 +113,7 @@ def terrain(heights: ArrayLike, half_x: float, half_y: float) -> Shape:
     return _shape(np.stack([x, y, z], axis=-1).reshape(-1, 3), faces)
 
 
-def welded(vertices: ArrayLike, faces: ArrayLike) -> Shape:
+def welded(vertices: ArrayLike, faces: ArrayLike) -> Surface:
     """The same surface with every point there once, and without faces of no area.
 
     Args:
@@ -126,8 +126,8 @@ def welded(vertices: ArrayLike, faces: ArrayLike) -> Shape:
     a, b, c = triangles.T
     triangles = triangles[(a != b) & (b != c) & (c != a)]
     used, renumbered = np.unique(triangles, return_inverse=True)
-    return Shape(unique[used], renumbered.reshape(-1, 3).astype(np.int32))
+    return Surface(unique[used], renumbered.reshape(-1, 3).astype(np.int32))
 
 
-def _shape(vertices: ArrayLike, faces: ArrayLike) -> Shape:
-    return Shape(np.asarray(vertices, np.float32), np.asarray(faces, np.int32))
+def _shape(vertices: ArrayLike, faces: ArrayLike) -> Surface:
+    return Surface(np.asarray(vertices, np.float32), np.asarray(faces, np.int32))

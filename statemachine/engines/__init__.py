@@ -25,6 +25,12 @@ PARTS: dict[str, str] = {
     "phrasebook": "which of its calls does what, as lines to type",
     "calls": "which of its functions can be watched, and what they change",
     "dials": "Models between the engine as it comes and the contract",
+    "audit": "driver(model, seed): the engine by its own functions, to find what its state is",
+    "reading": "read(path, name): the description of what the engine makes of a file",
+    "energy": "energies(model, qpos, qvel): kinetic and potential energy of states",
+    "mutants": "adapter: the module of the backend that a seeded fault is put into",
+    "watched": "what a student can do with the engine past the interface, and how it is seen",
+    "rendering": "here(), label(opengl), drawer(files, size, camera): pictures without a screen",
 }
 
 
@@ -54,11 +60,15 @@ def register(name: str, package: str) -> None:
 
 
 def rooms_with(name: str) -> list[str]:
-    """Engines whose rooms have a part of `PARTS`; the parts are not imported."""
-    return [engine for engine in room_names() if _has(_ROOMS[engine], name)]
+    """Names of the engines whose rooms have a part.
+
+    Args:
+        name: One of `PARTS`.
+    """
+    return [engine for engine in room_names() if _module(engine, name)]
 
 
-def part(engine: str | None, name: str) -> Any | None:
+def part(engine: str | None, name: str) -> Any:
     """A part of an engine's room, imported now; None if the engine has none.
 
     Args:
@@ -69,9 +79,11 @@ def part(engine: str | None, name: str) -> Any | None:
         raise unknown_name("part of an engine's room", name, PARTS)
     if engine is None or engine not in room_names():
         return None
-    room = _ROOMS[engine]
-    return importlib.import_module(f"{room}.{name}") if _has(room, name) else None
+    module = _module(engine, name)
+    return importlib.import_module(module) if module else None
 
 
-def _has(room: str, name: str) -> bool:
-    return importlib.util.find_spec(f"{room}.{name}") is not None
+def _module(engine: str, name: str) -> str | None:
+    """The module of a part, which is not imported; None if there is none."""
+    module = f"{_ROOMS[engine]}.{name}"
+    return module if importlib.util.find_spec(module) else None

@@ -107,19 +107,19 @@ class CallWatch(ABC):
 
     @abstractmethod
     def concerned(self, function: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
-        """The subjects that a call is about, the first of them foremost; None: not ours."""
+        """The objects that a call is about, the first of them foremost; None: not ours."""
 
     @abstractmethod
     def made(self, function: str, args: Sequence[Any], result: Any) -> WatchedObject | None:
-        """The subject that a call has made."""
+        """The object that a call has made."""
 
     @abstractmethod
     def name(self, namespace: Mapping[str, Any]) -> None:
-        """Label the subjects that variables lead to."""
+        """Label the objects that variables lead to."""
 
     @abstractmethod
     def living(self) -> Sequence[WatchedObject]:
-        """The subjects that are still there."""
+        """The objects that are still there."""
 
 
 def entries(field: str, before: bytes, after: bytes, size: int) -> str:
@@ -138,13 +138,13 @@ def entries(field: str, before: bytes, after: bytes, size: int) -> str:
 
 def named(namespace: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Names and values, Models first; what is in a list, tuple or dict too."""
-    found = []
+    variables = []
     for name, value in namespace.items():
         if name.startswith("__"):
             continue
-        found.append((name, value))
+        variables.append((name, value))
         if isinstance(value, (list, tuple)):
-            found += [(f"{name}[{i}]", each) for i, each in enumerate(value)]
+            variables += [(f"{name}[{i}]", item) for i, item in enumerate(value)]
         elif isinstance(value, dict):
-            found += [(f"{name}[{key!r}]", each) for key, each in value.items()]
-    yield from sorted(found, key=lambda pair: not isinstance(pair[1], Model))
+            variables += [(f"{name}[{key!r}]", item) for key, item in value.items()]
+    yield from sorted(variables, key=lambda pair: not isinstance(pair[1], Model))

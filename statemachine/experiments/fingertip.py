@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import BadInputError, UnknownNameError
+from ..installed import WITNESS
 from ..interface import Array, JointType, Model, forward, make_data
 from ..interface.checks import as_count
 from ..kinematics import Kind, Kinematics, Pose
@@ -152,7 +153,7 @@ def run(
         rotation_median=None if rotated is None else float(np.median(rotated)),
         default_pose=(float(first[0]), float(first[1]), float(first[2])),
         tolerance=TOLERANCE,
-        provenance=provenance(model, seed, pinocchio=kinematics.version),
+        provenance=provenance(model, seed, **{WITNESS: kinematics.version}),
     )
 
 

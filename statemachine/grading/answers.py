@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
@@ -10,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from ..engines import part
 from ..interface import DERIVED, INPUTS, Model
-from .watch import Inputs, Run, Watch
+from .watch import EngineRun, Inputs, StudentWatch
 
 _MOST = 10_000  # values that a list or a generator may have
 _DEEPEST = 6  # lists within lists
@@ -45,13 +45,13 @@ class Answer:
     result: Any
     memory: tuple[int, ...] = ()
     live: tuple[str, ...] = ()
-    runs: tuple[Run, ...] = ()
+    runs: tuple[EngineRun, ...] = ()
     forwards: tuple[Inputs, ...] = ()
     ends: tuple[Inputs, ...] = ()
     changed: dict[str, tuple[list[float], list[float]]] = field(default_factory=dict)
 
 
-def answer_of(result: Any, watch: Watch) -> Answer:
+def answer_of(result: Any, watch: StudentWatch) -> Answer:
     """The answer that a result and what was seen amount to.
 
     What is worked out only when somebody asks (a generator) is asked for here.
@@ -149,13 +149,5 @@ def _live(value: Any, datas: Sequence[Any]) -> str:
 
 def settings(model: Model) -> dict[str, list[float]]:
     """What of the engine's own model a student can reach: its options, and its arrays' sums."""
-    if model.backend != "mujoco":
-        return {}
-    options = model.raw.opt
-    names = ("disableflags", "enableflags", "timestep", "gravity", "integrator")
-    found = {f"opt.{name}": np.atleast_1d(getattr(options, name)).tolist() for name in names}
-    for name in dir(model.raw):
-        value = None if name.startswith("_") else getattr(model.raw, name)
-        if isinstance(value, np.ndarray):
-            found[name] = [float(zlib.crc32(value.tobytes()))]
-    return found
+    room = part(model.backend, "watched")
+    return room.settings(model.raw) if room else {}

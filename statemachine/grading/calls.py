@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import UnsupportedError
 from .answers import Answer, answer_of, settings
 from .watch import watching
-from .worlds import World
+from .worlds import ExerciseWorld
 
 Function = Callable[..., Any]
 _MODULE = "the_students_file"
@@ -85,7 +85,7 @@ def find(names: dict[str, Any], name: str, arguments: Sequence[Any]) -> Function
     return function
 
 
-def call(function: Function, world: World) -> Answer:
+def call(function: Function, world: ExerciseWorld) -> Answer:
     """What came of a function on a world.
 
     Raises:

@@ -13,11 +13,11 @@ from .answers import Answer
 from .calls import FaultError, Function, Remark, call, find, load_file
 from .judges import Judge
 from .watch import engine_watched
-from .worlds import World
+from .worlds import ExerciseWorld
 
 
 @dataclass(frozen=True)
-class Verdict:
+class FunctionVerdict:
     """What was found out about a function; it passes if every remark holds.
 
     `written` is False where the function is still to be written.
@@ -28,7 +28,7 @@ class Verdict:
 
 
 def answers_of_file(
-    path: Path, name: str, worlds: Sequence[World]
+    path: Path, name: str, worlds: Sequence[ExerciseWorld]
 ) -> Iterator[Answer | FaultError]:
     """What comes of a function of a file, which is loaded here, on world after world.
 
@@ -46,7 +46,9 @@ def answers_of_file(
         yield from answers_of(function, worlds)
 
 
-def answers_of(function: Function, worlds: Sequence[World]) -> Iterator[Answer | FaultError]:
+def answers_of(
+    function: Function, worlds: Sequence[ExerciseWorld]
+) -> Iterator[Answer | FaultError]:
     """What comes of a function on world after world, until it fails on one."""
     for world in worlds:
         try:
@@ -58,10 +60,10 @@ def answers_of(function: Function, worlds: Sequence[World]) -> Iterator[Answer |
 
 def judged(
     judge: Judge,
-    worlds: Sequence[World],
+    worlds: Sequence[ExerciseWorld],
     rights: Sequence[Any],
     answers: Iterable[Answer | FaultError],
-) -> Verdict | None:
+) -> FunctionVerdict | None:
     """The verdict on what came of a function, world after world, until one shows a fault.
 
     None if there are fewer answers than worlds, and no fault.
@@ -76,13 +78,13 @@ def judged(
         except FaultError as fault:
             remarks = [Remark(str(fault))]
             if not fault.written:
-                return Verdict(tuple(remarks), fault.written)
+                return FunctionVerdict(tuple(remarks), fault.written)
         faults = [remark for remark in remarks if not remark.holds]
         if faults:
             where = f"{world.where}: " if world.where else ""
-            return Verdict(tuple(Remark(where + fault.text) for fault in faults))
+            return FunctionVerdict(tuple(Remark(where + fault.text) for fault in faults))
         passed.append(world.where or "".join(remark.text for remark in remarks))
     if len(passed) < len(worlds):
         return None
     also = f"; right also {', and '.join(passed[1:])}" if passed[1:] else ""
-    return Verdict((Remark(passed[0] + also, True),))
+    return FunctionVerdict((Remark(passed[0] + also, True),))

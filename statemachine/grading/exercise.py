@@ -24,13 +24,13 @@ from typing import Any
 from .. import __version__, errors
 from ..backends import backend_engine
 from ..errors import BadInputError, EngineError, StateMachineError
-from ..installed import engine_version
+from ..installed import DEFAULT, engine_version
 from . import sandbox
 from .examine import judged
 from .judges import JUDGES, judge_of
-from .recording import START, Limits, Recording, record
+from .recording import START, FunctionRecording, Limits, record
 from .unwinding import unwinding
-from .worlds import Scenes, World
+from .worlds import ExerciseWorld, Scenes
 
 TIME_LIMIT = 5.0  # [s] of computing for a function, from when its worlds are ready
 WALL_LIMIT = 120.0  # [s] on the clock for it, which a busy machine may need too
@@ -90,7 +90,7 @@ class Grade:
 
 def run(
     file: str | os.PathLike[str],
-    backend: str = "mujoco",
+    backend: str = DEFAULT,
     time_limit: float = TIME_LIMIT,
     progress: Callable[[float], None] = lambda _: None,
     wall_limit: float = WALL_LIMIT,
@@ -193,7 +193,7 @@ def _all(
 
 def _recorded(
     path: Path, name: str, backend: str, limits: Limits, folder: Path, stop: threading.Event
-) -> Recording:
+) -> FunctionRecording:
     """A recording; if the process did not get ready, a second one."""
     recording = record(path, name, backend, limits, folder / "1", stop)
     if recording.began or recording.refusal or recording.broken or stop.is_set():
@@ -205,9 +205,9 @@ def _judgement(
     path: Path,
     name: str,
     limits: Limits,
-    worlds: list[World],
+    worlds: list[ExerciseWorld],
     rights: list[Any],
-    recording: Recording,
+    recording: FunctionRecording,
 ) -> Judgement:
     if recording.refusal:
         kind, text = recording.refusal
@@ -234,7 +234,7 @@ def _judgement(
     return _unfinished(path, name, limits, recording)
 
 
-def _unfinished(path: Path, name: str, limits: Limits, recording: Recording) -> Judgement:
+def _unfinished(path: Path, name: str, limits: Limits, recording: FunctionRecording) -> Judgement:
     """The judgement on a function that did not come to its end."""
     outcome, trace = recording.outcome, recording.trace
     # The innermost line of the student's file comes first in what is noted last.
@@ -253,7 +253,7 @@ def _unfinished(path: Path, name: str, limits: Limits, recording: Recording) -> 
     return Judgement(name, True, False, (text,), judged=False)
 
 
-def _not_ready(outcome: sandbox.Outcome) -> str:
+def _not_ready(outcome: sandbox.ProcessOutcome) -> str:
     """Why a process did not get as far as the student's code."""
     if outcome.timed_out:
         how = f"the engine was not ready after {START:.0f} s, twice"
@@ -266,7 +266,7 @@ def _not_ready(outcome: sandbox.Outcome) -> str:
     )
 
 
-def _how_it_ended(limits: Limits, outcome: sandbox.Outcome) -> str:
+def _how_it_ended(limits: Limits, outcome: sandbox.ProcessOutcome) -> str:
     """What became of a process that gave no verdict."""
     if outcome.out_of_cpu:
         return f"still running after {limits.cpu:g} s of computing: a loop that does not end?"

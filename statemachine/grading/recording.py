@@ -43,7 +43,7 @@ class Limits:
 
 
 @dataclass
-class Recording:
+class FunctionRecording:
     """What a process left behind, which the student's code may have had a hand in.
 
     Attributes:
@@ -56,7 +56,7 @@ class Recording:
         broken: Why the record is none, if it is none.
     """
 
-    outcome: sandbox.Outcome
+    outcome: sandbox.ProcessOutcome
     trace: str
     began: bool = False
     cpu: float = 0.0
@@ -68,7 +68,7 @@ class Recording:
 
 def record(
     path: Path, name: str, backend: str, limits: Limits, folder: Path, stop: threading.Event
-) -> Recording:
+) -> FunctionRecording:
     """Run a function of a file on its worlds.
 
     Args:
@@ -107,7 +107,7 @@ def record(
         memory_most=_MEMORY_MOST,
         stop=stop,
     )
-    recording = Recording(outcome, content(trace, _RECORD_MOST).decode("utf-8", "replace"))
+    recording = FunctionRecording(outcome, content(trace, _RECORD_MOST).decode("utf-8", "replace"))
     try:
         for line in content(answers, _RECORD_MOST).splitlines():
             _add(recording, line, nonce)
@@ -118,7 +118,7 @@ def record(
     return recording
 
 
-def _add(recording: Recording, line: bytes, nonce: str) -> None:
+def _add(recording: FunctionRecording, line: bytes, nonce: str) -> None:
     """Take a line; one without the number is what somebody else wrote, and none.
 
     Raises:

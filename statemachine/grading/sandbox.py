@@ -40,7 +40,7 @@ _LAUNCHER = str(Path(__file__).with_name("_launcher.py"))
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ProcessOutcome:
     """How a command ended.
 
     Attributes:
@@ -87,7 +87,7 @@ def run(
     output_most: int = 1_000_000,
     memory_most: int = MEMORY_MOST,
     stop: threading.Event | None = None,
-) -> Outcome:
+) -> ProcessOutcome:
     """Run a command to its end, or to that of its time; nothing of it is left afterwards.
 
     Args:
@@ -135,7 +135,7 @@ def run(
     code = process.returncode if waiting.ended else None
     number = -code if code is not None and code < 0 else None
     out_of_cpu = waiting.out_of_cpu or ended_by_cpu(number, used, cpu)
-    return Outcome(
+    return ProcessOutcome(
         returncode=code if code is not None and code >= 0 else None,
         signal=None if out_of_cpu else number,
         started=ready or (started is not None and started()),

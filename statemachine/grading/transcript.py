@@ -10,7 +10,7 @@ import numpy as np
 
 from ..interface import Array
 from .answers import Answer, Thing
-from .watch import Inputs, Run
+from .watch import EngineRun, Inputs
 
 _TEXT = 10_000  # characters of one text
 _RUNS = 10_000
@@ -125,12 +125,12 @@ def _inputs(found: Any) -> Inputs:
     return Inputs(_whole(found["data"]), *rows)
 
 
-def _run(found: Any) -> Run:
+def _run(found: Any) -> EngineRun:
     changed = found["ctrl_changed"]
     if not isinstance(found["own"], bool):
         raise ValueError("own is no bool")
     names = ("qpos", "qvel", "ctrl", "end", "end_qvel")
-    return Run(
+    return EngineRun(
         data=_whole(found["data"]),
         own=found["own"],
         **{name: _row(found[name]) for name in names},

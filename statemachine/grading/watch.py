@@ -14,12 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from ..engines import part
 from ..installed import require
 from ..interface import Array, Data, Model
 
-# Raw functions of MuJoCo that advance time, and those that only recompute.
-_STEPS = ("mj_step", "mj_step2")
-_FORWARDS = ("mj_forward", "mj_kinematics", "mj_fwdPosition")
 _MOST = 1000  # runs, forwards and Data that are noted
 
 
@@ -38,7 +36,7 @@ class Inputs:
 
 
 @dataclass
-class Run:
+class EngineRun:
     """One run, from its first step on.
 
     Attributes:
@@ -86,13 +84,13 @@ class Nudge:
     after: int
 
 
-class Watch:
+class StudentWatch:
     """What was done while a function ran.
 
     Attributes:
         runs: In the order in which they began.
         forwards: What the inputs were when derived values were recomputed, in order.
-        datas: Every Data that was used, or MuJoCo's own, in order.
+        datas: Every Data that was used, or the engine's own, in order.
     """
 
     def __init__(self, model: Model, nudge: Nudge | None) -> None:
@@ -100,12 +98,13 @@ class Watch:
 
         So that an engine that repeats itself to the bit does not.
         """
-        self.runs: list[Run] = []
+        self.runs: list[EngineRun] = []
         self.forwards: list[Inputs] = []
         self.datas: list[Any] = []
-        self._origin = _origin(model if model.backend != "mujoco" else model.raw)
+        self._room = part(model.backend, "watched")
+        self._origin = self._origin_of(model.raw if self._room else model)
         self._nudge = nudge
-        self._current: dict[int, Run] = {}
+        self._current: dict[int, EngineRun] = {}
 
     def meet(self, data: Any) -> int:
         """The number of a Data; the engine's own object behind a known one is no other.
@@ -137,8 +136,10 @@ class Watch:
         run = self._current.get(number)
         if run is None or not run.continues(data):
             now, time = self.inputs(data), float(data.time)
-            own = _origin(model) == self._origin
-            run = Run(number, own, now.qpos, now.qvel, now.ctrl, time, now.qpos, now.qvel, time)
+            own = self._origin_of(model) == self._origin
+            run = EngineRun(
+                number, own, now.qpos, now.qvel, now.ctrl, time, now.qpos, now.qvel, time
+            )
             if len(self.runs) < _MOST:
                 self.runs.append(run)
             self._current[number] = run
@@ -153,15 +154,19 @@ class Watch:
         run.end_time = float(data.time)
         return result
 
+    def _origin_of(self, model: Any) -> object:
+        """What a Model and its variants have in common, and the engine's own with its copies."""
+        return model.path if isinstance(model, Model) else self._room.origin(model)
 
-_watch: Watch | None = None
+
+_watch: StudentWatch | None = None
 
 
 @contextmanager
-def watching(model: Model, nudge: Nudge | None = None) -> Iterator[Watch]:
+def watching(model: Model, nudge: Nudge | None = None) -> Iterator[StudentWatch]:
     """What happens meanwhile, where `engine_watched` holds."""
     global _watch  # noqa: PLW0603  (the engine's functions are the process's too)
-    _watch = Watch(model, nudge)
+    _watch = StudentWatch(model, nudge)
     try:
         yield _watch
     finally:
@@ -170,22 +175,23 @@ def watching(model: Model, nudge: Nudge | None = None) -> Iterator[Watch]:
 
 @contextmanager
 def engine_watched(backend: str) -> Iterator[None]:
-    """Every Data made from now on is seen, and MuJoCo's own functions on the backend mujoco.
+    """Every Data made from now on is seen, and the engine's own functions that its room names.
 
     Before a student's file can import them.
     """
     with ExitStack() as stack:
-        raw = backend == "mujoco"
-        if raw:
-            mujoco = require("mujoco")
-            for name in _STEPS:
-                stack.enter_context(_replaced(mujoco, name, _seen_step))
-            for name in _FORWARDS:
-                stack.enter_context(_replaced(mujoco, name, _seen_forward))
+        room = part(backend, "watched")
+        if room:
+            engine = require(backend)
+            for name in room.STEPS:
+                stack.enter_context(_replaced(engine, name, _seen_step))
+            for name in room.FORWARDS:
+                stack.enter_context(_replaced(engine, name, _seen_forward))
         for kind in Data.__subclasses__():
-            if not (raw and kind.__module__.endswith("mujoco_backend")):
+            if not (room and kind is room.DATA):
                 stack.enter_context(_replaced(kind, "_recompute", _seen_recompute))
-        stack.enter_context(_replaced(Data, "__init__", functools.partial(_seen_data, raw)))
+        telling = backend if room else None
+        stack.enter_context(_replaced(Data, "__init__", functools.partial(_seen_data, telling)))
         yield
 
 
@@ -199,8 +205,8 @@ def _replaced(owner: Any, name: str, seen: Callable[[Any], Any]) -> Iterator[Non
         setattr(owner, name, original)
 
 
-def _seen_data(raw: bool, original: Callable[..., None]) -> Callable[..., None]:
-    """`Data.__init__`; with `raw`, MuJoCo's own functions tell of its steps."""
+def _seen_data(telling: str | None, original: Callable[..., None]) -> Callable[..., None]:
+    """`Data.__init__`; of the steps on a backend that is `telling` its own functions tell."""
 
     @functools.wraps(original)
     def seen(data: Any, model: Any, advance: Callable[..., None], *more: Any) -> None:
@@ -210,8 +216,7 @@ def _seen_data(raw: bool, original: Callable[..., None]) -> Callable[..., None]:
             else:
                 _watch.step(model, data, functools.partial(advance, nstep), nstep)
 
-        told = raw and model.backend == "mujoco"
-        original(data, model, advance if told else advanced, *more)
+        original(data, model, advance if model.backend == telling else advanced, *more)
         if _watch is not None:
             _watch.meet(data)
 
@@ -248,11 +253,6 @@ def _seen_forward(original: Callable[..., Any]) -> Callable[..., Any]:
         return result
 
     return seen
-
-
-def _origin(model: Any) -> Any:
-    """What a Model and its variants have in common, and MuJoCo's own with its copies."""
-    return model.path if isinstance(model, Model) else model.names
 
 
 def _raw(data: Any) -> Any:

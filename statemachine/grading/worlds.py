@@ -7,13 +7,14 @@ taken from the course's own model shows.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 from ..backends import load
+from ..errors import UnsupportedError
 from ..interface import Model
 from ..models import resolve
 from .watch import Nudge
@@ -25,32 +26,42 @@ _CRATE = """
   <geom name="crate" type="box" size="0.05 0.05 0.05" mass="0.3" contype="2" conaffinity="1"/>
 </body>
 """
-_BALL = """
+# Bodies that come last, with their qpos and qvel: a ball joint, and a slide that nothing drives
+# or limits.
+_BALL = (
+    """
 <body name="globe" pos="-0.4 -0.3 0.3">
   <joint name="globe" type="ball"/>
   <geom name="globe" size="0.05" mass="0.2" contype="0" conaffinity="0"/>
 </body>
-"""
-_DRAWER = """
+""",
+    " 1 0 0 0",
+    " 0 0 0",
+)
+_DRAWER = (
+    """
 <body name="drawer" pos="-0.5 0 0.3">
   <joint name="drawer" type="slide" axis="1 0 0"/>
   <geom name="drawer" type="box" size="0.05 0.05 0.02" mass="0.2" contype="0" conaffinity="0"/>
 </body>
-"""
+""",
+    " 0",
+    " 0",
+)
 _CRATE_QPOS, _CRATE_QVEL = "-0.4 0.3 0.05 1 0 0 0", "0 0 0 0 0 0"
 _TIME = "2.5"  # [s] of the first keyframe there
 _TIP = "0.03 0.01 -0.08"  # [m] of the fingertip in the gripper's frame there
 
 
 @dataclass(frozen=True)
-class World:
+class ExerciseWorld:
     """One call of a student's function.
 
     Attributes:
         where: What sets it apart; nothing on the course's own model.
         model: What the function gets.
         arguments: What it gets beside it.
-        nudge: See `watch.Watch`.
+        nudge: See `watch.StudentWatch`.
     """
 
     where: str
@@ -73,7 +84,10 @@ class Scenes:
 
     def crowded(self, name: str) -> Model:
         """The scene with a free body before the arm, another fingertip and another time."""
-        return self._load(name, "crowded", lambda root: _crowd(root, self._backend))
+        try:
+            return self._load(name, "crowded", lambda root: _crowd(root, [_BALL, _DRAWER]))
+        except UnsupportedError:  # a ball joint
+            return self._load(name, "crowded", lambda root: _crowd(root, [_DRAWER]))
 
     def _load(self, name: str, kind: str, edit: Callable[[ElementTree.Element], None]) -> Model:
         file = self._folder / f"{kind}_{name.rpartition('/')[2]}.xml"
@@ -106,10 +120,8 @@ def _bare(root: ElementTree.Element) -> None:
                 parent.remove(child)
 
 
-def _crowd(root: ElementTree.Element, backend: str) -> None:
-    # A ball joint only where the backend takes one; last a slide that nothing drives or limits.
-    last = [(_BALL, " 1 0 0 0", " 0 0 0")] if backend == "mujoco" else []
-    last.append((_DRAWER, " 0", " 0"))
+def _crowd(root: ElementTree.Element, last: Sequence[tuple[str, str, str]]) -> None:
+    """Put a crate first and other bodies last."""
     for body in root.findall("worldbody")[:1]:
         body.insert(0, ElementTree.fromstring(_CRATE))
     for body in root.findall("worldbody")[-1:]:

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..comparison.text import degrees, millimetres, vector
 from ..experiments import fingertip
+from ..installed import WITNESS
 from ..page import Page, Table, Text, Verdict
 from ._words import differences, page_of, where
 
@@ -16,7 +17,7 @@ def page(results: Mapping[str, fingertip.Certificate]) -> Page:
     """Frames first, then the differences."""
     first = next(iter(results.values()))
     seed = first.provenance.seed
-    pinocchio = first.provenance.versions["pinocchio"]
+    pinocchio = first.provenance.versions[WITNESS]
     blocks: list[Any] = [
         Text(
             f"The engine computes where the fingertip ({first.site}) is, by forward; Pinocchio "

@@ -1,10 +1,11 @@
 """The process that draws: a job comes in, pictures go out one after the other.
 
-python -c '… main()' mujoco|pybullet  < job.npz  > pictures
+python -c '… main()'  < job.npz  > pictures
 """
 
 from __future__ import annotations
 
+import importlib
 import io
 import json
 import os
@@ -16,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from .camera import Camera
+from ..drawing.camera import Camera
+from ..drawing.shots import Drawer
 from .compose import compose, halved
 
 
@@ -39,13 +41,9 @@ def draw(job: dict[str, Any], out: Any) -> None:
     """Write the pictures of a job, (height, width, 3) uint8 each, into `out`."""
     facts = json.loads(job["facts"].astype(np.uint8).tobytes())
     camera = Camera(**facts["camera"])
-    if facts["renderer"] == "mujoco":
-        from .mujoco_frames import MujocoFrames as Frames
-    else:
-        from .bullet_frames import BulletFrames as Frames
     width, height = facts["size"]
-    sharper = Frames.SHARPER
-    drawer = Frames(
+    sharper = facts["sharper"]
+    drawer: Drawer = importlib.import_module(facts["renderer"]).drawer(
         [Path(file) for file in facts["files"]], (width * sharper, height * sharper), camera
     )
     try:

@@ -2,29 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-from ..interface import Array
+from ..drawing.shots import GHOST, Pixels, Shot
 
-Pixels = NDArray[np.uint8]
-GHOST = (0.42, 0.18, 0.62)  # violet: apart from orange to every eye, and dark without colour
 _STRENGTH = 0.6  # of the ghost over what is behind it
-
-
-@dataclass(frozen=True, eq=False)
-class Shot:
-    """One picture and how far away everything in it is.
-
-    Attributes:
-        rgb: (height, width, 3).
-        depth: (height, width) along the direction of view [m]; infinite where nothing is.
-    """
-
-    rgb: Pixels
-    depth: Array
 
 
 def compose(solid: Shot, ghost: Shot | None, bias: float, line: int) -> Pixels:

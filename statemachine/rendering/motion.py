@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..backends import load
+from ..backends import load, on_default
 from ..drawing import drawing_of
 from ..errors import TraceError
 from ..interface import Array, Ints, Model, forward, make_data
@@ -67,7 +67,7 @@ def motion_of(trace: Trace, model: Model, times: Array) -> Motion:
                 "bodies that are numbers: it cannot be drawn"
             )
         return Motion(model.path, xpos, xquat)
-    reader = model if model.backend == "mujoco" else load(model.path)
+    reader = on_default(model)
     xpos, xquat = np.empty((len(rows), model.nbody, 3)), np.empty((len(rows), model.nbody, 4))
     with make_data(reader) as data:
         for k, row in enumerate(rows.tolist()):

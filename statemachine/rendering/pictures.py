@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import math
-import os
 import subprocess
 import sys
 import tempfile
@@ -17,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
+from ..drawing.camera import Camera, framed
+from ..drawing.shots import Pixels
 from ..errors import BadInputError, EngineError
 from ..interface import Array, Model
 from ..traces import Trace
-from .camera import Camera, framed
-from .compose import Pixels
 from .motion import Motion, corners, models_of, motion_of
-from .probe import Renderer, environment_with, renderer_here
+from .probe import Renderer, environment_of, renderer_here
 
 LONGEST = 5000  # pictures of one film
 _SMALLEST, _LARGEST = (64, 48), (1920, 1440)
@@ -167,7 +166,8 @@ def _drawn(
 ) -> Generator[Pixels]:
     width, height = size
     facts = {
-        "renderer": renderer.name,
+        "renderer": renderer.room.__name__,
+        "sharper": renderer.room.SHARPER,
         "files": [str(motion.file) for motion in motions],
         "size": size,
         "camera": asdict(camera),
@@ -180,7 +180,7 @@ def _drawn(
             stdin=job,
             stdout=subprocess.PIPE,
             stderr=said,
-            env=environment_with(renderer.opengl, dict(os.environ)),
+            env=environment_of(renderer),
         )
         assert child.stdout is not None
         try:

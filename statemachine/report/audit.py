@@ -6,9 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from ..audit import Audit, Audited
 from ..audit.falls import BOXES, FALL, STEPS
-from ..audit.findings import EACH_OTHER, Finding, worst
+from ..audit.findings import EACH_OTHER, AuditFinding
 from ..audit.restore import FORGETS, NO_CONTACTS, NOT_RESTORED, RESTORE, WITHOUT
 from ..comparison.text import count, milliseconds, rough
+from ..engines.futures import worst
 from ..page import Block, Page, Table, Text, Verdict
 from .audit_words import cell, sentences
 
@@ -35,8 +36,10 @@ def page(results: Mapping[str, Audit]) -> Page:
             "is none."
         )
     ]
-    for result in results.values():
+    for backend, result in results.items():
         blocks.append(_places(result.audited[0]))
+        if result.audited[0].layer != "engine":
+            blocks.append(Text(f"{backend} itself, by its own functions, was not asked."))
         for one in result.audited:
             blocks += [*_of_one(one), *_promises(one)]
         if result.without:
@@ -74,9 +77,9 @@ def _places(one: Audited) -> Table:
     )
 
 
-def _candidates(one: Audited) -> dict[str, list[Finding]]:
+def _candidates(one: Audited) -> dict[str, list[AuditFinding]]:
     """What was tried as a state, by what a table calls it."""
-    found: dict[str, list[Finding]] = {}
+    found: dict[str, list[AuditFinding]] = {}
     for each in one.findings:
         if each.experiment in (RESTORE, WITHOUT):
             without = each.experiment == WITHOUT
@@ -84,7 +87,7 @@ def _candidates(one: Audited) -> dict[str, list[Finding]]:
     return found
 
 
-def _by_point(one: Audited, rows: Mapping[str, Sequence[Finding]]) -> Table:
+def _by_point(one: Audited, rows: Mapping[str, Sequence[AuditFinding]]) -> Table:
     points = [seen.point for seen in one.points]
     against = {name: [each for each in of if each.into != EACH_OTHER] for name, of in rows.items()}
     return Table(
@@ -97,7 +100,7 @@ def _by_point(one: Audited, rows: Mapping[str, Sequence[Finding]]) -> Table:
     )
 
 
-def _by_target(one: Audited, rows: Mapping[str, Sequence[Finding]]) -> Table:
+def _by_target(one: Audited, rows: Mapping[str, Sequence[AuditFinding]]) -> Table:
     kinds = {"run itself": "the run itself", "fresh": "a fresh one", "used": "a used one"}
     shown = []
     for name, of in rows.items():
@@ -157,7 +160,7 @@ def _forgotten(one: Audited) -> list[Block]:
 
 def _promises(one: Audited) -> list[Block]:
     """What should change nothing."""
-    tried: dict[tuple[str, str, bool], list[Finding]] = {}
+    tried: dict[tuple[str, str, bool], list[AuditFinding]] = {}
     for each in one.findings:
         if each.experiment not in _OF_THE_STATE or each.promised:
             tried.setdefault((each.case, each.into, each.promised), []).append(each)
@@ -200,7 +203,7 @@ def _fallen(one: Audited) -> list[Text]:
     ]
 
 
-def _broken(one: Audited, of: Sequence[Finding]) -> str:
+def _broken(one: Audited, of: Sequence[AuditFinding]) -> str:
     off, where = worst([each.gap for each in of]), ", ".join([each.point for each in of])
     return (
         f"{one.name}: {of[0].case}, compared with {of[0].into}: differs at {where}, from step "
@@ -208,6 +211,6 @@ def _broken(one: Audited, of: Sequence[Finding]) -> str:
     )
 
 
-def _worst(findings: Iterable[Finding]) -> str:
+def _worst(findings: Iterable[AuditFinding]) -> str:
     gaps = [each.gap for each in findings]
     return cell(worst(gaps)) if gaps else _NOT_TRIED

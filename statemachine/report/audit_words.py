@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from ..audit import Audited
 from ..audit.conclusions import Conclusion, Missing
-from ..audit.findings import Gap, worst
 from ..audit.look import LOOK
 from ..audit.repeat import AGAIN
 from ..comparison.text import rough
+from ..engines.futures import FutureGap, worst
 
 _SAME = "same"
 
@@ -116,7 +116,7 @@ def _all(points: Sequence[str]) -> str:
     return f"all of {len(points)} save points" if len(points) > 1 else "the one save point"
 
 
-def cell(off: Gap) -> str:
+def cell(off: FutureGap) -> str:
     """The larger of angle and length, or that every byte is the same."""
     if off.exact:
         return _SAME

@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import importlib.metadata
-import importlib.util
-import os
 import platform
 import subprocess
 import sys
 from dataclasses import dataclass
 
-from ..installed import ENGINES, engine_version, wheel_here
+from ..engines import part
+from ..installed import DEFAULT, ENGINES, engine_version, wheel_here
 from ..page import Page, Table, Text, Verdict
-from ..rendering.probe import PATIENCE, offscreen_opengl, opengl_remedy
 
-_ROLES = {
-    "mujoco": "runs every lesson",
-    "pybullet": "the second engine of every lesson",
-    "pinocchio": "the witness of `statemachine fingertip`",
-}
+_PATIENCE = 60  # seconds for an import
 
 
 @dataclass(frozen=True)
-class Finding:
+class HealthCheck:
     """One thing looked at: its state, and the next step if it is not well."""
 
     name: str
@@ -36,7 +30,7 @@ class Finding:
 class Diagnosis:
     """All findings."""
 
-    findings: tuple[Finding, ...]
+    findings: tuple[HealthCheck, ...]
 
     @property
     def healthy(self) -> bool:
@@ -76,49 +70,40 @@ def page(diagnosis: Diagnosis) -> Page:
     )
 
 
-def _python() -> Finding:
-    return Finding("python", True, f"{platform.python_version()}, {sys.executable}")
+def _python() -> HealthCheck:
+    return HealthCheck("python", True, f"{platform.python_version()}, {sys.executable}")
 
 
-def _engine(name: str) -> Finding:
-    optional = name != "mujoco"
+def _engine(name: str) -> HealthCheck:
+    optional = name != DEFAULT
     code = f"from statemachine.installed import require; require({name!r})"
     # In a subprocess: a broken engine may take its process down, or print at will.
     try:
         done = _run(code)
     except subprocess.TimeoutExpired:
-        return Finding(name, False, f"import takes over {PATIENCE} s", "try again", optional)
+        return HealthCheck(name, False, f"import takes over {_PATIENCE} s", "try again", optional)
     if done.returncode == 0:
-        found = f"{engine_version(name)}, {_ROLES[name]}"
-        return Finding(name, True, found, optional=optional)
+        found = f"{engine_version(name)}, {ENGINES[name].role}"
+        return HealthCheck(name, True, found, optional=optional)
     reason = (done.stderr.strip().splitlines() or [f"import ended with code {done.returncode}"])[-1]
     reason = reason.removeprefix("statemachine.errors.MissingEngineError: ")
     told = any(word in reason for word in ("pip install", "no wheel", "apt-get", "unset it"))
     wheel = wheel_here(ENGINES[name])
     step = "" if told or not wheel else f"pip install --force-reinstall {wheel.requirement}"
-    return Finding(name, False, reason, step, optional)
+    return HealthCheck(name, False, reason, step, optional)
 
 
-def _rendering() -> Finding:
-    if importlib.util.find_spec("mujoco") is None:
-        return Finding("rendering", False, "needs mujoco", optional=True)
-    works = offscreen_opengl()
-    if works is None:
-        step = opengl_remedy()
-        return Finding("rendering", False, "no offscreen OpenGL", step, optional=True)
-    if works == os.environ.get("MUJOCO_GL", ""):
-        return Finding("rendering", True, "offscreen", optional=True)
-    found = f"offscreen with MUJOCO_GL={works}" if works else "offscreen by default"
-    step = f"export MUJOCO_GL={works}" if works else "unset MUJOCO_GL"
-    return Finding("rendering", True, found, f"{step}, before rendering", optional=True)
+def _rendering() -> HealthCheck:
+    works, found, step = part(DEFAULT, "rendering").diagnosis()
+    return HealthCheck("rendering", works, found, step, optional=True)
 
 
-def _clash() -> Finding:
+def _clash() -> HealthCheck:
     try:
         version = importlib.metadata.version("python-statemachine")
     except importlib.metadata.PackageNotFoundError:
-        return Finding("import name", True, "statemachine is ours alone")
-    return Finding(
+        return HealthCheck("import name", True, "statemachine is ours alone")
+    return HealthCheck(
         "import name",
         False,
         f"python-statemachine {version} uses the same import name",
@@ -131,6 +116,6 @@ def _run(code: str) -> subprocess.CompletedProcess[str]:
         [sys.executable, "-c", code],
         capture_output=True,
         text=True,
-        timeout=PATIENCE,
+        timeout=_PATIENCE,
         check=False,
     )

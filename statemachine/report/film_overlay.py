@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from ..comparison.text import figure
+from ..drawing.shots import GHOST
 from ..interface import Array
 from ..rendering import Timing
-from ..rendering.compose import GHOST
 from .log_axis import LogAxis
 
 _INK, _PALE, _PAPER, _RULE = (34, 34, 34), (176, 176, 182), (255, 255, 255), (222, 222, 226)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
-from ..compare.models import Agreement, Compared, Difference, Side
+from ..compare.models import AgreedFigures, Compared, DescribedFile, Difference
 from ..compare.models.ledger import SUBJECTS, Value
 from ..comparison.text import after, listed, reading, rounded, sentence, significant
 from ..page import Block, Page, Table, Text, Verdict
@@ -78,7 +78,7 @@ def page(result: Compared, everything: bool = False) -> Page:
 
 
 def _sides(result: Compared) -> Text:
-    def said(side: Side) -> str:
+    def said(side: DescribedFile) -> str:
         how = (
             f"loaded into {side.reader}"
             if side.format == "engine"
@@ -208,7 +208,7 @@ def _tiny(value: float, unit: str) -> str:
     return rounded(value, unit, 4 if value * reading(unit)[0] > 1e-2 else 1)
 
 
-def _agreement(group: Sequence[Agreement]) -> list[str]:
+def _agreement(group: Sequence[AgreedFigures]) -> list[str]:
     """A row for a subject: the worst in each of its units."""
     subject, worst = group[0].subject, []
     for each in group:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..comparison.text import count
-from ..grading.mutants.run import Examination, Failure, Trial
+from ..grading.mutants.run import Examination, Failure, MutantTrial
 from ..page import Block, Page, Table, Text, Verdict
 
 _WIDTH, _SHOWN = 30, 200  # characters of a test's name, and of what it said
@@ -43,7 +43,7 @@ def _trials(found: Examination) -> list[Block]:
     return [table, *hints, *idle, verdict]
 
 
-def _catchers(trial: Trial) -> str:
+def _catchers(trial: MutantTrial) -> str:
     """The first test that caught it, and how many others did."""
     if not trial.caught:
         return "nothing"

@@ -14,6 +14,7 @@ from typing import Any
 
 from ..backends import load
 from ..errors import MissingEngineError, unknown_name
+from ..installed import DEFAULT
 from ..lessons import LESSONS, module
 from ..lessons.records import Lesson
 from ..lessons.session import page_of_lesson, take
@@ -62,7 +63,7 @@ class Shown:
         return f"<Shown {self.page.title!r}: a notebook renders it>"
 
 
-def station(name: str, backend: str = "mujoco", **options: Any) -> Shown:
+def station(name: str, backend: str = DEFAULT, **options: Any) -> Shown:
     """Run a lesson and show what it says.
 
     Args:
@@ -88,7 +89,7 @@ def build() -> str:
     """The notebook as JSON, without outputs; its questions come from a run on MuJoCo."""
     cells = [_cell("start", "markdown", _INTRODUCTION), _cell("setup", "code", _START)]
     for number, lesson in enumerate(LESSONS.values(), start=1):
-        page = _page(lesson, "mujoco", {})
+        page = _page(lesson, DEFAULT, {})
         title = f"## {number}. {page.title}\n\n" if lesson.station else f"## {page.title}\n\n"
         cells.append(_cell(f"{lesson.name}-text", "markdown", title + _opening(page)))
         values = {option.key: option.default for option in lesson.options}

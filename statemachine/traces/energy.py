@@ -6,10 +6,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..backends import load
-from ..errors import MissingEngineError, StateMachineError
-from ..installed import require
-from ..interface import Array, Model, make_data
+from ..backends import on_default
+from ..engines import part
+from ..errors import StateMachineError
+from ..interface import Array, Model
 
 
 def energies(
@@ -39,25 +39,15 @@ def energies(
     """
     unknown = np.full((len(qpos), 2), np.nan), ""
     try:
-        mujoco = require("mujoco")
-        yardstick = model
-        if model.backend != "mujoco":
-            yardstick = load(model.path, backend="mujoco")
+        yardstick = on_default(model)
+        if yardstick is not model:
             if (yardstick.nq, yardstick.nv) != (qpos.shape[1], qvel.shape[1]):
                 return unknown
             if defaults == "model":
                 yardstick = yardstick.replace(gravity=model.gravity, armature=model.dof_armature)
             elif gravity is not None:
                 yardstick = yardstick.replace(gravity=gravity)
-    except (MissingEngineError, StateMachineError):
+        found = part(yardstick.backend, "energy").energies(yardstick, qpos, qvel)
+    except StateMachineError:
         return unknown
-    found = np.empty((len(qpos), 2))
-    with make_data(yardstick) as data:
-        raw_model, raw = yardstick.raw, data.raw
-        for k in range(len(qpos)):
-            data.qpos[:], data.qvel[:] = qpos[k], qvel[k]
-            mujoco.mj_fwdPosition(raw_model, raw)
-            mujoco.mj_energyPos(raw_model, raw)
-            mujoco.mj_energyVel(raw_model, raw)
-            found[k] = raw.energy[1], raw.energy[0]
-    return found, f"mujoco {yardstick.engine_version}"
+    return found, f"{yardstick.backend} {yardstick.engine_version}"

@@ -2,8 +2,8 @@
 
 `read` makes a description of a file, `compare` says where two of them differ:
 
-- `description`: a robot as frozen records, in one set of conventions
-- `from_urdf`, `from_mjcf`, `from_bullet`: one reader each
+- `..description` has the records, and the reader of URDF; an engine's own is the part `reading`
+  of its room
 - `tree`: rigid groups, composite inertia, M_ii, poses
 - `match`: which joint is which, and how the frames of links lie
 - `diff`: every difference with its size, entered into a `ledger`; by subject in `_places`,
@@ -21,26 +21,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from ... import __version__
-from ...backends import backend_engine, backend_names, load
-from ...errors import ModelError, UnsupportedError
-from ...installed import require
-from ...interface import make_data
+from ...backends import backend_engine, backend_names
+from ...description import urdf
+from ...description.records import Robot
+from ...engines import part, rooms_with
+from ...errors import UnsupportedError
+from ...installed import DEFAULT
 from ...models import resolve
-from . import _meshless, from_bullet, from_mjcf, from_urdf
-from .description import Robot
 from .diff import Found, diff
 from .engines import own_ways
-from .ledger import Agreement, Difference
+from .ledger import AgreedFigures, Difference
 from .match import renamed
-from .tree import Tree
+from .tree import GroupTree
 
 __all__ = [
-    "Agreement",
+    "AgreedFigures",
     "Compared",
+    "DescribedFile",
     "Difference",
     "Found",
     "Robot",
-    "Side",
     "compare",
     "read",
     "split",
@@ -48,7 +48,7 @@ __all__ = [
 
 
 @dataclass(frozen=True)
-class Side:
+class DescribedFile:
     """One of the two descriptions, for the record.
 
     Attributes:
@@ -79,8 +79,8 @@ class Compared:
         versions: Of what computed it.
     """
 
-    one: Side
-    two: Side
+    one: DescribedFile
+    two: DescribedFile
     found: Found
     digits: int
     versions: dict[str, str]
@@ -118,33 +118,21 @@ def read(
     """
     path = resolve(model, menagerie)
     name = "/".join(path.parts[-2:])
-    if engine is None and path.suffix.lower() == ".urdf":
-        return from_urdf.read(path)
-    if engine not in (None, "mujoco", "pybullet"):
-        backend_engine(engine)
+    if engine is None:
+        if path.suffix.lower() == ".urdf":
+            return urdf.read(path)
+        return part(DEFAULT, "reading").read_file(path, name)
+    backend_engine(engine)
+    room = part(engine, "reading")
+    if room is None:
+        known = ", ".join(rooms_with("reading"))
         raise UnsupportedError(
-            f"what {engine} makes of a file cannot be read here; known: mujoco, pybullet",
+            f"what {engine} makes of a file cannot be read here; known: {known}",
             backend=engine,
             feature="description",
             reason="no reader",
         )
-    if engine == "pybullet":
-        require("pybullet")
-        if path.suffix.lower() == ".urdf":
-            with from_bullet.loaded(path) as (client, bodies):
-                return from_bullet.read(client, bodies, name)
-        with make_data(load(path, backend="pybullet", defaults="engine")) as data:
-            client = data.raw.client
-            return from_bullet.read(client, from_bullet.everything(client), name)
-    try:
-        loaded = load(path, backend="mujoco", defaults="engine")
-    except ModelError:
-        robot = _meshless.read(path, name) if path.suffix.lower() == ".xml" else None
-        if engine is not None or robot is None:
-            raise
-        return robot
-    form = "engine" if engine else {".mjb": "MJB", ".urdf": "URDF"}.get(path.suffix.lower(), "MJCF")
-    return from_mjcf.read(loaded.raw, name, f"mujoco {loaded.engine_version}", form)
+    return room.read(path, name)
 
 
 def compare(
@@ -174,7 +162,7 @@ def compare(
         MissingEngineError, ModelError, ModelFileError, UnsupportedError: As `read`.
     """
     robots = [read(m, e, menagerie) for m, e in zip((one, two), engines, strict=True)]
-    trees = [Tree(renamed(robots[0], rename or {})), Tree(robots[1])]
+    trees = [GroupTree(renamed(robots[0], rename or {})), GroupTree(robots[1])]
     found = diff(trees[0], trees[1], frames, digits, seed, own_ways(*engines))
     versions = {
         "statemachine": __version__,
@@ -183,14 +171,14 @@ def compare(
     }
     for robot in robots:
         engine, _, version = robot.reader.partition(" ")
-        if engine in ("mujoco", "pybullet"):
+        if version:
             versions[engine] = version
     return Compared(_side(trees[0]), _side(trees[1]), found, digits, versions)
 
 
-def _side(tree: Tree) -> Side:
+def _side(tree: GroupTree) -> DescribedFile:
     robot = tree.robot
-    return Side(
+    return DescribedFile(
         file=robot.name,
         format=robot.format,
         reader=robot.reader,

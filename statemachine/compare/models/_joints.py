@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from ...comparison.text import milliseconds, rounded
-from .description import Actuator, Joint, Robot
+from ...description.records import Actuator, Robot, RobotJoint
 from .ledger import Ledger
 from .match import Pair
-from .tree import Tree
+from .tree import GroupTree
 
 _UNITS = {
     "hinge": {"limits": "rad", "speed": "rad/s", "effort": "N·m", "armature": "kg m²"},
@@ -16,7 +16,7 @@ _UNITS = {
 }
 
 
-def compare(book: Ledger, pair: Pair, one: Tree, two: Tree) -> None:
+def compare(book: Ledger, pair: Pair, one: GroupTree, two: GroupTree) -> None:
     """Everything but where the joint is."""
     a, b = pair.one.joint, pair.two.joint
     if a is None or b is None or a.kind != b.kind:
@@ -61,7 +61,7 @@ def _unsaid(
     return True
 
 
-def _armature(book: Ledger, a: Joint, b: Joint, unit: str, whole: list[float]) -> None:
+def _armature(book: Ledger, a: RobotJoint, b: RobotJoint, unit: str, whole: list[float]) -> None:
     """Its share is that of M_ii, the inertia that the joint's motor feels, at zero."""
     apart = abs((a.armature or 0.0) - (b.armature or 0.0))
     most = max(whole)
@@ -73,7 +73,9 @@ def _armature(book: Ledger, a: Joint, b: Joint, unit: str, whole: list[float]) -
             book.differ("armature", a.name, "", a.armature, b.armature, unit, size, share, effect)
 
 
-def _damping(book: Ledger, a: Joint, b: Joint, whole: list[float], effort: float | None) -> None:
+def _damping(
+    book: Ledger, a: RobotJoint, b: RobotJoint, whole: list[float], effort: float | None
+) -> None:
     """Its share is that of the effort at 1 rad/s; it slows a free joint in M_ii / damping."""
     unit = "N·m·s" if a.kind != "slide" else "N·s/m"
     times = [
@@ -89,7 +91,7 @@ def _damping(book: Ledger, a: Joint, b: Joint, whole: list[float], effort: float
             book.differ("damping", a.name, "", *values, unit, size, share, effect)
 
 
-def _friction(book: Ledger, a: Joint, b: Joint, unit: str, effort: float | None) -> None:
+def _friction(book: Ledger, a: RobotJoint, b: RobotJoint, unit: str, effort: float | None) -> None:
     """Its share is that of the effort."""
     values = a.friction or 0.0, b.friction or 0.0
     apart = abs(values[0] - values[1])
@@ -101,7 +103,7 @@ def _friction(book: Ledger, a: Joint, b: Joint, unit: str, effort: float | None)
             book.differ("dry friction", a.name, "", *values, unit, size, share, effect)
 
 
-def _limits(book: Ledger, a: Joint, b: Joint, unit: str) -> None:
+def _limits(book: Ledger, a: RobotJoint, b: RobotJoint, unit: str) -> None:
     """Their share is that of the wider range."""
     spans = [high - low for low, high in (each for each in (a.limits, b.limits) if each)]
     span = max(spans, default=0.0)
@@ -131,7 +133,7 @@ def _limits(book: Ledger, a: Joint, b: Joint, unit: str) -> None:
             )
 
 
-def _speed(book: Ledger, a: Joint, b: Joint, unit: str) -> None:
+def _speed(book: Ledger, a: RobotJoint, b: RobotJoint, unit: str) -> None:
     """What an MJCF has no word for, and is said for the record then."""
     if a.velocity is None or b.velocity is None:
         _unsaid(book, "speed", a.name, "", a.velocity, b.velocity, unit, 0.0, "", matters=False)
@@ -142,7 +144,7 @@ def _speed(book: Ledger, a: Joint, b: Joint, unit: str) -> None:
         book.differ("speed", a.name, "", a.velocity, b.velocity, unit, size, share)
 
 
-def _effort(book: Ledger, a: Joint, b: Joint, unit: str, load: list[float]) -> None:
+def _effort(book: Ledger, a: RobotJoint, b: RobotJoint, unit: str, load: list[float]) -> None:
     """Its share is that of the larger one; the weight it may have to hold beside it."""
     heavy = max(load)
     if a.effort is None or b.effort is None:
@@ -161,7 +163,7 @@ def _effort(book: Ledger, a: Joint, b: Joint, unit: str, load: list[float]) -> N
     )
 
 
-def _spring(book: Ledger, a: Joint, b: Joint) -> None:
+def _spring(book: Ledger, a: RobotJoint, b: RobotJoint) -> None:
     """Its share is 1: the other has none, or another."""
     unit = "N·m/rad" if a.kind == "hinge" else "N/m"
     if _unsaid(book, "spring", a.name, "stiffness", a.stiffness, b.stiffness, unit, 1.0):
@@ -177,7 +179,7 @@ def _spring(book: Ledger, a: Joint, b: Joint) -> None:
             book.differ("spring", a.name, "slack at", *at, unit, size, size)
 
 
-def _follows(book: Ledger, a: Joint, b: Joint) -> None:
+def _follows(book: Ledger, a: RobotJoint, b: RobotJoint) -> None:
     words = [
         "nothing" if each is None else f"{each[0]}, {each[1]:g} times, {each[2]:+g}"
         for each in (a.follows, b.follows)
@@ -193,7 +195,13 @@ def _on(robot: Robot, joint: str) -> list[Actuator] | None:
 
 
 def _drives(
-    book: Ledger, one: Tree, two: Tree, a: Joint, b: Joint, whole: list[float], load: list[float]
+    book: Ledger,
+    one: GroupTree,
+    two: GroupTree,
+    a: RobotJoint,
+    b: RobotJoint,
+    whole: list[float],
+    load: list[float],
 ) -> None:
     """What drives a joint. A gain's share is that of the larger one."""
     ours, theirs = _on(one.robot, a.name), _on(two.robot, b.name)
@@ -218,13 +226,13 @@ def _drives(
         book.differ("drive", a.name, "count", float(len(ours)), float(len(theirs)))
 
 
-def _unit(name: str, joint: Joint) -> str:
+def _unit(name: str, joint: RobotJoint) -> str:
     turn = joint.kind != "slide"
     return {"kp": "N·m/rad" if turn else "N/m", "kv": "N·m·s" if turn else "N·s/m"}.get(name, "")
 
 
 def _gain_effect(
-    name: str, value: float, whole: float, load: float, joint: Joint, drive: Actuator
+    name: str, value: float, whole: float, load: float, joint: RobotJoint, drive: Actuator
 ) -> str:
     """Of kp the sag under the load that a joint may have; of kv the damping ratio."""
     if name == "kp":
@@ -238,8 +246,8 @@ def _gain_effect(
 
 def _pair_of_drives(
     book: Ledger,
-    a: Joint,
-    b: Joint,
+    a: RobotJoint,
+    b: RobotJoint,
     x: Actuator,
     y: Actuator,
     whole: list[float],
@@ -275,7 +283,7 @@ def _pair_of_drives(
                 book.differ("drive", a.name, figure, mine, theirs, unit, size, share)
 
 
-def compare_loose_drives(book: Ledger, one: Tree, two: Tree) -> None:
+def compare_loose_drives(book: Ledger, one: GroupTree, two: GroupTree) -> None:
     """Actuators that drive something else than a joint: tendons, sites, bodies."""
     loose = [
         {each.name for each in tree.robot.actuators or () if not each.joint} for tree in (one, two)

@@ -7,15 +7,15 @@ import math
 import numpy as np
 
 from ...comparison.text import rounded
+from ...description.records import RobotJoint
 from ...interface import Array
 from ...rotations import angle_between
-from .description import Joint
 from .ledger import Ledger
 from .match import Pair
-from .tree import Tree
+from .tree import GroupTree
 
 
-def compare(book: Ledger, pair: Pair, above: Pair, tree: Tree, reach: float) -> None:
+def compare(book: Ledger, pair: Pair, above: Pair, tree: GroupTree, reach: float) -> None:
     """Where a joint is and how it is turned, at zero, in the parent's frame."""
     a, b = pair.one.joint, pair.two.joint
     if a is None or b is None:
@@ -59,7 +59,7 @@ def compare(book: Ledger, pair: Pair, above: Pair, tree: Tree, reach: float) -> 
     _axes(book, pair, a, b, reach)
 
 
-def _axes(book: Ledger, pair: Pair, a: Joint, b: Joint, reach: float) -> None:
+def _axes(book: Ledger, pair: Pair, a: RobotJoint, b: RobotJoint, reach: float) -> None:
     """The axis itself, in the frame of the second one's link."""
     where, anchor, axis = a.name, b.anchor, b.axis
     mine = pair.align.mat @ a.axis
@@ -76,7 +76,7 @@ def _axes(book: Ledger, pair: Pair, a: Joint, b: Joint, reach: float) -> None:
             book.differ("places", where, "axis beside", 0.0, apart, "m", apart, apart / reach)
 
 
-def _tips(tree: Tree, pair: Pair) -> list[Array]:
+def _tips(tree: GroupTree, pair: Pair) -> list[Array]:
     """Points that a pair carries at zero, in the second one's frame: its frames and masses."""
     world = tree.poses()
     home = pair.align @ world[pair.one.number].inverse

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from .description import Setting
+from ...description.records import Setting
 from .ledger import Ledger
-from .tree import Tree
+from .tree import GroupTree
 
 
-def compare(book: Ledger, one: Tree, two: Tree, notes: list[str]) -> None:
+def compare(book: Ledger, one: GroupTree, two: GroupTree, notes: list[str]) -> None:
     """Settings of the simulation; where a format has none, what the other would change."""
     ours, theirs = one.robot.settings, two.robot.settings
     if ours is None and theirs is None:

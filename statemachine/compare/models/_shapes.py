@@ -10,18 +10,18 @@ from itertools import permutations
 
 import numpy as np
 
+from ...description.meshes import extent
+from ...description.records import CollisionShape, Placement, rotation
 from ...interface import Array
-from .description import Placement, Shape
 from .ledger import Ledger
 from .match import Pair
-from .meshes import extent
-from .tree import Tree, rotation
+from .tree import GroupTree
 
 _AXES = [sign * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
 _SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
-def compare(book: Ledger, pair: Pair, one: Tree, two: Tree, reach: float) -> None:
+def compare(book: Ledger, pair: Pair, one: GroupTree, two: GroupTree, reach: float) -> None:
     """Their share is that of how far they stand out, against the robot's reach."""
     where = pair.one.name
     ours = [replace(s, place=pair.align @ s.place) for s in pair.one.shapes]
@@ -53,21 +53,25 @@ def compare(book: Ledger, pair: Pair, one: Tree, two: Tree, reach: float) -> Non
     _each(book, where, ours, theirs, reach, one, two)
 
 
-def _count(shapes: Sequence[Shape]) -> str:
+def _count(shapes: Sequence[CollisionShape]) -> str:
     found = Counter(shape.kind for shape in shapes)
     plural = {"box": "boxes", "mesh": "meshes"}
     words = (f"{n} {k if n == 1 else plural.get(k, k + 's')}" for k, n in sorted(found.items()))
     return ", ".join(words) or "none"
 
 
-def _volume(shapes: Sequence[Shape]) -> float | None:
+def _volume(shapes: Sequence[CollisionShape]) -> float | None:
     """Sum of the volumes, what they share counted twice; None if one is not known."""
     volumes = [shape.volume for shape in shapes]
     return None if None in volumes else sum(v for v in volumes if v is not None)
 
 
 def _boxes(
-    book: Ledger, where: str, ours: Sequence[Shape], theirs: Sequence[Shape], reach: float
+    book: Ledger,
+    where: str,
+    ours: Sequence[CollisionShape],
+    theirs: Sequence[CollisionShape],
+    reach: float,
 ) -> None:
     """How far the shapes reach along the axes of the link."""
     sides = []
@@ -89,11 +93,11 @@ def _boxes(
 def _each(
     book: Ledger,
     where: str,
-    ours: list[Shape],
-    theirs: list[Shape],
+    ours: list[CollisionShape],
+    theirs: list[CollisionShape],
     reach: float,
-    one: Tree,
-    two: Tree,
+    one: GroupTree,
+    two: GroupTree,
 ) -> None:
     """Shapes one by one, each with that of its kind and name, or else of its kind and place."""
     rest = list(theirs)
@@ -126,7 +130,7 @@ def _each(
         book.differ("contact", label, figure, *values, "", size, 0.5 if share is None else share)  # pyright: ignore[reportArgumentType]
 
 
-def _laid_on(shape: Shape, other: Shape) -> Shape:
+def _laid_on(shape: CollisionShape, other: CollisionShape) -> CollisionShape:
     """The other box with its axes called as this one's: one solid has six such names."""
     if shape.kind not in ("box", "ellipsoid"):
         return other
@@ -142,14 +146,14 @@ def _laid_on(shape: Shape, other: Shape) -> Shape:
     return min(choices, key=lambda each: each[0])[1]
 
 
-def _misfit(one: Shape, two: Shape) -> float:
+def _misfit(one: CollisionShape, two: CollisionShape) -> float:
     far = _centre_apart(one, two)
     if len(one.size) == len(two.size):
         far += float(np.linalg.norm(np.subtract(sorted(one.size), sorted(two.size))))
     return far
 
 
-def _middle(shape: Shape) -> Array | None:
+def _middle(shape: CollisionShape) -> Array | None:
     """The middle of a mesh's extent, for which every file may have another frame."""
     if shape.kind != "mesh":
         return shape.place.pos
@@ -159,12 +163,14 @@ def _middle(shape: Shape) -> Array | None:
     return np.array([(reaches[k] - reaches[k + 1]) / 2 for k in (0, 2, 4)])
 
 
-def _centre_apart(one: Shape, two: Shape) -> float:
+def _centre_apart(one: CollisionShape, two: CollisionShape) -> float:
     a, b = _middle(one), _middle(two)
     return 0.0 if a is None or b is None else float(np.linalg.norm(a - b))
 
 
-def _place(book: Ledger, label: str, shape: Shape, other: Shape, reach: float) -> None:
+def _place(
+    book: Ledger, label: str, shape: CollisionShape, other: CollisionShape, reach: float
+) -> None:
     """Where a shape is: its middle, and how it is turned, as far as that shows."""
     far = _centre_apart(shape, other)
     a, b = _middle(shape), _middle(other)
@@ -178,7 +184,7 @@ def _place(book: Ledger, label: str, shape: Shape, other: Shape, reach: float) -
         book.differ("shapes", label, "turned", None, None, "rad", turn, turn / math.pi / 10)
 
 
-def _turn(shape: Shape, other: Shape) -> float:
+def _turn(shape: CollisionShape, other: CollisionShape) -> float:
     """Angle [rad] between two shapes of a kind, what their symmetry hides apart."""
     a, b = shape.place.mat, other.place.mat
     if shape.kind in ("sphere", "mesh"):
@@ -202,10 +208,10 @@ def _turn(shape: Shape, other: Shape) -> float:
 
 def _contact(
     label: str,
-    shape: Shape,
-    other: Shape,
-    one: Tree,
-    two: Tree,
+    shape: CollisionShape,
+    other: CollisionShape,
+    one: GroupTree,
+    two: GroupTree,
     found: dict[tuple[object, object, str], list[str]],
 ) -> None:
     """Friction and the other settings; where one does not say, what its engine would take."""

@@ -6,16 +6,18 @@ import math
 
 import numpy as np
 
+from ...description.records import Inertial, Placement
 from ...interface import Array
-from .description import Inertial, Placement
 from .ledger import Ledger
 from .match import Pair
-from .tree import Group, Tree
+from .tree import Group, GroupTree
 
 _STILL = "stands still"
 
 
-def compare(book: Ledger, pair: Pair, one: Tree, two: Tree, reach: float, notes: list[str]) -> None:
+def compare(
+    book: Ledger, pair: Pair, one: GroupTree, two: GroupTree, reach: float, notes: list[str]
+) -> None:
     """Mass, centre of mass and inertia, each as the rigid part's composite."""
     mine, theirs = _seen(pair.one.inertial, pair.align), pair.two.inertial
     worlds = (
@@ -38,7 +40,13 @@ def _seen(own: Inertial, align: Placement) -> Inertial:
 
 
 def _inertials(
-    book: Ledger, pair: Pair, one: Tree, two: Tree, mine: Inertial, theirs: Inertial, reach: float
+    book: Ledger,
+    pair: Pair,
+    one: GroupTree,
+    two: GroupTree,
+    mine: Inertial,
+    theirs: Inertial,
+    reach: float,
 ) -> None:
     where = pair.one.name
     still = _stands(one, pair.one) and _stands(two, pair.two)
@@ -65,7 +73,7 @@ def _inertials(
     _tensors(book, pair, one, two, mine, theirs, not still)
 
 
-def _stands(tree: Tree, group: Group) -> bool:
+def _stands(tree: GroupTree, group: Group) -> bool:
     """Whether a part is fixed to the world, so that its mass moves nothing."""
     return tree.robot.rooted and group.parent < 0
 
@@ -77,8 +85,8 @@ def _most(value: float) -> float:
 def _tensors(
     book: Ledger,
     pair: Pair,
-    one: Tree,
-    two: Tree,
+    one: GroupTree,
+    two: GroupTree,
     mine: Inertial,
     theirs: Inertial,
     matters: bool,

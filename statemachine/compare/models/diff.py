@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...comparison.text import few, rounded
+from ...description.records import HERE
 from . import _joints, _places, _settings, _shapes, _solids
-from .description import HERE
-from .ledger import Agreement, Difference, Ledger
+from .ledger import AgreedFigures, Difference, Ledger
 from .match import Matching, frame_names, match
-from .tree import Group, Tree
+from .tree import Group, GroupTree
 
 POSES = 100  # at which the same positions are put into both
 
@@ -50,15 +50,15 @@ class Found:
     """
 
     differences: tuple[Difference, ...]
-    agreements: tuple[Agreement, ...]
+    agreements: tuple[AgreedFigures, ...]
     posed: Posed
     mass: tuple[float, float]
     notes: tuple[str, ...]
 
 
 def diff(
-    one: Tree,
-    two: Tree,
+    one: GroupTree,
+    two: GroupTree,
     frames: Mapping[str, str] | None = None,
     digits: int = 6,
     seed: int = 0,
@@ -104,12 +104,12 @@ def diff(
     )
 
 
-def _mass(tree: Tree) -> float:
+def _mass(tree: GroupTree) -> float:
     first = 1 if tree.robot.rooted else 0
     return sum(link.inertial.mass for link in tree.robot.links[first:] if link.inertial)
 
 
-def _reach(tree: Tree) -> float:
+def _reach(tree: GroupTree) -> float:
     """How far its links and frames are from its root at zero [m]."""
     world = tree.poses()
     points = [world[number].of(place.pos) for number, place in tree.frames.values()]
@@ -117,7 +117,9 @@ def _reach(tree: Tree) -> float:
     return max(float(np.linalg.norm(point)) for point in points) or 1.0
 
 
-def _structure(book: Ledger, one: Tree, two: Tree, found: Matching, notes: list[str]) -> None:
+def _structure(
+    book: Ledger, one: GroupTree, two: GroupTree, found: Matching, notes: list[str]
+) -> None:
     """Parts that only one has, other parents, and other names."""
     for k, (only, tree) in enumerate(((found.only_one, one), (found.only_two, two))):
         for group in only:
@@ -177,7 +179,7 @@ def _suggest(found: Matching, notes: list[str]) -> None:
                 )
 
 
-def _is_world(tree: Tree, name: str) -> bool:
+def _is_world(tree: GroupTree, name: str) -> bool:
     return tree.robot.rooted and name == tree.robot.links[0].name
 
 
@@ -188,8 +190,8 @@ def _label(group: Group) -> str:
 def _tools(
     book: Ledger,
     found: Matching,
-    one: Tree,
-    two: Tree,
+    one: GroupTree,
+    two: GroupTree,
     named: Mapping[str, str],
     reach: float,
     notes: list[str],
@@ -225,7 +227,7 @@ def _tools(
             notes.append(f"only {which} has the frames {few(alone, 8)} (--frame A=B pairs two)")
 
 
-def _posed(found: Matching, one: Tree, two: Tree, seed: int) -> Posed:
+def _posed(found: Matching, one: GroupTree, two: GroupTree, seed: int) -> Posed:
     """The same joint positions in both: how far apart are the same links?"""
     random = np.random.default_rng(seed)
     ranges: dict[str, tuple[str, float, float]] = {}

@@ -62,7 +62,7 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class Agreement:
+class AgreedFigures:
     """Figures that are the same, within rounding.
 
     Attributes:
@@ -155,7 +155,7 @@ class Ledger:
         self.agree(subject, where, size, relative, unit)
         return None
 
-    def agreements(self) -> tuple[Agreement, ...]:
+    def agreements(self) -> tuple[AgreedFigures, ...]:
         """How well the rest agrees, by subject and unit."""
         found = []
         for subject in SUBJECTS:
@@ -166,7 +166,9 @@ class Ledger:
                 relative = max(each[0] for each in entries)
                 worst = max(entries, key=lambda each: each[1])
                 found.append(
-                    Agreement(subject, len(entries), worst[1], unit, worst[3], digits_of(relative))
+                    AgreedFigures(
+                        subject, len(entries), worst[1], unit, worst[3], digits_of(relative)
+                    )
                 )
         return tuple(found)
 

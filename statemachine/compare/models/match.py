@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...description.records import HERE, Placement, Robot
 from ...errors import unknown_name
 from ...interface import Array
-from .description import HERE, Placement, Robot
-from .tree import Group, Tree
+from .tree import Group, GroupTree
 
 _NEAR, _TILT = 5e-3, 0.1  # [m] and [rad] within which two axes may be one
 _ODD = 1e-4  # [m] at which a mismatch counts half
@@ -82,7 +82,7 @@ def renamed(robot: Robot, names: Mapping[str, str]) -> Robot:
     return replace(robot, links=links, frames=frames, actuators=drives)
 
 
-def match(one: Tree, two: Tree) -> Matching:
+def match(one: GroupTree, two: GroupTree) -> Matching:
     """Pairs of rigid groups."""
     pairs: dict[int, Pair] = {}
     taken: set[int] = set()
@@ -117,7 +117,7 @@ def match(one: Tree, two: Tree) -> Matching:
     )
 
 
-def _bases(one: Tree, two: Tree) -> tuple[Group, Group]:
+def _bases(one: GroupTree, two: GroupTree) -> tuple[Group, Group]:
     """The roots; a base that floats in one file and stands still in the other is one too."""
     for name, a in one.by_joint.items():
         b = two.by_joint.get(name)
@@ -131,7 +131,9 @@ def _bases(one: Tree, two: Tree) -> tuple[Group, Group]:
     return one.groups[0], two.groups[0]
 
 
-def _placed(one: Tree, two: Tree, group: Group, above: Pair, taken: set[int]) -> Group | None:
+def _placed(
+    one: GroupTree, two: GroupTree, group: Group, above: Pair, taken: set[int]
+) -> Group | None:
     """A group of the second description that hangs where `group` does, by the same axis."""
     joint = group.joint
     assert joint is not None
@@ -165,7 +167,7 @@ def _apart(point: Array, other: Array, axis: Array) -> float:
     return float(np.linalg.norm(np.cross(axis, point - other)))
 
 
-def _of_root(one: Tree, two: Tree, a: Group, b: Group, names: Places) -> Placement:
+def _of_root(one: GroupTree, two: GroupTree, a: Group, b: Group, names: Places) -> Placement:
     """How the frames of two roots lie: as they are, or so that links of them coincide."""
     choices = [HERE]
     ours = {link.name: place for link, place in a.links}
@@ -183,14 +185,14 @@ def _of_root(one: Tree, two: Tree, a: Group, b: Group, names: Places) -> Placeme
 
 
 def _of_child(
-    one: Tree, two: Tree, a: Group, b: Group, names: Places, above: Placement
+    one: GroupTree, two: GroupTree, a: Group, b: Group, names: Places, above: Placement
 ) -> Placement:
     """How the frames of a pair lie: one frame, or two of a solid that is in one place."""
     return _best(one, two, a, b, names, [HERE, b.place.inverse @ above @ a.place])
 
 
 def _best(
-    one: Tree, two: Tree, a: Group, b: Group, names: Places, choices: list[Placement]
+    one: GroupTree, two: GroupTree, a: Group, b: Group, names: Places, choices: list[Placement]
 ) -> Placement:
     fixed = names.get((a.number, b.number), [])
     scores = [sum(e / (e + _ODD) for e in _errors(one, two, a, b, fixed, each)) for each in choices]
@@ -199,8 +201,8 @@ def _best(
 
 
 def _errors(
-    one: Tree,
-    two: Tree,
+    one: GroupTree,
+    two: GroupTree,
     a: Group,
     b: Group,
     fixed: list[tuple[Placement, Placement]],
@@ -228,7 +230,7 @@ def _errors(
         yield (align @ place).distance(other_place)
 
 
-def _fixed_frames(one: Tree, two: Tree) -> Places:
+def _fixed_frames(one: GroupTree, two: GroupTree) -> Places:
     """Frames of one name by the groups that carry them, those of the groups themselves apart."""
     found: Places = {}
     for name, other_name in frame_names(one, two).items():
@@ -238,7 +240,9 @@ def _fixed_frames(one: Tree, two: Tree) -> Places:
     return found
 
 
-def frame_names(one: Tree, two: Tree, given: Mapping[str, str] | None = None) -> dict[str, str]:
+def frame_names(
+    one: GroupTree, two: GroupTree, given: Mapping[str, str] | None = None
+) -> dict[str, str]:
     """Frames that are one: those given, of one name, or of names that say the same.
 
     "gripperframe" and "gripper_frame_link" do: case, signs and a last "link" or "site" apart.

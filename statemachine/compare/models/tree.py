@@ -13,9 +13,18 @@ from functools import cached_property
 
 import numpy as np
 
+from ...description.meshes import with_capsules
+from ...description.records import (
+    HERE,
+    CollisionShape,
+    Inertial,
+    Link,
+    Placement,
+    Robot,
+    RobotJoint,
+    moved,
+)
 from ...interface import Array
-from .description import HERE, Inertial, Joint, Link, Placement, Robot, Shape
-from .meshes import with_capsules
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +49,7 @@ class Group:
         return self.links[0][0].name
 
     @property
-    def joint(self) -> Joint | None:
+    def joint(self) -> RobotJoint | None:
         """What it moves by against its parent."""
         return self.links[0][0].joint
 
@@ -55,7 +64,7 @@ class Group:
         return together(parts)
 
     @cached_property
-    def shapes(self) -> tuple[Shape, ...]:
+    def shapes(self) -> tuple[CollisionShape, ...]:
         """Those of all its links, placed in the group's frame."""
         return with_capsules(
             [
@@ -83,24 +92,7 @@ def _shifted(mass: float, arm: Array) -> Array:
     return mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
 
 
-def moved(joint: Joint | None, amount: float) -> Placement:
-    """Where a joint takes its link at a position, in the frame that the link has at zero."""
-    if joint is None or not amount or joint.kind not in ("hinge", "slide"):
-        return HERE
-    if joint.kind == "slide":
-        return Placement(joint.axis * amount, np.eye(3))
-    mat = rotation(joint.axis, amount)
-    return Placement(joint.anchor - mat @ joint.anchor, mat)
-
-
-def rotation(axis: Array, angle: float) -> Array:
-    """Rotation matrix about a unit axis (Rodrigues)."""
-    x, y, z = axis
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
-
-
-class Tree:
+class GroupTree:
     """The groups of a description.
 
     Attributes:

@@ -61,13 +61,13 @@ class _MjData(_Object):
             return None
         if not _MjData._fields:
             _MjData._fields = _fields(data)
-        found = {}
+        contents = {}
         for name in _MjData._fields:
             value = getattr(data, name)
-            found[name] = value.tobytes() if isinstance(value, np.ndarray) else _bytes(value)
+            contents[name] = value.tobytes() if isinstance(value, np.ndarray) else _bytes(value)
         contact = data.contact
-        found["contact"] = b"".join(getattr(contact, part).tobytes() for part in _CONTACT)
-        return found
+        contents["contact"] = b"".join(getattr(contact, part).tobytes() for part in _CONTACT)
+        return contents
 
     def entry(self, field: str, before: bytes, after: bytes) -> str:
         value = getattr(self.thing, field)
@@ -92,10 +92,10 @@ class _MjModel(_Object):
         if model is None:
             return None
         options = model.opt
-        found = {f"opt.{name}": _bytes(getattr(options, name)) for name in self._options}
+        contents = {f"opt.{name}": _bytes(getattr(options, name)) for name in self._options}
         for name in self._all if thoroughly else self._small:
-            found[name] = getattr(model, name).tobytes()
-        return found
+            contents[name] = getattr(model, name).tobytes()
+        return contents
 
 
 def _bytes(value: Any) -> bytes:
@@ -104,15 +104,15 @@ def _bytes(value: Any) -> bytes:
 
 def _fields(data: Any) -> tuple[str, ...]:
     """Names of the numbers and arrays of an MjData, those of the interface first."""
-    found = [
+    names = [
         name
         for name in dir(type(data))
         if not name.startswith(("_", "maxuse_"))
         and name not in _LEFT_OUT
         and isinstance(getattr(data, name), (np.ndarray, int, float))
     ]
-    order = [name for name in _FIRST if name in found]
-    return (*order, *(name for name in found if name not in order))
+    order = [name for name in _FIRST if name in names]
+    return (*order, *(name for name in names if name not in order))
 
 
 class _MujocoWatch(CallWatch):
@@ -138,8 +138,8 @@ class _MujocoWatch(CallWatch):
         if function in ("MjModel", "MjData", "MjSpec"):  # the first is not an object yet
             args = args[1:]
         things = [*args, *kwargs.values()]
-        found = [self._subject(thing) for thing in things if isinstance(thing, self._kinds)]
-        return sorted(found, key=lambda subject: isinstance(subject, _MjModel))
+        objects = [self._watched(thing) for thing in things if isinstance(thing, self._kinds)]
+        return sorted(objects, key=lambda watched: isinstance(watched, _MjModel))
 
     @property
     def _kinds(self) -> tuple[type, type]:
@@ -147,9 +147,9 @@ class _MujocoWatch(CallWatch):
 
     def made(self, function: str, args: Sequence[Any], result: Any) -> WatchedObject | None:
         thing = args[0] if function in ("MjModel", "MjData") else result
-        return self._subject(thing) if isinstance(thing, self._kinds) else None
+        return self._watched(thing) if isinstance(thing, self._kinds) else None
 
-    def _subject(self, thing: Any) -> _Object:
+    def _watched(self, thing: Any) -> _Object:
         known = self._known.get(id(thing))
         if known is None or known.thing is not thing:
             if isinstance(thing, self._module.MjModel):
@@ -180,12 +180,12 @@ class _MujocoWatch(CallWatch):
             self._label(model.compiled, f"the description of {label}", raw=True)
 
     def _label(self, thing: Any, label: str, raw: bool = False) -> None:
-        subject = self._subject(thing)
-        if not subject.named:
-            subject.lead(label, raw)
+        watched = self._watched(thing)
+        if not watched.named:
+            watched.lead(label, raw)
 
     def living(self) -> Sequence[WatchedObject]:
-        self._known = {key: each for key, each in self._known.items() if each.thing is not None}
+        self._known = {key: known for key, known in self._known.items() if known.thing is not None}
         return list(self._known.values())
 
 

@@ -44,13 +44,13 @@ def _raw(model: Model, gravity: bool = True, damping: bool = True) -> Iterator[W
 def terms(model: Model) -> tuple[Term, ...]:
     """What the interface's names are on this engine, by looking at a loaded model."""
     raw = model.compiled
-    found = []
+    rows = []
     with _raw(model) as world:
         for tree in world.trees:
             names = [pb.getJointInfo(tree.body, i, world.client) for i in _all_joints(world, tree)]
             for index, place in zip(tree.joints, raw.dof_jntid[tree.dofs], strict=False):
                 slot = int(raw.jnt_qposadr[place])
-                found.append(
+                rows.append(
                     Term(
                         f"joint {model.joint_names[place]}",
                         f"qpos[{slot}]",
@@ -59,13 +59,13 @@ def terms(model: Model) -> tuple[Term, ...]:
                 )
             fixed = [f"{info[1].decode()} is {info[0]}" for info in names if info[3] < 0]
             if fixed:
-                found.append(Term("fixed joints", "none", f"take an index too: {', '.join(fixed)}"))
+                rows.append(Term("fixed joints", "none", f"take an index too: {', '.join(fixed)}"))
         for tree in world.trees:
             if tree.free:
-                found += _free_terms(world, tree, model)
+                rows += _free_terms(world, tree, model)
         for tree in world.trees:
-            found += _frame_terms(world, tree, model)
-    return tuple(found)
+            rows += _frame_terms(world, tree, model)
+    return tuple(rows)
 
 
 def _all_joints(world: World, tree: Tree) -> range:
@@ -102,7 +102,7 @@ def _frame_terms(world: World, tree: Tree, model: Model) -> Iterator[Term]:
             state = pb.getLinkState(tree.body, link, physicsClientId=world.client)
             apart[body] = float(np.linalg.norm(np.subtract(state[0], state[4])))
     if apart:
-        body = max(apart, key=lambda each: apart[each])
+        body = max(apart, key=lambda link: apart[link])
         yield Term(
             f"position of {model.body_names[body]}",
             "its frame",
@@ -123,7 +123,7 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...
         joint: Id of a hinge or slide.
     """
     steps = max(1, round(seconds / ENGINE_TIMESTEP))
-    found, fresh = [], _fresh_gravity()
+    runs, fresh = [], _fresh_gravity()
     for label, gravity, motors, damping in (
         ("as loadURDF leaves it", False, True, True),
         ("gravity set", True, True, True),
@@ -135,9 +135,13 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...
             pb.setTimeStep(ENGINE_TIMESTEP, world.client)
             tree, index = _joint(world, model, joint)
             if not motors:
-                for each in tree.joints:
+                for driven in tree.joints:
                     pb.setJointMotorControl2(
-                        tree.body, each, pb.VELOCITY_CONTROL, force=0, physicsClientId=world.client
+                        tree.body,
+                        driven,
+                        pb.VELOCITY_CONTROL,
+                        force=0,
+                        physicsClientId=world.client,
                     )
             ratio = _explicit(world, tree)
             speeds = []
@@ -146,7 +150,7 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...
                 speeds.append(pb.getJointState(tree.body, index, world.client)[1])
             state = pb.getJointState(tree.body, index, world.client)
             places = [s[0] for s in pb.getJointStates(tree.body, tree.joints, world.client)]
-            found.append(
+            runs.append(
                 LeftAlone(
                     label=label,
                     time=steps * ENGINE_TIMESTEP,
@@ -159,7 +163,7 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...
                     steps=steps,
                 )
             )
-    return tuple(found)
+    return tuple(runs)
 
 
 def _fresh_gravity() -> float:
@@ -267,14 +271,14 @@ def _command(world: World, model: Model, target: Array) -> None:
 
 def _joints(world: World) -> list[float]:
     """Positions of all joints, and of all bases."""
-    found: list[float] = []
+    values: list[float] = []
     for tree in world.trees:
         if tree.joints:
-            found += [s[0] for s in pb.getJointStates(tree.body, tree.joints, world.client)]
+            values += [s[0] for s in pb.getJointStates(tree.body, tree.joints, world.client)]
         if tree.free:
             pos, quat = pb.getBasePositionAndOrientation(tree.body, world.client)
-            found += [*pos, *quat]
-    return found
+            values += [*pos, *quat]
+    return values
 
 
 def _state(world: World, model: Model) -> tuple[Array, Array]:

@@ -112,7 +112,7 @@ class _World(WatchedObject):
                 ):
                     kept.append(values)
                 links.append(pb.getLinkStates(body, numbers, 0, 0, client))
-        found = {
+        contents = {
             _BODIES: bodies,
             **dict(zip(_JOINT, joints, strict=True)),
             "base poses": poses,
@@ -122,8 +122,8 @@ class _World(WatchedObject):
             "masses, frictions and dampings": dynamics,
             "constraints": pb.getNumConstraints(client),
         }
-        found |= pb.getPhysicsEngineParameters(client)
-        return {name: marshal.dumps(value, 2) for name, value in found.items()}
+        contents |= pb.getPhysicsEngineParameters(client)
+        return {name: marshal.dumps(value, 2) for name, value in contents.items()}
 
     def differing(self, before: Contents, now: Contents) -> list[str]:
         # Another body makes every list a longer one: that is not what changed.
@@ -149,14 +149,14 @@ class _Arrays(WatchedObject):
         machine = self._machine()
         if machine is None:
             return None
-        found = {name: getattr(machine, name).tobytes() for name in INPUTS}
-        found["time"] = marshal.dumps(machine.time, 2)
+        contents = {name: getattr(machine, name).tobytes() for name in INPUTS}
+        contents["time"] = marshal.dumps(machine.time, 2)
         # Not by asking the Data, which would compute what nobody has read.
         for name, value in machine.derived.items():
             whole = name in DERIVED
             parts = [value] if whole else [value.geom, value.dist, value.pos, value.force]
-            found[name] = b"".join(part.tobytes() for part in parts)
-        return found
+            contents[name] = b"".join(part.tobytes() for part in parts)
+        return contents
 
     def differing(self, before: Contents, now: Contents) -> list[str]:
         # What was never read is what a fresh Data says: zeros.

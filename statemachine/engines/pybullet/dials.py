@@ -134,12 +134,12 @@ class PybulletDials:
     def shapes(self) -> np.ndarray:
         """(nbody, 3) inertias that the engine takes from the shapes, in the file's axes."""
         raw = self.model.compiled
-        found = np.array(raw.body_inertia)
+        inertias = np.array(raw.body_inertia)
         with cast("PybulletData", self.model._make_data()) as data:
             world = data.raw
             for body, link, b in _links(world):
-                found[b] = pb.getDynamicsInfo(body, link, world.client)[2]
-        return found
+                inertias[b] = pb.getDynamicsInfo(body, link, world.client)[2]
+        return inertias
 
     @cached_property
     def frictions(self) -> np.ndarray:
@@ -292,7 +292,7 @@ def _set_limits(world: World, ranges: Mapping[int, tuple[float, float]] | None) 
 
 def _set_frictions(world: World, surfaces: Surfaces) -> None:
     for k, (body, link, _) in enumerate(world.solids()):
-        wanted = [float(each[k]) for each in (surfaces.slide, surfaces.roll, surfaces.spin)]
+        wanted = [float(friction[k]) for friction in (surfaces.slide, surfaces.roll, surfaces.spin)]
         _rub(world, body, link, wanted)
 
 
@@ -314,9 +314,9 @@ def _fresh_surfaces(world: World, plan: Plan) -> None:
     for body, link, _ in solids:
         _rub(world, body, link, [FRICTION, 0.0, 0.0])
     for (i, j), meet in plan.surfaces.pairs.items():
-        (body, link, one), (other, other_link, two) = solids[i], solids[j]
+        (body, link, solid), (other, other_link, other_solid) = solids[i], solids[j]
         # What never moves does not meet what never moves; of the rest, all that are two bodies.
-        moves = any(plan.raw.body_weldid[solid.body] for solid in (one, two))
+        moves = any(plan.raw.body_weldid[s.body] for s in (solid, other_solid))
         wanted = moves and body != other
         if wanted != meet:
             pb.setCollisionFilterPair(

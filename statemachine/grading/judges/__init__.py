@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 if TYPE_CHECKING:
     from ..answers import Answer
     from ..calls import Remark
-    from ..worlds import Scenes, World
+    from ..worlds import ExerciseWorld, Scenes
 
 # By the functions of the student's file, in the order in which they stand there.
 JUDGES = {
@@ -27,15 +27,15 @@ JUDGES = {
 class Judge(Protocol):
     """What a judge's module offers."""
 
-    def worlds(self, scenes: Scenes) -> list[World]:
+    def worlds(self, scenes: Scenes) -> list[ExerciseWorld]:
         """The worlds, the course's own first."""
         ...
 
-    def right(self, worlds: list[World]) -> list[Any]:
+    def right(self, worlds: list[ExerciseWorld]) -> list[Any]:
         """What is right on each of the worlds, worked out by us."""
         ...
 
-    def judge(self, answer: Answer, world: World, right: Any) -> list[Remark]:
+    def judge(self, answer: Answer, world: ExerciseWorld, right: Any) -> list[Remark]:
         """What is wrong with what it did there; or, in one remark that holds, what is right.
 
         Raises:

@@ -12,7 +12,7 @@ from ...interface import Array, Data, Model, forward, make_data
 from ..answers import Answer
 from ..calls import Remark
 from ..watch import Inputs
-from ..worlds import ELSEWHERE, Scenes, World
+from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from ._values import LIFT, TIP, address, grain, near, numbers, owner, parts, short_float, told_apart
 
 SCENE = "so101/scene"
@@ -37,12 +37,15 @@ class Tips:
     course: Array
 
 
-def worlds(scenes: Scenes) -> list[World]:
+def worlds(scenes: Scenes) -> list[ExerciseWorld]:
     """The course's scene; a crate before the arm, and the fingertip elsewhere."""
-    return [World("", scenes.ordinary(SCENE)), World(ELSEWHERE, scenes.crowded(SCENE))]
+    return [
+        ExerciseWorld("", scenes.ordinary(SCENE)),
+        ExerciseWorld(ELSEWHERE, scenes.crowded(SCENE)),
+    ]
 
 
-def right(worlds: list[World]) -> list[Tips]:
+def right(worlds: list[ExerciseWorld]) -> list[Tips]:
     """The readings on each."""
     first = _tips(worlds[0].model, None)
     return [first, *(_tips(world.model, first.readings) for world in worlds[1:])]
@@ -67,7 +70,7 @@ def _places(model: Model, data: Data) -> dict[str, Array]:
     return sites | {f"body {n!r}": data.xpos[k].copy() for k, n in enumerate(model.body_names)}
 
 
-def judge(answer: Answer, world: World, right: Tips) -> list[Remark]:
+def judge(answer: Answer, world: ExerciseWorld, right: Tips) -> list[Remark]:
     """The four readings, and that no time passed."""
     short = short_float(answer.result)
     tolerance = _SINGLE if short == "float32" else TOLERANCE
@@ -127,7 +130,7 @@ def _all_at_once(given: Array, answer: Answer, tips: Tips, tolerance: float) -> 
     return []
 
 
-def _why(k: int, given: Array, world: World, tips: Tips, answer: Answer) -> str:
+def _why(k: int, given: Array, world: ExerciseWorld, tips: Tips, answer: Answer) -> str:
     """What reading k is, as far as the run shows it."""
     right, found = tips.readings[k], given[k]
     away = f"{_mm(float(np.linalg.norm(found - right)))} away"

@@ -10,7 +10,7 @@ import numpy as np
 from ...interface import Array, Ints, make_data, step
 from ..answers import Answer
 from ..calls import Remark
-from ..worlds import ELSEWHERE, Scenes, World
+from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from ._values import LIFT, address, count, grain, listed, near, numbers, owner, parts, told_apart
 
 SCENE = "so101/scene"
@@ -22,7 +22,7 @@ _NO_STEP = "no step was taken with the model that you got"
 
 
 @dataclass(frozen=True)
-class Trace:
+class FallCurve:
     """qpos (steps + 1, nq), qvel (steps + 1, nv) and time (steps + 1,) [s] after each step."""
 
     qpos: Array
@@ -40,12 +40,12 @@ class Fall:
         course: (2, …) what is right on the course's own model, if this is another [degrees].
     """
 
-    on: Trace
-    off: Trace
+    on: FallCurve
+    off: FallCurve
     marks: Ints
     course: Array | None = None
 
-    def trace(self, limp: bool) -> Trace:
+    def trace(self, limp: bool) -> FallCurve:
         """With the servos off, or on."""
         return self.off if limp else self.on
 
@@ -54,18 +54,18 @@ class Fall:
         return np.degrees(self.trace(limp).qpos[self.marks, place])
 
 
-def worlds(scenes: Scenes) -> list[World]:
+def worlds(scenes: Scenes) -> list[ExerciseWorld]:
     """The course's scene; the Moon's gravity at another timestep; a crate before the arm."""
     course = scenes.ordinary(SCENE)
     moon = course.replace(gravity=_MOON, timestep=0.004)
     return [
-        World("", course, (4,)),
-        World("with the Moon's gravity and 4 ms a step", moon, (3,)),
-        World(ELSEWHERE, scenes.crowded(SCENE), (2,)),
+        ExerciseWorld("", course, (4,)),
+        ExerciseWorld("with the Moon's gravity and 4 ms a step", moon, (3,)),
+        ExerciseWorld(ELSEWHERE, scenes.crowded(SCENE), (2,)),
     ]
 
 
-def right(worlds: list[World]) -> list[Fall]:
+def right(worlds: list[ExerciseWorld]) -> list[Fall]:
     """The fall on each."""
     course = worlds[0].model
     first = _fall(worlds[0])
@@ -73,7 +73,7 @@ def right(worlds: list[World]) -> list[Fall]:
     return [first, *(_fall(world, usual) for world in worlds[1:])]
 
 
-def _fall(world: World, course: Array | None = None) -> Fall:
+def _fall(world: ExerciseWorld, course: Array | None = None) -> Fall:
     model, (seconds,) = world.model, world.arguments
     each = round(1 / model.timestep)
     traces = []
@@ -83,11 +83,11 @@ def _fall(world: World, course: Array | None = None) -> Fall:
             for _ in range((seconds + 1) * each):
                 step(variant, data)
                 moments.append((data.qpos.copy(), data.qvel.copy(), data.time))
-        traces.append(Trace(*(np.array(column) for column in zip(*moments, strict=True))))
+        traces.append(FallCurve(*(np.array(column) for column in zip(*moments, strict=True))))
     return Fall(traces[0], traces[1], np.arange(seconds + 1) * each, course)
 
 
-def judge(answer: Answer, world: World, right: Fall) -> list[Remark]:
+def judge(answer: Answer, world: ExerciseWorld, right: Fall) -> list[Remark]:
     """Both traces in degrees; ctrl untouched; the Model as it was."""
     remarks = _left(answer)
     pair = parts(answer.result, 2, "(on, off), two lists of degrees,")
@@ -128,7 +128,7 @@ def judge(answer: Answer, world: World, right: Fall) -> list[Remark]:
     ]
 
 
-def _why(given: list[Array], limp: bool, world: World, fall: Fall, answer: Answer) -> str:
+def _why(given: list[Array], limp: bool, world: ExerciseWorld, fall: Fall, answer: Answer) -> str:
     """What a wrong list is, where one mistake gives all of its numbers."""
     mine, other = given[limp], given[not limp]
     right = fall.degrees(limp, address(world.model))
@@ -153,7 +153,9 @@ def _is(given: Array, mistaken: Array, right: Array) -> bool:
     return telling and near(given, mistaken, slack + 1e-9 * float(abs(mistaken).max()))
 
 
-def _mistakes(limp: bool, world: World, fall: Fall, answer: Answer) -> Iterator[tuple[Array, str]]:
+def _mistakes(
+    limp: bool, world: ExerciseWorld, fall: Fall, answer: Answer
+) -> Iterator[tuple[Array, str]]:
     """What typical mistakes give, and what to say of them."""
     model, trace = world.model, fall.trace(limp)
     place, dof = address(model), int(model.jnt_dofadr[model.joint_id(LIFT)])
@@ -188,7 +190,7 @@ def _mistakes(limp: bool, world: World, fall: Fall, answer: Answer) -> Iterator[
             )
 
 
-def _goes_on(given: Array, other: Array, world: World, answer: Answer) -> str:
+def _goes_on(given: Array, other: Array, world: ExerciseWorld, answer: Answer) -> str:
     """Whether a run began where another had ended."""
     place = address(world.model)
     fresh = sum(abs(np.degrees(run.qpos[place])) <= TOLERANCE for run in answer.runs if run.own)
@@ -200,7 +202,7 @@ def _goes_on(given: Array, other: Array, world: World, answer: Answer) -> str:
     )
 
 
-def _late(given: Array, limp: bool, world: World, fall: Fall, answer: Answer) -> str:
+def _late(given: Array, limp: bool, world: ExerciseWorld, fall: Fall, answer: Answer) -> str:
     """Whether the list is right for other moments, to which one of the runs came."""
     place, marks, timestep = address(world.model), fall.marks, world.model.timestep
     trace = np.degrees(fall.trace(limp).qpos[:, place])
@@ -220,7 +222,7 @@ def _late(given: Array, limp: bool, world: World, fall: Fall, answer: Answer) ->
     return f": that is the arm {abs(found[0]) * timestep:g} s {word} (the first is at 0 s)"
 
 
-def _by_the_clock(given: Array, limp: bool, world: World, fall: Fall) -> str:
+def _by_the_clock(given: Array, limp: bool, world: ExerciseWorld, fall: Fall) -> str:
     """Whether it was stepped while data.time was below whole seconds, where that is a step off."""
     trace = fall.trace(limp)
     degrees = np.degrees(trace.qpos[:, address(world.model)])

@@ -9,8 +9,8 @@ import numpy as np
 from ...interface import Array, Model, make_data, reset
 from ..answers import Answer, kind
 from ..calls import Remark
-from ..watch import Nudge, Run
-from ..worlds import ELSEWHERE, Scenes, World
+from ..watch import EngineRun, Nudge
+from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from ._values import (
     address,
     count,
@@ -41,17 +41,17 @@ class Start:
     ctrl: Array
 
 
-def worlds(scenes: Scenes) -> list[World]:
+def worlds(scenes: Scenes) -> list[ExerciseWorld]:
     """The course's scene; fewer steps with a crate before the arm; runs that do end apart."""
     course = scenes.ordinary(SCENE)
     crowded = scenes.crowded(SCENE).replace(timestep=0.004)
     return [
-        World("", course, (np.array(_CTRL), 600)),
-        World(ELSEWHERE, crowded, (np.array(_OTHER), 150)),
+        ExerciseWorld("", course, (np.array(_CTRL), 600)),
+        ExerciseWorld(ELSEWHERE, crowded, (np.array(_OTHER), 150)),
         # One bit, in the middle and upwards, at the end and downwards: nearly equal, equal in
         # part, equal in sum and not smaller all pass for equal in one of the two.
         *(
-            World(
+            ExerciseWorld(
                 f"with {what} of the second run one bit off",
                 course,
                 (np.array(_CTRL), _STEPS),
@@ -65,7 +65,7 @@ def worlds(scenes: Scenes) -> list[World]:
     ]
 
 
-def right(worlds: list[World]) -> list[Start]:
+def right(worlds: list[ExerciseWorld]) -> list[Start]:
     """Where the runs begin on each."""
     return [_start(world.model) for world in worlds]
 
@@ -76,7 +76,7 @@ def _start(model: Model) -> Start:
         return Start(data.qpos.copy(), data.qvel.copy(), data.time, data.ctrl.copy())
 
 
-def judge(answer: Answer, world: World, right: Start) -> list[Remark]:
+def judge(answer: Answer, world: ExerciseWorld, right: Start) -> list[Remark]:
     """Two runs as asked for, what they ended in, and whether that is equal."""
     _, nstep = world.arguments
     same, *copies = parts(answer.result, 3, "(same, first, second)")
@@ -150,7 +150,7 @@ def _memory(answer: Answer) -> list[Remark]:
     return []
 
 
-def _runs(runs: tuple[Run, ...], world: World, start: Start) -> list[Remark]:
+def _runs(runs: tuple[EngineRun, ...], world: ExerciseWorld, start: Start) -> list[Remark]:
     """Whether there were two runs, each as it was asked for; the first fault of each kind."""
     _, nstep = world.arguments
     if not runs:
@@ -185,7 +185,7 @@ def _runs(runs: tuple[Run, ...], world: World, start: Start) -> list[Remark]:
     return [Remark(text) for text in found.values()]
 
 
-def _faults(run: Run, world: World, start: Start) -> dict[str, str]:
+def _faults(run: EngineRun, world: ExerciseWorld, start: Start) -> dict[str, str]:
     ctrl, nstep = world.arguments
     faults = {}
     if not (near(run.qpos, start.qpos, _START) and near(run.qvel, start.qvel, _START)):
@@ -224,7 +224,7 @@ def _faults(run: Run, world: World, start: Start) -> dict[str, str]:
     return faults
 
 
-def _ends(ends: list[Array], runs: tuple[Run, ...]) -> list[Remark]:
+def _ends(ends: list[Array], runs: tuple[EngineRun, ...]) -> list[Remark]:
     """Whether what was returned is what the runs ended in."""
     for name, given, run in zip(_COUNT, ends, runs, strict=True):
         if same_bits(given, run.end):

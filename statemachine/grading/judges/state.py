@@ -11,7 +11,7 @@ from typing import Any
 from ...interface import JointType, Model, make_data, reset
 from ..answers import Answer, kind
 from ..calls import FaultError, Remark
-from ..worlds import ELSEWHERE, Scenes, World
+from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from ._values import count, parts
 
 SCENE = "so101/scene_box"
@@ -20,7 +20,7 @@ Slot = tuple[int, int]  # from, and up to but not with
 
 
 @dataclass(frozen=True)
-class Layout:
+class ExpectedState:
     """What is right on one world: slots of qpos and of qvel by joint, time at keyframe 0 [s].
 
     `course_time` is that of the course's own scene.
@@ -31,15 +31,18 @@ class Layout:
     course_time: float
 
 
-def worlds(scenes: Scenes) -> list[World]:
+def worlds(scenes: Scenes) -> list[ExerciseWorld]:
     """The course's scene; a crate before the arm, and a keyframe with another time."""
-    return [World("", scenes.ordinary(SCENE)), World(ELSEWHERE, scenes.crowded(SCENE))]
+    return [
+        ExerciseWorld("", scenes.ordinary(SCENE)),
+        ExerciseWorld(ELSEWHERE, scenes.crowded(SCENE)),
+    ]
 
 
-def right(worlds: list[World]) -> list[Layout]:
+def right(worlds: list[ExerciseWorld]) -> list[ExpectedState]:
     """The layout of each."""
     usual = _time(worlds[0].model)
-    return [Layout(_slots(world.model), _time(world.model), usual) for world in worlds]
+    return [ExpectedState(_slots(world.model), _time(world.model), usual) for world in worlds]
 
 
 def _slots(model: Model) -> dict[str, tuple[Slot, Slot]]:
@@ -57,7 +60,7 @@ def _time(model: Model) -> float:
         return data.time
 
 
-def judge(answer: Answer, world: World, right: Layout) -> list[Remark]:
+def judge(answer: Answer, world: ExerciseWorld, right: ExpectedState) -> list[Remark]:
     """A pair of slices for every joint, and the time."""
     slots, time = parts(answer.result, 2, "(slots, time)")
     remarks = [*_names(slots, right), *_first_wrong(slots, right, world.model)]
@@ -74,7 +77,7 @@ def judge(answer: Answer, world: World, right: Layout) -> list[Remark]:
     ]
 
 
-def _names(slots: Any, layout: Layout) -> list[Remark]:
+def _names(slots: Any, layout: ExpectedState) -> list[Remark]:
     if not isinstance(slots, dict):
         raise FaultError(
             "slots: a dict {joint: (slice of qpos, slice of qvel)} is asked for; "
@@ -94,7 +97,7 @@ def _names(slots: Any, layout: Layout) -> list[Remark]:
     return []
 
 
-def _first_wrong(slots: dict[str, Any], layout: Layout, model: Model) -> list[Remark]:
+def _first_wrong(slots: dict[str, Any], layout: ExpectedState, model: Model) -> list[Remark]:
     """The first joint with a wrong slot, and why it may be."""
     for name, right in layout.slots.items():
         if name not in slots:
@@ -125,7 +128,7 @@ def _slot(value: Any, name: str, total: int) -> Slot:
     return (start + total if start < 0 else start), (stop + total if stop < 0 else stop)
 
 
-def _why(name: str, given: list[Slot], which: int, layout: Layout, model: Model) -> str:
+def _why(name: str, given: list[Slot], which: int, layout: ExpectedState, model: Model) -> str:
     right = layout.slots[name]
     number = model.joint_id(name)
     free = int(model.jnt_type[number]) == int(JointType.FREE)
@@ -154,7 +157,7 @@ def _why(name: str, given: list[Slot], which: int, layout: Layout, model: Model)
     return f"it begins elsewhere: see {table}, no arithmetic"
 
 
-def _clock(time: Any, layout: Layout, model: Model, stepped: bool) -> list[Remark]:
+def _clock(time: Any, layout: ExpectedState, model: Model, stepped: bool) -> list[Remark]:
     right = layout.time
     if not isinstance(time, Real) or isinstance(time, bool):
         return [Remark(f"time: a number of seconds is asked for; got {kind(time)}")]

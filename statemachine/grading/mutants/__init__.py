@@ -99,6 +99,4 @@ _ALL = (
     ),
 )
 MUTANTS = {mutant.name: mutant for mutant in _ALL}
-# Those whose adapters the faults are made for.
 FAULT = "STATEMACHINE_FAULT"  # the variable that names a fault to the plugin
-BACKENDS = ("mujoco", "pybullet")

@@ -7,7 +7,6 @@ the arm does; what the Model tells of itself (gravity, gains, friction) stays ri
 from __future__ import annotations
 
 import copy
-import importlib
 import random
 from collections.abc import Callable
 from contextlib import suppress
@@ -17,11 +16,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ...engines import part, rooms_with
 from ...errors import MissingEngineError
 from ...installed import require
 from ...interface import INPUTS, Array, Data, JointType, read_only
 from ...rotations import matrix_from_quat, xyzw_from_wxyz
-from . import BACKENDS
 
 
 class Patcher(Protocol):
@@ -39,10 +38,10 @@ Instead = Callable[..., Any]
 def _adapters() -> list[ModuleType]:
     """The modules of the backends whose engine is here."""
     found = []
-    for name in BACKENDS:
+    for name in rooms_with("mutants"):
         with suppress(MissingEngineError):
             require(name)
-            found.append(importlib.import_module(f"statemachine.backends.{name}_backend"))
+            found.append(part(name, "mutants").adapter)
     return found
 
 

@@ -22,8 +22,10 @@ import pytest
 
 import statemachine as sm
 
+from ...engines import rooms_with
+from ...installed import DEFAULT
 from ..guard import Guard
-from . import BACKENDS, FAULT
+from . import FAULT
 
 if TYPE_CHECKING:
     from statemachine import Data, Model
@@ -36,7 +38,9 @@ _LONGEST = 300  # characters of what an error says
 def pytest_addoption(parser: pytest.Parser) -> None:
     """The options with which `run` starts it."""
     group = parser.getgroup("statemachine")
-    group.addoption("--engine", choices=BACKENDS, default=BACKENDS[0], help="backend of `model`")
+    group.addoption(
+        "--engine", choices=rooms_with("mutants"), default=DEFAULT, help="backend of `model`"
+    )
     group.addoption("--record", metavar="FILE", help="write down there what happens")
 
 
@@ -47,7 +51,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if name := os.environ.pop(FAULT, ""):
         FAULTS[name](pytest.MonkeyPatch())  # for the life of the process
     if path := config.getoption("record"):
-        config.pluginmanager.register(Recorder(Path(path)))
+        config.pluginmanager.register(PytestRecorder(Path(path)))
         os.chdir(Path(path).parent)  # what tests write does not end up beside them
         sm.load(
             SCENE, backend=str(config.getoption("engine"))
@@ -74,7 +78,7 @@ def data(model: Model) -> Iterator[Data]:
         yield data
 
 
-class Recorder:
+class PytestRecorder:
     """Writes down what was found, what began and how it ended.
 
     Lines: {"ready": true} once the fault is in, {"tests": names}, {"began": name},

@@ -19,12 +19,13 @@ from pathlib import Path
 from typing import Any
 
 from ...backends import backend_names
+from ...engines import rooms_with
 from ...errors import BadInputError, EngineError, MissingEngineError, ModelFileError, unknown_name
-from ...installed import engine_version, require
+from ...installed import DEFAULT, engine_version, require
 from .. import sandbox
 from ..recording import content
 from ..unwinding import unwinding
-from . import BACKENDS, FAULT, MUTANTS, Mutant
+from . import FAULT, MUTANTS, Mutant
 
 _SECONDS = 60.0  # of computing, for the tests on the healthy arm
 _CLOCK = 300.0  # on the clock: the machine may be busy with others
@@ -44,7 +45,7 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class Trial:
+class MutantTrial:
     """A mutant, and the tests that caught it."""
 
     mutant: Mutant
@@ -73,7 +74,7 @@ class Examination:
     engine_version: str
     tests: tuple[str, ...]
     failures: tuple[Failure, ...]
-    trials: tuple[Trial, ...]
+    trials: tuple[MutantTrial, ...]
 
     @property
     def caught(self) -> int:
@@ -99,7 +100,7 @@ class Examination:
 
 def examine(
     file: str | os.PathLike[str],
-    backend: str = "mujoco",
+    backend: str = DEFAULT,
     only: Sequence[str] = (),
     seconds: float = _SECONDS,
     clock: float = _CLOCK,
@@ -144,7 +145,7 @@ def _examine(
     if not healthy.tests:
         reason = "each was skipped" if healthy.skipped else "a test is a function test_…"
         raise BadInputError(f"there are no tests in {path.name}: {reason}")
-    trials: dict[str, Trial] = {}
+    trials: dict[str, MutantTrial] = {}
     if not healthy.failures:
         progress(1 / (len(mutants) + 1))
         patience = _TIMES * healthy.cpu + _AND, _TIMES * healthy.wall + _CLOCK_AND
@@ -156,7 +157,7 @@ def _examine(
             }
             for done in as_completed(running):
                 mutant = running[done]
-                trials[mutant.name] = Trial(mutant, done.result().failures)
+                trials[mutant.name] = MutantTrial(mutant, done.result().failures)
                 progress((len(trials) + 1) / (len(mutants) + 1))
         finally:  # after an interrupt nothing goes on
             stop.set()
@@ -188,11 +189,12 @@ def _mutant(name: str) -> Mutant:
 
 def _ready(backend: str) -> str:
     """The version of the backend's engine; raises where the tests could not even begin."""
+    known = rooms_with("mutants")
     if backend not in backend_names():
-        raise unknown_name("backend", backend, BACKENDS)
-    if backend not in BACKENDS:
+        raise unknown_name("backend", backend, known)
+    if backend not in known:
         raise BadInputError(
-            f"the faults are made for {' and '.join(BACKENDS)}, not for backend {backend!r}"
+            f"the faults are made for {' and '.join(known)}, not for backend {backend!r}"
         )
     require(backend)
     if importlib.util.find_spec("pytest") is None:
@@ -261,7 +263,7 @@ def _environment() -> dict[str, str]:
     }
 
 
-def _read(record: Path, outcome: sandbox.Outcome, seconds: float, clock: float) -> _Record:
+def _read(record: Path, outcome: sandbox.ProcessOutcome, seconds: float, clock: float) -> _Record:
     tests: list[str] | None = None
     ready = False
     running, broken = "", ""
@@ -314,7 +316,7 @@ def _lines(record: Path) -> Iterator[Any]:
             yield None
 
 
-def _end(outcome: sandbox.Outcome, seconds: float, clock: float) -> str:
+def _end(outcome: sandbox.ProcessOutcome, seconds: float, clock: float) -> str:
     """How a run ended that did not come to its end."""
     if outcome.out_of_cpu:
         return f"took longer than {seconds:.0f} s of computing"

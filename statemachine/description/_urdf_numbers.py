@@ -7,9 +7,9 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from ...errors import ModelError
-from ...interface import Array
-from .description import HERE, Placement
+from ..errors import ModelError
+from ..interface import Array
+from .records import HERE, Placement
 
 
 def origin(element: Element, where: str) -> Placement:

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..backends import load
-from ..drawing import Part, drawing_of
-from ..installed import require
-from ..interface import Array
-from ..rotations import xyzw_from_wxyz
-from ..silence import silence
-from .camera import Camera
-from .compose import GHOST, Shot
+from ...backends import load
+from ...drawing import Part, drawing_of
+from ...drawing.camera import Camera
+from ...drawing.shots import GHOST, Drawer, Shot
+from ...installed import require
+from ...interface import Array
+from ...rotations import xyzw_from_wxyz
+from ...silence import silence
 
 _MOST = 20_000  # faces of one shape; PyBullet takes 131072 vertices
 _TILE = 0.1  # [m] of a floor without an end, laid out so that its perspective is seen
@@ -24,14 +24,34 @@ _TILES = 12  # each way from the middle
 _LIGHT = (0.4, -0.6, 1.5)
 _SKY = np.array([[196.0, 208.0, 220.0], [240.0, 243.0, 246.0]])  # above, and at the horizon
 
+SHARPER = 1  # it has no time for smooth edges
+
+
+def here() -> str:
+    """Nothing that it needs beside itself.
+
+    Raises:
+        MissingEngineError: It is not installed here.
+    """
+    require("pybullet")
+    return ""
+
+
+def label(_opengl: str) -> str:
+    """What a reader is told of what draws."""
+    return "PyBullet's software renderer"
+
+
+def drawer(files: Sequence[Path], size: tuple[int, int], camera: Camera) -> Drawer:
+    """Connect to a world for each side; see `BulletFrames`."""
+    return BulletFrames(files, size, camera)
+
 
 class BulletFrames:
     """Draws the bodies of one or two models wherever they are told to be."""
 
-    SHARPER = 1  # it has no time for smooth edges
-
     def __init__(self, files: Sequence[Path], size: tuple[int, int], camera: Camera) -> None:
-        """Connect to a world for each side; as `MujocoFrames`."""
+        """Connect to a world for each side; the arguments are those of `drawer`."""
         pb = require("pybullet")
         self._pb, self._size, self._camera = pb, size, camera
         self._clients: list[int] = []

@@ -8,8 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ...errors import UnsupportedError
-from ...interface import (
+from ..engines.auditing import Disturbance, Driver, Measured, Restore, SaveMethod, SavePoint
+from ..engines.futures import Coordinates, coordinates_of
+from ..errors import UnsupportedError
+from ..interface import (
     DERIVED,
     INPUTS,
     Array,
@@ -23,9 +25,6 @@ from ...interface import (
     set_state,
     step,
 )
-from ..findings import Layout, layout_of
-from ..points import Point
-from ._driver import Driver, Look, Restore, Seen, Way
 
 
 class InterfaceDriver(Driver):
@@ -42,10 +41,10 @@ class InterfaceDriver(Driver):
         self.name = f"this interface on {model.backend}"
 
     @cached_property
-    def layout(self) -> Layout:
-        return layout_of(self.model)
+    def coordinates(self) -> Coordinates:
+        return coordinates_of(self.model)
 
-    def fresh(self, point: Point) -> Data:
+    def fresh(self, point: SavePoint) -> Data:
         return make_data(point.model)
 
     def close(self, machine: Data) -> None:
@@ -54,7 +53,7 @@ class InterfaceDriver(Driver):
     def reset(self, machine: Data) -> None:
         reset(machine.model, machine)
 
-    def start(self, machine: Data, point: Point) -> None:
+    def start(self, machine: Data, point: SavePoint) -> None:
         machine.qpos, machine.qvel, machine.ctrl = point.qpos, point.qvel, point.ctrl
 
     def command(self, machine: Data, ctrl: Array) -> None:
@@ -69,46 +68,46 @@ class InterfaceDriver(Driver):
     def time(self, machine: Data) -> float:
         return machine.time
 
-    def _see(self, point: Point) -> Seen:
+    def _measure(self, point: SavePoint) -> Measured:
         with self.at(point) as machine:
             forward(machine.model, machine)
             speed = float(np.abs(machine.qvel).max(initial=0.0))
             contacts = len(machine.contacts)
-            return Seen(point.name, point.how, machine.time, contacts, None, speed)
+            return Measured(point.name, point.how, machine.time, contacts, None, speed)
 
-    def ways(self, point: Point) -> tuple[Way, ...]:
+    def save_methods(self, point: SavePoint) -> tuple[SaveMethod, ...]:
         exact = point.model.capabilities.exact_restore
         return (
             _written("qpos", "qvel"),
             _written("qpos", "qvel", "ctrl", "time"),
-            Way("get_state, set_state", _state, promised=exact, agree=True),
+            SaveMethod("get_state, set_state", _state, promised=exact, agree=True),
         )
 
-    def looks(self, point: Point) -> tuple[Look, ...]:
+    def disturbances(self, point: SavePoint) -> tuple[Disturbance, ...]:
         def ask(machine: Data) -> None:
             forward(machine.model, machine)
             _read_all(machine)
 
         return (
-            Look("forward", lambda machine: forward(machine.model, machine)),
-            Look("reading what is derived", _read_all),
-            Look("forward, then reading", ask),
-            Look("get_state", lambda machine: get_state(machine.model, machine)),
+            Disturbance("forward", lambda machine: forward(machine.model, machine)),
+            Disturbance("reading what is derived", _read_all),
+            Disturbance("forward, then reading", ask),
+            Disturbance("get_state", lambda machine: get_state(machine.model, machine)),
         )
 
-    def state(self, point: Point) -> State:
+    def state(self, point: SavePoint) -> State:
         """The State at a save point, to be put into a Data elsewhere."""
         with self.at(point) as machine:
             return get_state(machine.model, machine)
 
-    def future(self, point: Point, state: State, steps: int) -> Array:
+    def future(self, point: SavePoint, state: State, steps: int) -> Array:
         """What follows from a State in a new Data."""
         with self.new(point) as machine:
             set_state(machine.model, machine, state)
             return self.drive(machine, point, steps)
 
 
-def _written(*names: str) -> Way:
+def _written(*names: str) -> SaveMethod:
     @contextmanager
     def save(machine: Data) -> Iterator[Restore]:
         kept = {name: np.array(getattr(machine, name)) for name in names}
@@ -119,7 +118,7 @@ def _written(*names: str) -> Way:
 
         yield restore
 
-    return Way(" ".join(names), save)
+    return SaveMethod(" ".join(names), save)
 
 
 @contextmanager

@@ -10,22 +10,22 @@ from typing import Any
 
 import numpy as np
 
+from ...description.meshes import volume_of
+from ...description.records import (
+    CollisionShape,
+    Inertial,
+    Link,
+    NamedFrame,
+    Placement,
+    Robot,
+    RobotJoint,
+    Setting,
+    moved,
+)
 from ...installed import require
 from ...interface import Array
 from ...rotations import matrix_from_quat
-from . import _mjcf_drives as drives
-from .description import (
-    Frame,
-    Inertial,
-    Joint,
-    Link,
-    Placement,
-    Robot,
-    Setting,
-    Shape,
-)
-from .meshes import volume_of
-from .tree import moved
+from . import _description_drives as drives
 
 _JOINTS = ("free", "ball", "slide", "hinge")  # mjtJoint, in its order
 _NUMBERS = (  # of the options, those that change what is computed
@@ -46,7 +46,7 @@ _NUMBERS = (  # of the options, those that change what is computed
 _CONTACT = ("condim", "priority", "solref", "solimp", "solmix", "margin", "gap")
 
 
-def read(raw: Any, name: str, reader: str, form: str) -> Robot:
+def description_of(raw: Any, name: str, reader: str, form: str) -> Robot:
     """The description in a compiled model.
 
     Args:
@@ -70,7 +70,7 @@ def read(raw: Any, name: str, reader: str, form: str) -> Robot:
         format=form,
         links=tuple(links),
         frames=tuple(
-            Frame(
+            NamedFrame(
                 site or f"site {i}",
                 bottom[int(raw.site_bodyid[i])],
                 _place(raw.site_pos[i], raw.site_quat[i]),
@@ -137,11 +137,11 @@ def _inertial(raw: Any, body: int) -> Inertial | None:
     return Inertial(float(raw.body_mass[body]), np.array(raw.body_ipos[body]), tensor)
 
 
-def _joint(raw: Any, joint: int, body: str) -> Joint:
+def _joint(raw: Any, joint: int, body: str) -> RobotJoint:
     dof, kind = int(raw.jnt_dofadr[joint]), _JOINTS[int(raw.jnt_type[joint])]
     spring = int(raw.jnt_qposadr[joint])
     scalar = kind in ("slide", "hinge")
-    return Joint(
+    return RobotJoint(
         name=raw.joint(joint).name or f"the joint of {body}",
         kind=kind,
         axis=np.array(raw.jnt_axis[joint]),
@@ -168,7 +168,7 @@ def _follows(raw: Any, joint: int) -> tuple[str, float, float] | None:
     return None
 
 
-def _shapes(mujoco: Any, raw: Any, body: int) -> tuple[Shape, ...]:
+def _shapes(mujoco: Any, raw: Any, body: int) -> tuple[CollisionShape, ...]:
     start = int(raw.body_geomadr[body])
     geoms = range(start, start + int(raw.body_geomnum[body]))
     return tuple(
@@ -176,7 +176,7 @@ def _shapes(mujoco: Any, raw: Any, body: int) -> tuple[Shape, ...]:
     )
 
 
-def _shape(mujoco: Any, raw: Any, geom: int) -> Shape:
+def _shape(mujoco: Any, raw: Any, geom: int) -> CollisionShape:
     kind = mujoco.mjtGeom(int(raw.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
     counts = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
     size = tuple(map(float, raw.geom_size[geom][: counts.get(kind, 0)]))
@@ -187,7 +187,7 @@ def _shape(mujoco: Any, raw: Any, geom: int) -> Shape:
         points = np.array(raw.mesh_vert[first : first + raw.mesh_vertnum[mesh]], dtype=np.float64)
         triangles = points[raw.mesh_face[faces : faces + raw.mesh_facenum[mesh]]]
     touch = _touch(raw, geom)
-    return Shape(
+    return CollisionShape(
         kind=kind,
         place=_place(raw.geom_pos[geom], raw.geom_quat[geom]),
         size=size,

@@ -16,16 +16,29 @@ import numpy as np
 
 from ...installed import require
 from ...interface import Array, JointType, Model, make_data
-from ..findings import Layout
-from ..points import Point
-from . import _pybullet_saves as saves
-from ._driver import Driver, Hiding, Look, Restore, Save, Seen, Way
-from ._pybullet_saves import Client
+from ..auditing import (
+    Disturbance,
+    Driver,
+    HiddenState,
+    Measured,
+    Restore,
+    Save,
+    SaveMethod,
+    SavePoint,
+)
+from ..futures import Coordinates
+from . import _audit_saves as saves
+from ._audit_saves import Client
 
 _RETARGET = 0.2  # what a target is changed by, to see whether a restore brings it back [rad or m]
 _PUSH = 5.0  # of a force that waits for the next step [N]
 _BEST = "written + targets"  # all that can be read and written
 _SLIPPERY = 0.05  # a friction that the model does not have
+
+
+def driver(model: Model, seed: int) -> Driver:
+    """The engine itself, to be audited with a model; `seed`: of what it does of its own."""
+    return PybulletDriver(model, seed)
 
 
 class PybulletDriver(Driver):
@@ -52,14 +65,14 @@ class PybulletDriver(Driver):
             if joint >= 0
         }
 
-    def lacks(self, point: Point) -> str:
+    def lacks(self, point: SavePoint) -> str:
         limits = point.model.capabilities.behaviours["joint limits"]
         if not point.at_limit or limits.support == "native":
             return ""
         return f"joint limits are {limits.support} ({limits.note})"
 
     @cached_property
-    def layout(self) -> Layout:
+    def coordinates(self) -> Coordinates:
         """Joints, tree by tree; then position and quaternion of each free base."""
         model = self.model
         slides = set(model.jnt_dofadr[model.jnt_type == int(JointType.SLIDE)].tolist())
@@ -77,15 +90,15 @@ class PybulletDriver(Driver):
                 lengths += range(at, at + 3)
                 quats.append(at + 3)
                 at += 7
-        return Layout(tuple(angles), tuple(lengths), tuple(quats))
+        return Coordinates(tuple(angles), tuple(lengths), tuple(quats))
 
-    def fresh(self, point: Point) -> Client:
+    def fresh(self, point: SavePoint) -> Client:
         return Client(make_data(point.model))
 
     def close(self, machine: Client) -> None:
         machine.data.close()
 
-    def start(self, machine: Client, point: Point) -> None:
+    def start(self, machine: Client, point: SavePoint) -> None:
         machine.world.put(point.qpos, point.qvel)
         if point.powered:
             self.command(machine, point.ctrl)
@@ -128,11 +141,11 @@ class PybulletDriver(Driver):
     def time(self, machine: Client) -> float:
         return machine.time
 
-    def _see(self, point: Point) -> Seen:
+    def _measure(self, point: SavePoint) -> Measured:
         with self.at(point) as machine:
-            speeds = self.read(machine)[self.layout.width :]
+            speeds = self.read(machine)[self.coordinates.width :]
             points = self.pb.getContactPoints(physicsClientId=machine.id)
-            return Seen(
+            return Measured(
                 point.name,
                 point.how,
                 machine.time,
@@ -141,14 +154,14 @@ class PybulletDriver(Driver):
                 float(np.abs(speeds).max(initial=0.0)),
             )
 
-    def ways(self, point: Point) -> tuple[Way, ...]:
+    def save_methods(self, point: SavePoint) -> tuple[SaveMethod, ...]:
         """The engine's ways with and without what its user must add: targets and time."""
         return (
-            Way("written", self._way(saves.written, known=False)),
-            Way(_BEST, self._way(saves.written)),
-            Way("saveState + targets", self._way(saves.in_memory), travels=False),
-            Way("saveBullet + targets", self._way(saves.in_a_file)),
-            Way("taken apart + targets", self._way(saves.taken_apart)),
+            SaveMethod("written", self._way(saves.written, known=False)),
+            SaveMethod(_BEST, self._way(saves.written)),
+            SaveMethod("saveState + targets", self._way(saves.in_memory), travels=False),
+            SaveMethod("saveBullet + targets", self._way(saves.in_a_file)),
+            SaveMethod("taken apart + targets", self._way(saves.taken_apart)),
         )
 
     def _way(self, save: Callable[[Any, Client], Iterator[Restore]], known: bool = True) -> Save:
@@ -171,17 +184,17 @@ class PybulletDriver(Driver):
 
         return whole
 
-    def hides(self, point: Point) -> Hiding:
+    def hidden_state(self, point: SavePoint) -> HiddenState:
         """What the engine's ways forget, each way without what its user must add."""
         ways = {
             "written": self._way(saves.written, known=False),
             "saveState": self._way(saves.in_memory, known=False),
             "saveBullet": self._way(saves.in_a_file, known=False),
         }
-        best = Way(_BEST, self._way(saves.written))
-        return Hiding(ways, self._changes(point), partial(saves.let_pass, self.pb), best)
+        best = SaveMethod(_BEST, self._way(saves.written))
+        return HiddenState(ways, self._changes(point), partial(saves.let_pass, self.pb), best)
 
-    def _changes(self, point: Point) -> dict[str, Callable[[Client], None]]:
+    def _changes(self, point: SavePoint) -> dict[str, Callable[[Client], None]]:
         pb = self.pb
 
         def motor_targets(machine: Client) -> None:
@@ -207,7 +220,7 @@ class PybulletDriver(Driver):
             found.pop("motor targets")
         return found
 
-    def looks(self, point: Point) -> tuple[Look, ...]:
+    def disturbances(self, point: SavePoint) -> tuple[Disturbance, ...]:
         pb = self.pb
 
         def links(machine: Client) -> None:
@@ -232,11 +245,11 @@ class PybulletDriver(Driver):
             pb.removeState(state, physicsClientId=machine.id)
 
         return (
-            Look("getLinkState, forward kinematics", links),
-            Look("getContactPoints", lambda m: pb.getContactPoints(physicsClientId=m.id)),
-            Look("inverse dynamics, mass matrix", dynamics),
-            Look("saveState", save),
-            Look(
+            Disturbance("getLinkState, forward kinematics", links),
+            Disturbance("getContactPoints", lambda m: pb.getContactPoints(physicsClientId=m.id)),
+            Disturbance("inverse dynamics, mass matrix", dynamics),
+            Disturbance("saveState", save),
+            Disturbance(
                 "performCollisionDetection",
                 lambda m: pb.performCollisionDetection(m.id),
                 promised=False,

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...interface import Array
-from .description import Shape
+from ..interface import Array
+from .records import CollisionShape
 
 _LARGEST = 256 * 2**20  # bytes
 
@@ -104,7 +104,7 @@ def volume_of(kind: str, size: tuple[float, ...], triangles: Array | None = None
     return None
 
 
-def extent(shape: Shape, direction: Array) -> float | None:
+def extent(shape: CollisionShape, direction: Array) -> float | None:
     """How far a shape reaches from its link's origin in a direction (3,) [m]; None: unknown."""
     own = shape.place.mat.T @ direction
     start = float(shape.place.pos @ direction)
@@ -123,7 +123,7 @@ def extent(shape: Shape, direction: Array) -> float | None:
     return None if shape.points is None else start + float((shape.points @ own).max())
 
 
-def with_capsules(shapes: Sequence[Shape]) -> tuple[Shape, ...]:
+def with_capsules(shapes: Sequence[CollisionShape]) -> tuple[CollisionShape, ...]:
     """A cylinder with a sphere on each end is the capsule that the format has no word for."""
     found = list(shapes)
     for cylinder in shapes:
@@ -137,7 +137,7 @@ def with_capsules(shapes: Sequence[Shape]) -> tuple[Shape, ...]:
     return tuple(found)
 
 
-def _ends(cylinder: Shape, shapes: Sequence[Shape]) -> Iterator[Shape]:
+def _ends(cylinder: CollisionShape, shapes: Sequence[CollisionShape]) -> Iterator[CollisionShape]:
     radius, half = cylinder.size
     for sign in (-1, 1):
         end = cylinder.place.of(np.array([0.0, 0.0, sign * half]))

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ...description.records import Actuator, Range
 from ...interface import Array
-from .description import Actuator, Range
 
 _HINGE = 3  # mjtJoint
 

@@ -7,14 +7,15 @@ something else than zero.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from ...interface import Array
-from ...rotations import angle_between
+from ..interface import Array
+from ..rotations import angle_between
 
 Range = tuple[float, float]
 
@@ -60,7 +61,7 @@ class Inertial:
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class CollisionShape:
     """What a link touches with.
 
     Attributes:
@@ -85,7 +86,7 @@ class Shape:
 
 
 @dataclass(frozen=True, eq=False)
-class Joint:
+class RobotJoint:
     """How a link moves against its parent.
 
     Attributes:
@@ -98,7 +99,7 @@ class Joint:
         armature: Inertia of the rotor as the joint feels it [kg m² or kg].
         damping: [N·m·s/rad or N·s/m]; friction: dry friction [N·m or N].
         stiffness: Of a spring in it; rest: where that is slack.
-        follows: Joint, factor and offset where it mimics another.
+        follows: RobotJoint, factor and offset where it mimics another.
     """
 
     name: str
@@ -132,13 +133,13 @@ class Link:
     name: str
     parent: str
     place: Placement
-    joint: Joint | None
+    joint: RobotJoint | None
     inertial: Inertial | None
-    shapes: tuple[Shape, ...] = ()
+    shapes: tuple[CollisionShape, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class NamedFrame:
     """A named frame that a link carries: `place` in the link's frame."""
 
     name: str
@@ -195,7 +196,7 @@ class Robot:
     reader: str
     format: str
     links: tuple[Link, ...]
-    frames: tuple[Frame, ...]
+    frames: tuple[NamedFrame, ...]
     actuators: tuple[Actuator, ...] | None
     settings: Mapping[str, Setting] | None
     rooted: bool
@@ -204,6 +205,23 @@ class Robot:
     touch: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property
-    def joints(self) -> tuple[Joint, ...]:
+    def joints(self) -> tuple[RobotJoint, ...]:
         """All joints, in the order of the links."""
         return tuple(link.joint for link in self.links if link.joint)
+
+
+def moved(joint: RobotJoint | None, amount: float) -> Placement:
+    """Where a joint takes its link at a position, in the frame that the link has at zero."""
+    if joint is None or not amount or joint.kind not in ("hinge", "slide"):
+        return HERE
+    if joint.kind == "slide":
+        return Placement(joint.axis * amount, np.eye(3))
+    mat = rotation(joint.axis, amount)
+    return Placement(joint.anchor - mat @ joint.anchor, mat)
+
+
+def rotation(axis: Array, angle: float) -> Array:
+    """Rotation matrix about a unit axis (Rodrigues)."""
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross

@@ -13,9 +13,8 @@ import numpy as np
 
 from ...installed import require
 from ...interface import Array, Model
-from ..findings import Layout, layout_of
-from ..points import Point
-from ._driver import ONLY, Driver, Look, Restore, Seen, Way
+from ..auditing import ONLY, Disturbance, Driver, Measured, Restore, SaveMethod, SavePoint
+from ..futures import Coordinates, coordinates_of
 
 # What another past may have left in them, as a part of the weight or inertia that it acts on.
 _PUSH = 0.1
@@ -28,6 +27,11 @@ class Simulation:
 
     model: Any
     data: Any
+
+
+def driver(model: Model, seed: int) -> Driver:
+    """The engine itself, to be audited with a model; `seed`: of what it does of its own."""
+    return MujocoDriver(model, seed)
 
 
 class MujocoDriver(Driver):
@@ -56,10 +60,10 @@ class MujocoDriver(Driver):
         }
 
     @cached_property
-    def layout(self) -> Layout:
-        return layout_of(self.model)
+    def coordinates(self) -> Coordinates:
+        return coordinates_of(self.model)
 
-    def fresh(self, point: Point) -> Simulation:
+    def fresh(self, point: SavePoint) -> Simulation:
         return Simulation(point.model.raw, self.mj.MjData(point.model.raw))
 
     def close(self, machine: Simulation) -> None:
@@ -68,7 +72,7 @@ class MujocoDriver(Driver):
     def reset(self, machine: Simulation) -> None:
         self.mj.mj_resetData(machine.model, machine.data)
 
-    def start(self, machine: Simulation, point: Point) -> None:
+    def start(self, machine: Simulation, point: SavePoint) -> None:
         data = machine.data
         data.qpos[:], data.qvel[:], data.ctrl[:] = point.qpos, point.qvel, point.ctrl
 
@@ -84,7 +88,7 @@ class MujocoDriver(Driver):
     def time(self, machine: Simulation) -> float:
         return float(machine.data.time)
 
-    def soil(self, machine: Simulation, point: Point) -> None:
+    def leave_traces(self, machine: Simulation, point: SavePoint) -> None:
         """Every component that stepping does not change is left at something else."""
         model, data = machine.model, machine.data
         rng = np.random.default_rng(self.seed + 2)
@@ -97,11 +101,11 @@ class MujocoDriver(Driver):
         data.userdata[:] += 1.0
         data.eq_active[:] = 1 - data.eq_active
 
-    def _see(self, point: Point) -> Seen:
+    def _measure(self, point: SavePoint) -> Measured:
         with self.at(point) as machine:
             self.mj.mj_forward(machine.model, machine.data)
             data, kind = machine.data, self.mj.mjtConstraint
-            return Seen(
+            return Measured(
                 point.name,
                 point.how,
                 float(data.time),
@@ -110,7 +114,7 @@ class MujocoDriver(Driver):
                 float(np.abs(data.qvel).max(initial=0.0)),
             )
 
-    def ways(self, point: Point) -> tuple[Way, ...]:
+    def save_methods(self, point: SavePoint) -> tuple[SaveMethod, ...]:
         """Parts of the integration state, then all of it but one component."""
         state = self.mj.mjtState
         qpos, qvel = int(state.mjSTATE_QPOS), int(state.mjSTATE_QVEL)
@@ -126,17 +130,17 @@ class MujocoDriver(Driver):
         }
         return (
             *(self.way(name, spec) for name, spec in candidates.items()),
-            Way("mj_copyData", self._copied),
+            SaveMethod("mj_copyData", self._copied),
             *(
                 self.way(f"INTEGRATION without {name}", self.whole & ~bit, name)
                 for name, bit in self.fields.items()
             ),
         )
 
-    def only(self, fields: tuple[str, ...]) -> Way:
+    def only(self, fields: tuple[str, ...]) -> SaveMethod:
         return self.way(ONLY, sum(self.fields[name] for name in fields))
 
-    def way(self, name: str, spec: int, left_out: str = "") -> Way:
+    def way(self, name: str, spec: int, left_out: str = "") -> SaveMethod:
         """The candidate of a mask of components."""
 
         @contextmanager
@@ -144,7 +148,7 @@ class MujocoDriver(Driver):
             kept = self.saved(machine, spec)
             yield lambda other: self.mj.mj_setState(other.model, other.data, kept, spec)
 
-        return Way(name, save, left_out)
+        return SaveMethod(name, save, left_out)
 
     def saved(self, machine: Simulation, spec: int) -> Array:
         """The components of a mask, as the engine gives them."""
@@ -158,7 +162,7 @@ class MujocoDriver(Driver):
         self.mj.mj_copyData(kept, machine.model, machine.data)
         yield lambda other: self.mj.mj_copyData(other.data, other.model, kept)
 
-    def looks(self, point: Point) -> tuple[Look, ...]:
+    def disturbances(self, point: SavePoint) -> tuple[Disturbance, ...]:
         mj = self.mj
 
         def halves(machine: Simulation) -> None:
@@ -168,18 +172,18 @@ class MujocoDriver(Driver):
         # The engine's manual keeps the two halves for integrators of one stage.
         one_stage = int(point.model.raw.opt.integrator) != int(mj.mjtIntegrator.mjINT_RK4)
         return (
-            Look("mj_forward", lambda m: mj.mj_forward(m.model, m.data)),
-            Look("mj_inverse", lambda m: mj.mj_inverse(m.model, m.data), promised=False),
-            Look("mj_getState", lambda m: self.saved(m, self.whole)),
-            Look("mj_step1, mj_step2 for mj_step", halves, promised=one_stage, instead=True),
+            Disturbance("mj_forward", lambda m: mj.mj_forward(m.model, m.data)),
+            Disturbance("mj_inverse", lambda m: mj.mj_inverse(m.model, m.data), promised=False),
+            Disturbance("mj_getState", lambda m: self.saved(m, self.whole)),
+            Disturbance("mj_step1, mj_step2 for mj_step", halves, promised=one_stage, instead=True),
         )
 
-    def pools(self) -> dict[str, Callable[[Point, int], list[Array]]]:
+    def pools(self) -> dict[str, Callable[[SavePoint, int], list[Array]]]:
         """The engine's own ways to run several simulations at once, on threads."""
         on = f"{_THREADS} threads"
         return {f"mujoco.rollout, {on}": self._rollout, f"mujoco.batch, {on}": self._batch}
 
-    def _rollout(self, point: Point, steps: int) -> list[Array]:
+    def _rollout(self, point: SavePoint, steps: int) -> list[Array]:
         state, user = self.mj.mjtState, int(self.mj.mjtState.mjSTATE_USER)
         model = point.model.raw
         with self.at(point) as machine:
@@ -198,7 +202,7 @@ class MujocoDriver(Driver):
         width = len(first)
         return [np.vstack((first, each[:, before : before + width])) for each in out]
 
-    def _batch(self, point: Point, steps: int) -> list[Array]:
+    def _batch(self, point: SavePoint, steps: int) -> list[Array]:
         batch = import_module("mujoco.batch").Batch(point.model.raw, _SEVERAL, _THREADS)
         with self.at(point) as machine:
             batch.state[:] = self.saved(machine, self.whole)

@@ -7,17 +7,21 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from ...errors import DivergedError
-from ...interface import Array, Model
-from ..findings import Finding, Gap, Layer, Layout, gap, worst
-from ..points import Point
+from ..errors import DivergedError
+from ..interface import Array, Model
+from .futures import Coordinates, FutureGap, gap, worst
+
+Layer = Literal["engine", "interface"]
 
 _AFTERWARDS = 50  # steps of another past beyond the save point
 _OTHERWISE = 0.1  # how far its command is from the point's [rad or m]
+
+STIR = 0.3  # how far a command is from that of rest [rad or m], where the range allows it
+_RATE = 2.0  # of a command that swings [rad/s]
 
 ONLY = "only those that matter"  # the candidate of what was found to be needed
 Machine = Any  # what a driver steps: an MjData, a client, a Data
@@ -26,8 +30,46 @@ Restore = Callable[[Machine], None]
 Save = Callable[[Machine], AbstractContextManager[Restore]]
 
 
+@dataclass(frozen=True, eq=False)
+class SavePoint:
+    """A save point: where a run starts, and how long it runs before it is saved.
+
+    Attributes:
+        name: A word.
+        how: How one gets there.
+        model: The model, or a variant of it.
+        qpos, qvel, ctrl: The start; the command stays.
+        run_in: Steps before the save.
+        powered: Whether the servos are on.
+        swings: Whether a controller writes the command before each step, from the time.
+        at_limit: Whether joints have arrived at their limits.
+    """
+
+    name: str
+    how: str
+    model: Model
+    qpos: Array
+    qvel: Array
+    ctrl: Array
+    run_in: int
+    powered: bool = True
+    swings: bool = False
+    at_limit: bool = False
+
+    def commanded(self, time: float) -> Array:
+        """What the controller of a point that swings writes at a time [s]."""
+        ctrl = self.ctrl.copy()
+        ctrl[0] += STIR * np.sin(_RATE * time)
+        return within(self.model, ctrl)
+
+
+def within(model: Model, ctrl: Array) -> Array:
+    """A command (nu,), clipped to the ranges of the actuators."""
+    return np.clip(ctrl, *model.actuator_ctrlrange.T)
+
+
 @dataclass(frozen=True)
-class Way:
+class SaveMethod:
     """A way to save and to restore.
 
     Attributes:
@@ -48,7 +90,7 @@ class Way:
 
 
 @dataclass(frozen=True)
-class Look:
+class Disturbance:
     """Something done between two steps that should leave no trace in what follows.
 
     Attributes:
@@ -65,7 +107,7 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Hiding:
+class HiddenState:
     """Ways to save, and changes that show what they forget.
 
     Attributes:
@@ -78,11 +120,11 @@ class Hiding:
     ways: Mapping[str, Save]
     changes: Mapping[str, Callable[[Machine], None]]
     let_pass: Callable[[Machine], None]
-    best: Way
+    best: SaveMethod
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class ReferenceRun:
     """The future of a run that nothing disturbed: what all others are compared with.
 
     Attributes:
@@ -90,7 +132,7 @@ class Run:
         future: (steps + 1, k) positions and velocities, there and after each step.
     """
 
-    point: Point
+    point: SavePoint
     future: Array
 
     @property
@@ -100,7 +142,7 @@ class Run:
 
 
 @dataclass(frozen=True)
-class Seen:
+class Measured:
     """What a save point is like.
 
     Attributes:
@@ -139,15 +181,15 @@ class Driver(ABC):
 
     def __init__(self, model: Model, seed: int) -> None:
         self.model, self.seed = model, seed
-        self._seen: dict[str, Seen] = {}
+        self._measured: dict[str, Measured] = {}
 
     @cached_property
     @abstractmethod
-    def layout(self) -> Layout:
+    def coordinates(self) -> Coordinates:
         """What the numbers are that `read` gives."""
 
     @abstractmethod
-    def fresh(self, point: Point) -> Machine:
+    def fresh(self, point: SavePoint) -> Machine:
         """A new machine, at its default state."""
 
     @abstractmethod
@@ -155,7 +197,7 @@ class Driver(ABC):
         """Give back what it holds."""
 
     @abstractmethod
-    def start(self, machine: Machine, point: Point) -> None:
+    def start(self, machine: Machine, point: SavePoint) -> None:
         """Put a machine, new or reset, to the start of a point."""
 
     @abstractmethod
@@ -175,48 +217,48 @@ class Driver(ABC):
         """Simulated time [s]."""
 
     @abstractmethod
-    def _see(self, point: Point) -> Seen:
+    def _measure(self, point: SavePoint) -> Measured:
         """What a save point is like."""
 
     @abstractmethod
-    def ways(self, point: Point) -> tuple[Way, ...]:
+    def save_methods(self, point: SavePoint) -> tuple[SaveMethod, ...]:
         """Candidates for the state, from the smallest to the largest."""
 
     @abstractmethod
-    def looks(self, point: Point) -> tuple[Look, ...]:
+    def disturbances(self, point: SavePoint) -> tuple[Disturbance, ...]:
         """What should perturb nothing."""
 
-    def see(self, point: Point) -> Seen:
+    def measure(self, point: SavePoint) -> Measured:
         """What a save point is like, looked at once."""
-        if point.name not in self._seen:
-            self._seen[point.name] = self._see(point)
-        return self._seen[point.name]
+        if point.name not in self._measured:
+            self._measured[point.name] = self._measure(point)
+        return self._measured[point.name]
 
     def reset(self, machine: Machine) -> None:
         """Put a machine back to its default state, where `resets`."""
         raise NotImplementedError
 
-    def only(self, fields: tuple[str, ...]) -> Way | None:
+    def only(self, fields: tuple[str, ...]) -> SaveMethod | None:
         """The candidate of some of the components that are left out one at a time."""
         return None
 
-    def hides(self, point: Point) -> Hiding | None:
+    def hidden_state(self, point: SavePoint) -> HiddenState | None:
         """What decides the future and is in no position or velocity, to be tried directly."""
         return None
 
-    def pools(self) -> Mapping[str, Callable[[Point, int], list[Array]]]:
+    def pools(self) -> Mapping[str, Callable[[SavePoint, int], list[Array]]]:
         """The engine's own ways to run several at once: futures from a point, so many steps."""
         return {}
 
-    def soil(self, machine: Machine, point: Point) -> None:  # noqa: B027  (optional hook)
+    def leave_traces(self, machine: Machine, point: SavePoint) -> None:  # noqa: B027  (optional hook)
         """Leave traces of another past beyond its state and command."""
 
-    def lacks(self, point: Point) -> str:
+    def lacks(self, point: SavePoint) -> str:
         """Why a save point means nothing here; empty where it does."""
         return ""
 
     @contextmanager
-    def new(self, point: Point) -> Iterator[Machine]:
+    def new(self, point: SavePoint) -> Iterator[Machine]:
         """A fresh machine for a while."""
         machine = self.fresh(point)
         try:
@@ -225,14 +267,14 @@ class Driver(ABC):
             self.close(machine)
 
     @contextmanager
-    def at(self, point: Point) -> Iterator[Machine]:
+    def at(self, point: SavePoint) -> Iterator[Machine]:
         """A machine at a save point."""
         with self.new(point) as machine:
             self.arrive(machine, point)
             yield machine
 
     @contextmanager
-    def used(self, point: Point) -> Iterator[Machine]:
+    def used(self, point: SavePoint) -> Iterator[Machine]:
         """A machine with another past: other commands, pushed, and later."""
         with self.at(point) as machine:
             if point.powered and point.model.nu:
@@ -240,17 +282,19 @@ class Driver(ABC):
                     -_OTHERWISE, _OTHERWISE, point.model.nu
                 )
                 self.command(machine, point.ctrl + stir)
-            self.soil(machine, point)
+            self.leave_traces(machine, point)
             for _ in range(_AFTERWARDS):
                 self.advance(machine)
             yield machine
 
-    def arrive(self, machine: Machine, point: Point) -> None:
+    def arrive(self, machine: Machine, point: SavePoint) -> None:
         """From a new or reset machine to the save point."""
         self.start(machine, point)
         self.drive(machine, point, point.run_in)
 
-    def drive(self, machine: Machine, point: Point, steps: int, look: Look | None = None) -> Array:
+    def drive(
+        self, machine: Machine, point: SavePoint, steps: int, look: Disturbance | None = None
+    ) -> Array:
         """Go on, with a look before each step; (steps + 1, k) of what is read there and after."""
         trace = [self.read(machine)]
         for _ in range(steps):
@@ -263,7 +307,7 @@ class Driver(ABC):
             trace.append(self.read(machine))
         return np.array(trace)
 
-    def run(self, point: Point, steps: int) -> Run:
+    def run(self, point: SavePoint, steps: int) -> ReferenceRun:
         """The undisturbed run from a point.
 
         Raises:
@@ -273,14 +317,8 @@ class Driver(ABC):
             future = self.drive(machine, point, steps)
         if not np.isfinite(future).all():
             raise DivergedError(f"{self.name} diverged")
-        return Run(point, future)
+        return ReferenceRun(point, future)
 
-    def gap(self, run: Run, *futures: Array) -> Gap:
+    def gap(self, run: ReferenceRun, *futures: Array) -> FutureGap:
         """The worst gap of futures to that of a run."""
-        return worst([gap(run.future, future, self.layout) for future in futures])
-
-    def found(
-        self, experiment: str, run: Run, case: str, into: str, off: Gap, promised: bool = True
-    ) -> Finding:
-        """A finding about this driver."""
-        return Finding(experiment, self.layer, run.point.name, case, into, promised, off)
+        return worst([gap(run.future, future, self.coordinates) for future in futures])

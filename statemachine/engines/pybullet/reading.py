@@ -10,26 +10,37 @@ from typing import Any
 
 import numpy as np
 
+from ...backends import load
+from ...description import urdf
+from ...description.meshes import volume_of
+from ...description.records import (
+    HERE,
+    CollisionShape,
+    Inertial,
+    Link,
+    Placement,
+    Robot,
+    RobotJoint,
+    Setting,
+)
 from ...errors import EngineError, ModelError
 from ...installed import engine_version, require
+from ...interface import make_data
 from ...rotations import matrix_from_quat, wxyz_from_xyzw
 from ...silence import silence
-from . import from_urdf
-from .description import HERE, Inertial, Joint, Link, Placement, Robot, Setting, Shape
-from .meshes import volume_of
 
 _KINDS = {0: "hinge", 1: "slide", 2: "ball"}  # JOINT_REVOLUTE, JOINT_PRISMATIC, JOINT_SPHERICAL
 _SHAPES = {2: "sphere", 3: "box", 4: "cylinder", 5: "mesh", 6: "plane", 7: "capsule"}
 
 
 @contextmanager
-def loaded(path: Path) -> Iterator[tuple[int, list[int]]]:
+def _loaded(path: Path) -> Iterator[tuple[int, list[int]]]:
     """A client with a URDF in it, as loadURDF leaves it, and the ids of its bodies.
 
     Raises:
         ModelError: The file is none, or PyBullet cannot read it.
     """
-    from_urdf.read(path)  # of some bad files PyBullet makes an end of the process
+    urdf.read(path)  # of some bad files PyBullet makes an end of the process
     pb = require("pybullet")
     client = pb.connect(pb.DIRECT)
     if client < 0:
@@ -49,13 +60,33 @@ def loaded(path: Path) -> Iterator[tuple[int, list[int]]]:
         pb.disconnect(client)
 
 
-def everything(client: int) -> list[int]:
+def _everything(client: int) -> list[int]:
     """The ids of all bodies in a world, what the backend adds to the robot among them."""
     pb = require("pybullet")
     return [pb.getBodyUniqueId(k, client) for k in range(pb.getNumBodies(client))]
 
 
-def read(client: int, bodies: Sequence[int], name: str) -> Robot:
+def read(path: Path, name: str) -> Robot:
+    """What the engine makes of a file: of a URDF what loadURDF leaves, else what the backend loads.
+
+    Args:
+        path: The file.
+        name: What the description goes by.
+
+    Raises:
+        MissingEngineError: It is not installed here.
+        ModelError: It cannot read the file.
+    """
+    require("pybullet")
+    if path.suffix.lower() == ".urdf":
+        with _loaded(path) as (client, bodies):
+            return _description(client, bodies, name)
+    with make_data(load(path, backend="pybullet", defaults="engine")) as data:
+        client = data.raw.client
+        return _description(client, _everything(client), name)
+
+
+def _description(client: int, bodies: Sequence[int], name: str) -> Robot:
     """The description of all bodies in a world, joints put to zero.
 
     Friction, effort and speed of a joint are what the engine keeps; it applies none of them
@@ -67,7 +98,7 @@ def read(client: int, bodies: Sequence[int], name: str) -> Robot:
     world = next((base for _, (base, still) in bases if still and base == "world"), None)
     links.append(Link("world", "", HERE, None, None))
     names: set[str] = {"world"}
-    around: list[Shape] = []
+    around: list[CollisionShape] = []
     for body, (base, still) in bases:
         count = pb.getNumJoints(body, client)
         if still and (base == "world" or not count):
@@ -92,7 +123,7 @@ def read(client: int, bodies: Sequence[int], name: str) -> Robot:
     )
 
 
-def _standing(pb: Any, client: int, body: int) -> Iterator[Shape]:
+def _standing(pb: Any, client: int, body: int) -> Iterator[CollisionShape]:
     """The shapes of a base that stands in the world, in its axes."""
     dynamics = {-1: pb.getDynamicsInfo(body, -1, client)}
     inner = {-1: _pose(*dynamics[-1][3:5])}
@@ -128,7 +159,7 @@ def _body(
     names = {-1: base}
     if base != "world":
         names[-1] = _unique(base, taken)
-        joint = None if still else Joint(f"{base} floats", "free", np.zeros(3), np.zeros(3))
+        joint = None if still else RobotJoint(f"{base} floats", "free", np.zeros(3), np.zeros(3))
         yield _link(pb, client, body, -1, names[-1], "world", place[-1], joint, dynamics, inner)
     for i, info in enumerate(infos):
         names[i] = _unique(info[12].decode(), taken)
@@ -147,9 +178,9 @@ def _unique(name: str, taken: set[str]) -> str:
     return name
 
 
-def _joint(info: Sequence[Any], inner: Placement) -> Joint:
+def _joint(info: Sequence[Any], inner: Placement) -> RobotJoint:
     low, high = info[8], info[9]
-    return Joint(
+    return RobotJoint(
         name=info[1].decode(),
         kind=_KINDS[info[2]],
         axis=inner.mat @ np.array(info[13]),
@@ -169,7 +200,7 @@ def _link(
     name: str,
     parent: str,
     place: Placement,
-    joint: Joint | None,
+    joint: RobotJoint | None,
     dynamics: dict[int, Any],
     inner: dict[int, Placement],
 ) -> Link:
@@ -181,7 +212,7 @@ def _link(
         kind = _SHAPES.get(shape[2], f"kind {shape[2]}")
         size = _size(kind, shape[3])
         shapes.append(
-            Shape(
+            CollisionShape(
                 kind,
                 inner[index] @ _pose(*shape[5:7]),
                 size,

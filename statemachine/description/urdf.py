@@ -13,11 +13,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from ...errors import ModelError
-from ...interface import Array
+from ..errors import ModelError
+from ..interface import Array
 from ._urdf_numbers import number, numbers, origin
-from .description import HERE, Inertial, Joint, Link, Placement, Robot, Shape
 from .meshes import read_mesh, volume_of
+from .records import HERE, CollisionShape, Inertial, Link, Placement, Robot, RobotJoint
 
 Element = ElementTree.Element
 _LARGEST = 64 * 2**20  # bytes; a description is text, its meshes are elsewhere
@@ -144,7 +144,7 @@ class _Reader:
             0.0 if each is None else number(each, "value", f"link {name!r}") for each in found
         )
 
-    def _shape(self, element: Element, link: str) -> Shape:
+    def _shape(self, element: Element, link: str) -> CollisionShape:
         where = f"a collision shape of link {link!r}"
         geometry = element.find("geometry")
         solid = None if geometry is None else next(iter(geometry), None)
@@ -161,12 +161,14 @@ class _Reader:
             size = (number(solid, "radius", where), number(solid, "length", where) / 2)
         else:
             self.notes.append(f"{where} is a <{solid.tag}>, which is not known here")
-            return Shape(solid.tag, place, name=name)
+            return CollisionShape(solid.tag, place, name=name)
         if min(size) < 0:
             raise ModelError(f"{where} has a negative size")
-        return Shape(solid.tag, place, size, volume=volume_of(solid.tag, size), name=name)
+        return CollisionShape(solid.tag, place, size, volume=volume_of(solid.tag, size), name=name)
 
-    def _mesh(self, solid: Element, place: Placement, name: str, link: str, where: str) -> Shape:
+    def _mesh(
+        self, solid: Element, place: Placement, name: str, link: str, where: str
+    ) -> CollisionShape:
         file = solid.get("filename", "")
         scale = tuple(numbers(solid, "scale", 3, where, (1.0, 1.0, 1.0)))
         if (file, scale) not in self._scaled:
@@ -176,10 +178,10 @@ class _Reader:
             self.notes.append(
                 f"the mesh {file!r} of link {link!r} {trouble}: its size is not known"
             )
-            return Shape("mesh", place, name=name)
+            return CollisionShape("mesh", place, name=name)
         scaled = points * scale
         volume = volume_of("mesh", (), scaled)
-        return Shape("mesh", place, points=scaled.reshape(-1, 3), volume=volume, name=name)
+        return CollisionShape("mesh", place, points=scaled.reshape(-1, 3), volume=volume, name=name)
 
 
 def _name(element: Element) -> str:
@@ -219,7 +221,7 @@ def _order(names: list[str], parent: dict[str, str]) -> list[str]:
     return order
 
 
-def _joint(element: Element) -> Joint | None:
+def _joint(element: Element) -> RobotJoint | None:
     name, kind = _name(element), element.get("type", "")
     where = f"joint {name!r}"
     if kind == "fixed":
@@ -246,7 +248,7 @@ def _joint(element: Element) -> Joint | None:
             raise ModelError(f"{where} is {kind} and has no <limit>")
         low, high = of(limit, "lower", 0.0) or 0.0, of(limit, "upper", 0.0) or 0.0
         limits = (low, high) if low <= high else None  # PyBullet's way to say "none"
-    return Joint(
+    return RobotJoint(
         name=name,
         kind=_KINDS[kind],
         axis=axis / max(length, 1e-9),

@@ -11,7 +11,7 @@ from typing import Any
 
 from ...interface import Array, Data
 from ...silence import silence
-from ._driver import Restore
+from ..auditing import Restore
 
 
 @dataclass

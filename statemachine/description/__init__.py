@@ -1,0 +1,6 @@
+"""A robot as its file describes it, whatever the format: what descriptions are compared by.
+
+- `records`: a robot as frozen records, in one set of conventions
+- `urdf`: from a URDF; what only an engine can read is read in that engine's room
+- `meshes`: their corners, volumes and extents
+"""
