@@ -19,7 +19,6 @@ from statemachine.compare import (
     Comparison,
     Request,
     compare,
-    parse_tolerances,
     series,
     sides_of,
     touches,
@@ -27,6 +26,7 @@ from statemachine.compare import (
 )
 from statemachine.compare.series import normal_forces, total_forces
 from statemachine.compare.tolerances import COUNT
+from statemachine.comparison import parse_tolerances
 from statemachine.errors import BadInputError, MissingEngineError, TraceError, UnknownNameError
 from statemachine.experiments.scenarios import SCENARIOS
 from statemachine.installed import available

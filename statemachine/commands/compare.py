@@ -151,7 +151,8 @@ def _run_why(options: argparse.Namespace) -> int:
 
 
 def _run_compare(options: argparse.Namespace) -> int:
-    from ..compare import compare, parse_tolerances, sides_of, touches, witness
+    from ..compare import compare, sides_of, touches, witness
+    from ..comparison import parse_tolerances
     from ..report import compare as report
     from ..report.progress import progress
 

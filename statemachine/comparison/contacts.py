@@ -77,8 +77,8 @@ def same_pairs(one: Mapping[str, _T], two: Mapping[str, _T]) -> dict[str, _T]:
 
     Two models may number the same bodies in another order.
     """
-    found = {}
+    renamed = {}
     for pair, value in two.items():
         turned = " on ".join(reversed(pair.split(" on ")))
-        found[turned if turned in one and pair not in one else pair] = value
-    return found
+        renamed[turned if turned in one and pair not in one else pair] = value
+    return renamed

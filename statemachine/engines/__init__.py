@@ -13,7 +13,7 @@ import importlib.metadata
 import importlib.util
 from typing import Any
 
-from ..errors import BadInputError, unknown_name
+from ..errors import BadInputError, UnsupportedError, unknown_name
 
 _ROOMS: dict[str, str] = {
     name: f"{__name__}.{name}" for name in ("mujoco", "pybullet", "pinocchio")
@@ -26,12 +26,12 @@ PARTS: dict[str, str] = {
     "phrasebook": "which of its calls does what, as lines to type",
     "calls": "which of its functions can be watched, and what they change",
     "dials": "Models between the engine as it comes and the contract",
-    "audit": "driver(model, seed): the engine by its own functions, to find what its state is",
-    "reading": "read(path, name): the description of what the engine makes of a file",
-    "energy": "energies(model, qpos, qvel): kinetic and potential energy of states",
-    "mutants": "adapter: the module of the backend that a seeded fault is put into",
-    "watched": "what a student can do with the engine past the interface, and how it is seen",
-    "rendering": "here(), label(opengl), drawer(files, size, camera): pictures without a screen",
+    "audit": "the engine by its own functions, to find out what its state is",
+    "reading": "what the engine makes of a file, as a description",
+    "energy": "the energies of states, by which all engines are measured",
+    "mutants": "where a seeded fault is put into its backend",
+    "watched": "what a student can do with the engine past the interface",
+    "rendering": "pictures without a screen",
 }
 
 
@@ -82,6 +82,23 @@ def part(engine: str | None, name: str) -> Any:
         return None
     module = _module(engine, name)
     return importlib.import_module(module) if module else None
+
+
+def needed_part(engine: str, name: str) -> Any:
+    """A part that an engine must have for what was asked; else as `part`.
+
+    Raises:
+        UnsupportedError: Its room has none.
+    """
+    found = part(engine, name)
+    if found is None:
+        raise UnsupportedError(
+            f"{engine} has no part {name!r} in its room: {PARTS[name]}",
+            backend=engine,
+            feature=name,
+            reason="not written",
+        )
+    return found
 
 
 def _module(engine: str, name: str) -> str | None:

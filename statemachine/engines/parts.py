@@ -5,11 +5,17 @@ A part is a module; its functions are those of the protocol, without `self`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
 from typing import Any, Literal, Protocol
 
-from ..interface import Array, Model
+from ..description.records import Robot
+from ..drawing.camera import Camera
+from ..drawing.shots import Drawer
+from ..interface import Array, Data, Model
+from .auditing import Driver
 
 
 @dataclass(frozen=True)
@@ -125,3 +131,128 @@ class DialsPart(Protocol):
     def frictionless(self, model: Model) -> Model:
         """The same Model with surfaces that have no friction."""
         ...
+
+
+class AuditPart(Protocol):
+    """The part "audit": the engine by its own functions, to find out what its state is."""
+
+    def driver(self, model: Model, seed: int) -> Driver:
+        """What starts, steps, saves and restores; `seed` is of what it draws."""
+        ...
+
+
+class ReadingPart(Protocol):
+    """The part "reading": what the engine makes of a file, as a description."""
+
+    def read(self, path: Path, name: str) -> Robot:
+        """What it makes of a file, with its own defaults.
+
+        Args:
+            path: The file.
+            name: What the description goes by.
+
+        Raises:
+            MissingEngineError: It is not installed here.
+            ModelError: It cannot read the file.
+        """
+        ...
+
+
+class CompilerPart(ReadingPart, Protocol):
+    """The part "reading" of the engine whose format MJCF is."""
+
+    def read_file(self, path: Path, name: str) -> Robot:
+        """What an MJCF says itself; meshes may be missing. Arguments and errors as of `read`."""
+        ...
+
+
+class EnergyPart(Protocol):
+    """The part "energy" of the engine by which all are measured."""
+
+    def energies(self, model: Model, qpos: Array, qvel: Array) -> Array:
+        """Kinetic and potential energy (n, 2) [J] of states.
+
+        Args:
+            model: A model on this engine.
+            qpos: (n, nq) positions [rad or m].
+            qvel: (n, nv) velocities [rad/s or m/s].
+        """
+        ...
+
+
+class RenderingPart(Protocol):
+    """The part "rendering": pictures without a screen.
+
+    Attributes:
+        SHARPER: It draws so many times as large as a picture is shown.
+        __name__: Of the module, which another process imports to draw.
+    """
+
+    SHARPER: int
+    __name__: str
+
+    def here(self) -> str:
+        """The OpenGL that it draws with here; "" for its own choice, or where none is needed.
+
+        Raises:
+            MissingEngineError: It cannot draw here; the message says why, and what to do.
+        """
+        ...
+
+    def label(self, opengl: str) -> str:
+        """What a reader is told of what draws."""
+        ...
+
+    def drawer(self, files: Sequence[Path], size: tuple[int, int], camera: Camera) -> Drawer:
+        """Get ready to draw.
+
+        Args:
+            files: The model of the solid side, and that of the ghost if there is one.
+            size: Width and height of the pictures, `SHARPER` times as shown.
+            camera: Where they are seen from.
+        """
+        ...
+
+
+class OpenGLPart(RenderingPart, Protocol):
+    """The part "rendering" of the engine that reads the models for all renderers."""
+
+    def environment(self, opengl: str, known: dict[str, str]) -> dict[str, str]:
+        """The environment of a process in which the engine takes this OpenGL."""
+        ...
+
+    def diagnosis(self) -> tuple[bool, str, str]:
+        """Whether it draws here, what was found, and the next step if there is one."""
+        ...
+
+
+class WatchedPart(Protocol):
+    """The part "watched": what a student can do with the engine past the interface.
+
+    Attributes:
+        STEPS: Names of its functions f(model, data[, nstep]) that advance time.
+        FORWARDS: Names of those f(model, data) that only recompute.
+        DATA: The backend's Data, whose verbs call these functions.
+    """
+
+    STEPS: tuple[str, ...]
+    FORWARDS: tuple[str, ...]
+    DATA: type[Data]
+
+    def origin(self, raw: Any) -> object:
+        """What an engine's own model and its copies have in common, and no other."""
+        ...
+
+    def settings(self, raw: Any) -> dict[str, list[float]]:
+        """What of it a student can change, by name."""
+        ...
+
+
+class MutantsPart(Protocol):
+    """The part "mutants": where a seeded fault is put in.
+
+    Attributes:
+        adapter: The backend's module, with `compile_file`, `facts` and `edited`.
+    """
+
+    adapter: ModuleType

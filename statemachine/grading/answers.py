@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..engines import part
+from ..engines.parts import WatchedPart
 from ..interface import DERIVED, INPUTS, Model
 from .watch import EngineRun, Inputs, StudentWatch
 
@@ -149,5 +150,5 @@ def _live(value: Any, datas: Sequence[Any]) -> str:
 
 def settings(model: Model) -> dict[str, list[float]]:
     """What of the engine's own model a student can reach: its options, and its arrays' sums."""
-    room = part(model.backend, "watched")
+    room: WatchedPart | None = part(model.backend, "watched")
     return room.settings(model.raw) if room else {}

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..engines import part
+from ..engines.parts import WatchedPart
 from ..installed import require
 from ..interface import Array, Data, Model
 
@@ -101,7 +102,7 @@ class StudentWatch:
         self.runs: list[EngineRun] = []
         self.forwards: list[Inputs] = []
         self.datas: list[Any] = []
-        self._room = part(model.backend, "watched")
+        self._room: WatchedPart | None = part(model.backend, "watched")
         self._origin = self._origin_of(model.raw if self._room else model)
         self._nudge = nudge
         self._current: dict[int, EngineRun] = {}
@@ -156,7 +157,9 @@ class StudentWatch:
 
     def _origin_of(self, model: Any) -> object:
         """What a Model and its variants have in common, and the engine's own with its copies."""
-        return model.path if isinstance(model, Model) else self._room.origin(model)
+        if isinstance(model, Model) or self._room is None:
+            return model.path
+        return self._room.origin(model)
 
 
 _watch: StudentWatch | None = None
@@ -180,7 +183,7 @@ def engine_watched(backend: str) -> Iterator[None]:
     Before a student's file can import them.
     """
     with ExitStack() as stack:
-        room = part(backend, "watched")
+        room: WatchedPart | None = part(backend, "watched")
         if room:
             engine = require(backend)
             for name in room.STEPS:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import Any
 
-from ..engines import part, rooms_with
+from ..engines import needed_part, rooms_with
+from ..engines.parts import OpenGLPart, RenderingPart
 from ..errors import MissingEngineError, unknown_name
 from ..installed import DEFAULT, require
 
@@ -28,9 +28,9 @@ class Renderer:
         return self.room.label(self.opengl)
 
     @property
-    def room(self) -> Any:
+    def room(self) -> RenderingPart:
         """What the engine draws with."""
-        return part(self.name, "rendering")
+        return needed_part(self.name, "rendering")
 
 
 def renderers() -> list[str]:
@@ -55,7 +55,8 @@ def renderer_here(name: str | None = None) -> Renderer:
     reasons: list[MissingEngineError] = []
     for engine in known if name is None else (name,):
         try:
-            return Renderer(engine, part(engine, "rendering").here())
+            room: RenderingPart = needed_part(engine, "rendering")
+            return Renderer(engine, room.here())
         except MissingEngineError as error:
             reasons.append(error)
     if name is not None:
@@ -68,4 +69,5 @@ def renderer_here(name: str | None = None) -> Renderer:
 
 def environment_of(renderer: Renderer) -> dict[str, str]:
     """The environment of a process that draws; the model is read by the default engine there."""
-    return part(DEFAULT, "rendering").environment(renderer.opengl, dict(os.environ))
+    room: OpenGLPart = needed_part(DEFAULT, "rendering")
+    return room.environment(renderer.opengl, dict(os.environ))

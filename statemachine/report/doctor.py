@@ -8,7 +8,8 @@ import subprocess
 import sys
 from dataclasses import dataclass
 
-from ..engines import part
+from ..engines import needed_part
+from ..engines.parts import OpenGLPart
 from ..installed import DEFAULT, ENGINES, engine_version, wheel_here
 from ..page import Page, Table, Text, Verdict
 
@@ -94,7 +95,8 @@ def _engine(name: str) -> HealthCheck:
 
 
 def _rendering() -> HealthCheck:
-    works, found, step = part(DEFAULT, "rendering").diagnosis()
+    room: OpenGLPart = needed_part(DEFAULT, "rendering")
+    works, found, step = room.diagnosis()
     return HealthCheck("rendering", works, found, step, optional=True)
 
 

@@ -7,8 +7,10 @@ from typing import Any, Literal
 import numpy as np
 
 from ..backends import on_default
-from ..engines import part
+from ..engines import needed_part
+from ..engines.parts import EnergyPart
 from ..errors import StateMachineError
+from ..installed import DEFAULT
 from ..interface import Array, Model
 
 
@@ -47,7 +49,8 @@ def energies(
                 yardstick = yardstick.replace(gravity=model.gravity, armature=model.dof_armature)
             elif gravity is not None:
                 yardstick = yardstick.replace(gravity=gravity)
-        found = part(yardstick.backend, "energy").energies(yardstick, qpos, qvel)
+        room: EnergyPart = needed_part(DEFAULT, "energy")
+        found = room.energies(yardstick, qpos, qvel)
     except StateMachineError:
         return unknown
-    return found, f"{yardstick.backend} {yardstick.engine_version}"
+    return found, f"{DEFAULT} {yardstick.engine_version}"

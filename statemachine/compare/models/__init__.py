@@ -24,7 +24,8 @@ from ... import __version__
 from ...backends import backend_engine, backend_names
 from ...description import urdf
 from ...description.records import Robot
-from ...engines import part, rooms_with
+from ...engines import needed_part, part, rooms_with
+from ...engines.parts import CompilerPart, ReadingPart
 from ...errors import UnsupportedError
 from ...installed import DEFAULT
 from ...models import resolve
@@ -121,9 +122,10 @@ def read(
     if engine is None:
         if path.suffix.lower() == ".urdf":
             return urdf.read(path)
-        return part(DEFAULT, "reading").read_file(path, name)
+        compiler: CompilerPart = needed_part(DEFAULT, "reading")
+        return compiler.read_file(path, name)
     backend_engine(engine)
-    room = part(engine, "reading")
+    room: ReadingPart | None = part(engine, "reading")
     if room is None:
         known = ", ".join(rooms_with("reading"))
         raise UnsupportedError(

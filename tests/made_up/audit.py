@@ -1,0 +1,5 @@
+"""Its own functions are MuJoCo's."""
+
+from statemachine.engines.mujoco.audit import driver
+
+__all__ = ["driver"]

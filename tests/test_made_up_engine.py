@@ -1,0 +1,238 @@
+"""A third engine: every command runs on it, and says what it does not know of it.
+
+It is MuJoCo under another name, as another distribution would bring it: a backend and, for the
+last tests, a room, both declared as entry points, and a row in the table of engines.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from statemachine import backends, engines
+from statemachine.cli import main
+from statemachine.installed import ENGINES
+
+from .conftest import ROOT, need_engine
+
+NAME = "hidden"
+ON = ("--backend", NAME)
+SHORT = ("--seconds", "0.2")
+BESIDE = ("--backends", "mujoco", NAME)
+SAYS_NO, BAD_INPUT = 1, 2
+
+
+def _declared(folder: Path, entries: str) -> None:
+    """Make a folder look like one into which a distribution was installed."""
+    information = folder / "made_up-1.0.dist-info"
+    information.mkdir()
+    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: made-up\nVersion: 1.0\n")
+    (information / "entry_points.txt").write_text(entries)
+
+
+@pytest.fixture
+def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder to work in, in which the engine is known; to the processes that are started too."""
+    packages = tmp_path / "packages"
+    packages.mkdir()
+    _declared(packages, f"[statemachine.backends]\n{NAME} = tests.hidden_world:load\n")
+    monkeypatch.syspath_prepend(str(packages))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join((str(packages), str(ROOT))))
+    monkeypatch.setitem(ENGINES, NAME, replace(ENGINES["mujoco"], name=NAME, role="made up"))
+    monkeypatch.chdir(tmp_path)
+    yield packages
+    backends._BACKENDS.pop(NAME, None)
+    engines._ROOMS.pop(NAME, None)
+
+
+@pytest.fixture
+def room(engine: Path) -> None:
+    """It has a room, in which some parts are."""
+    with (engine / "made_up-1.0.dist-info" / "entry_points.txt").open("a") as file:
+        file.write(f"[statemachine.engines]\n{NAME} = tests.made_up\n")
+
+
+Output = pytest.CaptureFixture[str]
+
+
+def said(capsys: Output, *command: str, code: int = 0) -> str:
+    """What a command says on standard output; where it refuses, in one line of the other."""
+    try:
+        ended = main(list(command))
+    except SystemExit as error:
+        ended = error.code
+    out, err = capsys.readouterr()
+    assert ended == code, err
+    assert "Traceback" not in out + err
+    if code >= BAD_INPUT:
+        assert not out
+        assert err.count("\n") == 1
+        return err
+    return out
+
+
+def _slow(*words: str) -> object:
+    return pytest.param(words, marks=pytest.mark.slow, id=" ".join(words))
+
+
+LESSONS = [
+    _slow("objects"),
+    ("state",),
+    ("write",),
+    _slow("forward"),
+    ("hold",),
+    _slow("gravity"),
+    _slow("reset"),
+    _slow("replay"),
+    _slow("time"),
+    _slow("speed"),
+    _slow("questions"),
+]
+
+
+@pytest.mark.usefixtures("engine")
+@pytest.mark.parametrize("lesson", LESSONS, ids=" ".join)
+def test_every_lesson_runs_on_it(capsys: Output, lesson: tuple[str]) -> None:
+    assert NAME in said(capsys, "lesson", *lesson, *ON)
+
+
+@pytest.mark.usefixtures("engine")
+def test_a_lesson_as_json(capsys: Output) -> None:
+    assert list(json.loads(said(capsys, "lesson", "hold", *ON, "--json"))) == [NAME]
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("engine")
+def test_a_lesson_on_all_engines(capsys: Output) -> None:
+    assert NAME in said(capsys, "lesson", "hold", "--backend", "all")
+
+
+@pytest.mark.usefixtures("engine")
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("hold", *BESIDE, *SHORT),
+        ("hold", *BESIDE, *SHORT, "--defaults", "engine"),
+        ("hold", *BESIDE, *SHORT, "--why"),
+        _slow("hold", *BESIDE, *SHORT, "--plot", "hold.svg"),
+        _slow("hold", *BESIDE, *SHORT, "--html", "hold.html"),
+        _slow("hold", *BESIDE, *SHORT, "--film", "hold.webp", "--size", "320x240"),
+    ],
+    ids=" ".join,
+)
+def test_a_comparison_finds_that_it_is_the_same(capsys: Output, words: tuple[str, ...]) -> None:
+    if "--film" in words:
+        pytest.importorskip("PIL")
+    text = said(capsys, "compare", *words)
+    assert NAME in text
+    assert "differs" not in text.replace("differs otherwise", "")
+    assert all(Path(word).stat().st_size for word in words if word.startswith("hold."))
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("engine")
+def test_why_it_parts_from_another_engine(capsys: Output) -> None:
+    need_engine("pybullet")
+    words = ("--backends", "pybullet", NAME, *SHORT, "--defaults", "engine", "--why")
+    assert NAME in said(capsys, "compare", "hold", *words)
+
+
+@pytest.mark.usefixtures("engine")
+def test_what_it_makes_of_a_file_is_not_known(capsys: Output) -> None:
+    for words in ((f"so101@{NAME}", "so101"), ("so101", *BESIDE)):
+        line = said(capsys, "compare", "--models", *words, code=BAD_INPUT)
+        assert "cannot be read here; known: mujoco, pybullet" in line
+
+
+@pytest.mark.usefixtures("room")
+def test_what_it_makes_of_a_file_its_room_tells(capsys: Output) -> None:
+    assert NAME in said(capsys, "compare", "--models", f"so101@{NAME}", "so101")
+
+
+@pytest.mark.usefixtures("engine")
+def test_its_traces_are_played_shown_and_compared(capsys: Output) -> None:
+    said(capsys, "trace", "record", "hold", "--out", "a.npz", *SHORT, *ON)
+    assert NAME in said(capsys, "trace", "show", "a.npz")
+    said(capsys, "trace", "play", "a.npz", "--out", "b.npz", *ON)
+    said(capsys, "trace", "play", "a.npz", "--out", "c.npz")
+    said(capsys, "trace", "csv", "a.npz", "--out", "a.csv")
+    for words in (("a.npz", "b.npz"), ("b.npz", "c.npz"), ("a.npz", *BESIDE)):
+        assert NAME in said(capsys, "compare", *words)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("engine")
+def test_its_traces_are_drawn(capsys: Output) -> None:
+    pytest.importorskip("PIL")
+    said(capsys, "trace", "record", "hold", "--out", "a.npz", *SHORT, *ON)
+    said(capsys, "trace", "plot", "a.npz", "--out", "a.svg")
+    said(capsys, "trace", "film", "a.npz", "--out", "a.webp", "--size", "320x240")
+    assert Path("a.svg").stat().st_size
+    assert Path("a.webp").stat().st_size
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("engine")
+def test_it_is_audited_through_the_interface(capsys: Output) -> None:
+    text = said(capsys, "audit", *ON, "--steps", "3")
+    assert f"{NAME} itself, by its own functions, was not asked." in text
+    assert "this interface on hidden" in text
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("room")
+def test_it_is_audited_by_its_room(capsys: Output) -> None:
+    text = said(capsys, "audit", *ON, "--steps", "3")
+    assert "was not asked" not in text
+    assert "mj_copyData" in text
+
+
+@pytest.mark.usefixtures("engine")
+@pytest.mark.parametrize("words", [(), ("--calls",), ("quaternion",)], ids=" ".join)
+def test_what_it_takes_for_granted_is_not_asked(capsys: Output, words: tuple[str, ...]) -> None:
+    assert "not asked" in said(capsys, "conventions", *words, *ON)
+
+
+@pytest.mark.usefixtures("room")
+def test_two_engines_are_compared_by_what_their_rooms_tell(capsys: Output) -> None:
+    assert NAME in said(capsys, "compare", "--models", "so101", *BESIDE)
+
+
+@pytest.mark.usefixtures("engine", "pinocchio")
+def test_its_fingertip_has_a_witness(capsys: Output) -> None:
+    assert NAME in said(capsys, "fingertip", *ON, "--poses", "5")
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("engine")
+def test_exercises_are_judged_on_it(capsys: Output) -> None:
+    file = str(ROOT / "exercises" / "step_loop.py")
+    text = said(capsys, "check", file, *ON, code=SAYS_NO)
+    assert f"step_loop.py on {NAME}" in text
+    assert "4 not written yet" in text
+
+
+@pytest.mark.usefixtures("engine")
+def test_no_faults_are_made_for_it(capsys: Output) -> None:
+    tests = str(ROOT / "tests" / "test_arm.py")
+    line = said(capsys, "check", "--mutants", tests, *ON, code=BAD_INPUT)
+    assert "the faults are made for mujoco and pybullet" in line
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("engine")
+def test_it_is_viewed(capsys: Output) -> None:
+    pytest.importorskip("viser")
+    assert "http://" in said(capsys, "view", *ON, "--seconds", "0.3")
+    assert "http://" in said(capsys, "view", *ON, "--ghost", "mujoco", "--seconds", "0.3")
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("engine")
+def test_the_doctor_has_a_line_for_it(capsys: Output) -> None:
+    assert NAME in said(capsys, "doctor")
