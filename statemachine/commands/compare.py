@@ -96,7 +96,9 @@ def add_run(parser: argparse.ArgumentParser) -> None:
     )
     add_menagerie(parser)
     parser.add_argument("--seconds", type=float, default=None, metavar="S", help="simulated time")
-    parser.add_argument("--timestep", type=float, default=None, metavar="S", help="on both sides")
+    parser.add_argument(
+        "--timestep", type=float, default=None, metavar="S", help="of each step [s]"
+    )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of what is drawn (0)")
 
 

@@ -93,7 +93,10 @@ def sides_of(
         raise BadInputError(
             "compare takes one experiment: it runs on both engines; two traces are files"
         )
-    scenario(request.what[0])
+    what = request.what[0]
+    if what not in SCENARIOS and Path(what).is_file():
+        raise BadInputError(f"{what!r} is no trace: a trace ends in .npz or .parquet")
+    scenario(what)
     for name in request.backends:
         if name not in backend_names():
             raise unknown_name("backend", name, backend_names())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import TypeVar
+from weakref import WeakKeyDictionary
 
 from ..interface import Model
 
@@ -34,13 +35,15 @@ class ContactNames:
 
     @classmethod
     def of(cls, model: Model) -> ContactNames:
-        """The names of a Model."""
-        return cls(
-            model.body_names,
-            model.geom_names,
-            model.geom_bodyid.tolist(),
-            model.body_parentid.tolist(),
-        )
+        """The names of a Model, made once."""
+        if model not in _OF:
+            _OF[model] = cls(
+                model.body_names,
+                model.geom_names,
+                model.geom_bodyid.tolist(),
+                model.body_parentid.tolist(),
+            )
+        return _OF[model]
 
     def pair(self, one: int, two: int) -> str:
         """The bodies of two geoms that touch: "gripper on floor"."""
@@ -70,6 +73,9 @@ class ContactNames:
                 return count, body
             above = self._parents[above]
         return len(self._parents), body  # a file may say that a body hangs on itself
+
+
+_OF: WeakKeyDictionary[Model, ContactNames] = WeakKeyDictionary()
 
 
 def same_pairs(one: Mapping[str, _T], two: Mapping[str, _T]) -> dict[str, _T]:

@@ -33,7 +33,7 @@ def check_place(target: Path) -> None:
     if not folder.is_dir():
         raise BadInputError(f"{target} cannot be written: there is no folder {folder}")
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise BadInputError(f"{target} cannot be written into its folder")
+        raise BadInputError(f"{target} cannot be written: its folder is read-only for you")
 
 
 @contextmanager
@@ -90,9 +90,12 @@ def _part_of(target: Path) -> Iterator[str]:
 def _new_part(target: Path) -> tuple[int | None, str]:
     """A new file's name, and its handle, which holds a lock until it is closed."""
     while True:
-        handle, name = tempfile.mkstemp(
-            dir=target.parent, prefix=f".{target.name}{_PART}", suffix=target.suffix
-        )
+        try:
+            handle, name = tempfile.mkstemp(
+                dir=target.parent, prefix=f".{target.name}{_PART}", suffix=target.suffix
+            )
+        except OSError as error:  # of the file that was asked for, not of the one beside it
+            raise OSError(error.errno, error.strerror, os.fspath(target)) from None
         if fcntl is None:  # an open file could not be renamed
             os.close(handle)
             return None, name
