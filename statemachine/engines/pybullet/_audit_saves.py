@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
+from ...backends._bullet_client import pb
 from ...interface import Array, Data
-from ...silence import silence
 from ..auditing import Restore
+from .world import read_into, saved_in_a_file, saved_in_memory
 
 
 @dataclass
@@ -49,7 +47,7 @@ def solids(machine: Client) -> list[tuple[int, int]]:
     return [(body, link) for body, link, _ in machine.world.solids()]
 
 
-def written(pb: Any, machine: Client) -> Iterator[Restore]:
+def written(machine: Client) -> Iterator[Restore]:
     """What can be read of positions and velocities is written back."""
     joints = [
         pb.getJointStates(tree.body, tree.joints, machine.id) if tree.joints else ()
@@ -71,48 +69,26 @@ def written(pb: Any, machine: Client) -> Iterator[Restore]:
     yield restore
 
 
-def in_memory(pb: Any, machine: Client) -> Iterator[Restore]:
-    """The engine's saveState: for the world that it was made in."""
-    state = pb.saveState(machine.id)
-    try:
-        yield lambda other: pb.restoreState(state, physicsClientId=other.id)
-    finally:
-        pb.removeState(state, physicsClientId=machine.id)
+def in_memory(machine: Client) -> Iterator[Restore]:
+    """The engine's saveState."""
+    with saved_in_memory(machine.id) as restore:
+        yield lambda other: restore(other.id)
 
 
-def in_a_file(pb: Any, machine: Client) -> Iterator[Restore]:
-    """The engine's file, which another world of the same bodies takes too."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = os.fspath(Path(folder) / "world.bullet")
-        with silence():
-            pb.saveBullet(file, physicsClientId=machine.id)
-
-        def restore(other: Client) -> None:
-            with silence():
-                pb.restoreState(fileName=file, physicsClientId=other.id)
-
-        yield restore
+def in_a_file(machine: Client) -> Iterator[Restore]:
+    """The engine's file."""
+    with saved_in_a_file(machine.id) as restore:
+        yield lambda other: restore(other.id)
 
 
-def taken_apart(pb: Any, machine: Client) -> Iterator[Restore]:
+def taken_apart(machine: Client) -> Iterator[Restore]:
     """Every body is taken far away and brought back, which leaves no memory of contacts."""
-    qpos, qvel = _in_our_words(pb, machine)
+    qpos, qvel = machine.data.qpos.copy(), machine.data.qvel.copy()
+    read_into(machine.world, qpos, qvel)
     yield lambda other: other.world.place(qpos, qvel)
 
 
-def _in_our_words(pb: Any, machine: Client) -> tuple[Array, Array]:
-    """The state as `World.place` wants it."""
-    qpos, qvel = machine.data.qpos.copy(), machine.data.qvel.copy()
-    for tree in machine.world.trees:
-        if tree.joints:
-            states = pb.getJointStates(tree.body, tree.joints, machine.id)
-            qpos[tree.qpos], qvel[tree.qvel] = [s[0] for s in states], [s[1] for s in states]
-        if tree.free:
-            qpos[tree.qpos], qvel[tree.qvel] = machine.world.read_free(tree)
-    return qpos, qvel
-
-
-def let_pass(pb: Any, machine: Client) -> None:
+def let_pass(machine: Client) -> None:
     """Nothing touches anything any more."""
     for body, link in solids(machine):
         pb.setCollisionFilterGroupMask(body, link, 0, 0, machine.id)

@@ -19,7 +19,7 @@ from ...backends._bullet_world import ENGINE_TIMESTEP, Tree, World
 from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model
 from ..parts import LeftAlone, Term, WayBack
-from .world import fresh_world
+from .world import aim, fresh_world, gravity_of, limp, read_into, servos_of
 
 # Before a state is taken, while the jaws still touch what they hold; and after it.
 _BEFORE, _AFTER = 10, 100
@@ -137,13 +137,7 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...
             tree, index = _joint(world, model, joint)
             if not motors:
                 for driven in tree.joints:
-                    pb.setJointMotorControl2(
-                        tree.body,
-                        driven,
-                        pb.VELOCITY_CONTROL,
-                        force=0,
-                        physicsClientId=world.client,
-                    )
+                    limp(tree.body, world.client, driven)
             ratio = _explicit(world, tree)
             speeds = []
             for _ in range(steps):
@@ -170,8 +164,7 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...
 def _fresh_gravity() -> float:
     """The length of the gravity that a world has before anybody sets it."""
     with fresh_world() as client:
-        told = pb.getPhysicsEngineParameters(client)
-        return float(np.linalg.norm([told[f"gravityAcceleration{axis}"] for axis in "XYZ"]))
+        return float(np.linalg.norm(gravity_of(client)))
 
 
 def _explicit(world: World, tree: Tree) -> float:
@@ -201,12 +194,12 @@ def ways_back(model: Model) -> tuple[WayBack, ...]:
     qpos = start.qpos if start else model.compiled.qpos0
     target = start.ctrl if start else np.zeros(model.nu)
     zero = np.zeros(model.nv)
-    touching: list[int] = []
+    servos, touching = servos_of(model), list[int]()
 
     def run(world: World, steps: int) -> Array:
         trace = []
         for _ in range(steps):
-            _command(world, model, target)
+            aim(world, servos, target)
             pb.stepSimulation(world.client)
             trace.append(_joints(world))
         return np.array(trace)
@@ -229,7 +222,8 @@ def ways_back(model: Model) -> tuple[WayBack, ...]:
         return lambda: pb.restoreState(state, physicsClientId=world.client)
 
     def written(world: World) -> Callable[[], None]:
-        now, rate = _state(world, model)
+        now, rate = qpos.copy(), zero.copy()
+        read_into(world, now, rate)
         return lambda: world.put(now, rate)
 
     futures = []
@@ -253,20 +247,6 @@ def ways_back(model: Model) -> tuple[WayBack, ...]:
     )
 
 
-def _command(world: World, model: Model, target: Array) -> None:
-    for tree in world.trees:
-        for index, dof in zip(tree.joints, tree.dofs, strict=False):
-            for actuator in np.flatnonzero(model.actuator_jntid >= 0):
-                if model.jnt_dofadr[model.actuator_jntid[actuator]] == dof:
-                    pb.setJointMotorControl2(
-                        tree.body,
-                        index,
-                        pb.POSITION_CONTROL,
-                        targetPosition=float(target[actuator]),
-                        physicsClientId=world.client,
-                    )
-
-
 def _joints(world: World) -> list[float]:
     """Positions of all joints, and of all bases."""
     values: list[float] = []
@@ -277,16 +257,3 @@ def _joints(world: World) -> list[float]:
             pos, quat = pb.getBasePositionAndOrientation(tree.body, world.client)
             values += [*pos, *quat]
     return values
-
-
-def _state(world: World, model: Model) -> tuple[Array, Array]:
-    qpos, qvel = np.zeros(model.nq), np.zeros(model.nv)
-    for _, start in model._quaternions:
-        qpos[start] = 1.0
-    for tree in world.trees:
-        if tree.joints:
-            states = pb.getJointStates(tree.body, tree.joints, world.client)
-            qpos[tree.qpos], qvel[tree.qvel] = [s[0] for s in states], [s[1] for s in states]
-        if tree.free:
-            qpos[tree.qpos], qvel[tree.qvel] = world.read_free(tree)
-    return qpos, qvel

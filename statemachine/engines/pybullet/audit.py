@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,7 @@ from ..auditing import (
 from ..futures import Coordinates
 from . import _audit_saves as saves
 from ._audit_saves import Client
+from .world import aim, servos_of
 
 _RETARGET = 0.2  # what a target is changed by, to see whether a restore brings it back [rad or m]
 _PUSH = 5.0  # of a force that waits for the next step [N]
@@ -58,12 +59,7 @@ class PybulletDriver(Driver):
         super().__init__(model, seed)
         self.name = f"PyBullet {model.engine_version} itself"
         self.pb: Any = require("pybullet")
-        # Where each servo's joint has its degree of freedom; one that drives no joint is left out.
-        self._servos = {
-            int(model.jnt_dofadr[joint]): servo
-            for servo, joint in enumerate(model.actuator_jntid.tolist())
-            if joint >= 0
-        }
+        self._servos = servos_of(model)
 
     def lacks(self, point: SavePoint) -> str:
         limits = point.model.capabilities.behaviours["joint limits"]
@@ -105,16 +101,7 @@ class PybulletDriver(Driver):
 
     def command(self, machine: Client, ctrl: Array) -> None:
         machine.targets = np.clip(ctrl, *self.model.actuator_ctrlrange.T)
-        for tree in machine.world.trees:
-            for index, dof in zip(tree.joints, tree.dofs.tolist(), strict=False):
-                if dof in self._servos:
-                    self.pb.setJointMotorControl2(
-                        tree.body,
-                        index,
-                        self.pb.POSITION_CONTROL,
-                        targetPosition=float(machine.targets[self._servos[dof]]),
-                        physicsClientId=machine.id,
-                    )
+        aim(machine.world, self._servos, machine.targets)
 
     def advance(self, machine: Client, nstep: int = 1) -> None:
         for _ in range(nstep):
@@ -164,14 +151,14 @@ class PybulletDriver(Driver):
             SaveMethod("taken apart + targets", self._way(saves.taken_apart)),
         )
 
-    def _way(self, save: Callable[[Any, Client], Iterator[Restore]], known: bool = True) -> Save:
+    def _way(self, save: Callable[[Client], Iterator[Restore]], known: bool = True) -> Save:
         """A way to save; `known`: with what the user knows and the engine does not tell."""
 
         @contextmanager
         def whole(machine: Client) -> Iterator[Restore]:
             time = machine.time
             targets = None if machine.targets is None else machine.targets.copy()
-            with contextmanager(save)(self.pb, machine) as restore:
+            with contextmanager(save)(machine) as restore:
 
                 def back(other: Client) -> None:
                     restore(other)
@@ -192,7 +179,7 @@ class PybulletDriver(Driver):
             "saveBullet": self._way(saves.in_a_file, known=False),
         }
         best = SaveMethod(_BEST, self._way(saves.written))
-        return HiddenState(ways, self._changes(point), partial(saves.let_pass, self.pb), best)
+        return HiddenState(ways, self._changes(point), saves.let_pass, best)
 
     def _changes(self, point: SavePoint) -> dict[str, Callable[[Client], None]]:
         pb = self.pb
@@ -213,7 +200,7 @@ class PybulletDriver(Driver):
         found: dict[str, Callable[[Client], None]] = {
             "motor targets": motor_targets,
             "a waiting force": waiting_force,
-            "collision masks": partial(saves.let_pass, pb),
+            "collision masks": saves.let_pass,
             "frictions": friction,
         }
         if not point.powered or not self._servos:

@@ -11,7 +11,7 @@ from ...interface import Array
 from ..measured import Futures, LetGo, Measurement, OneStep, ReadTwice, Sliding
 from ..samples import floor, joint_tree, marked, pendulum
 from . import pile
-from .world import fresh_world, limp, load, put_floor
+from .world import fresh_world, gravity_of, limp, load, put_floor
 from .world import timestep as step_of
 
 
@@ -51,16 +51,15 @@ def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Arr
         return before, _marks(client, body)
 
 
-def gravity(steps: int) -> tuple[list[float], Array]:
+def gravity(steps: int) -> tuple[tuple[float, ...], Array]:
     """A body in a world that was told nothing, let go; without the damping that bodies have."""
     with fresh_world() as client:
         body = load(client, marked.URDF)
         pb.changeDynamics(body, -1, linearDamping=0, physicsClientId=client)
-        told = pb.getPhysicsEngineParameters(client)
         for _ in range(steps):
             pb.stepSimulation(client)
-        fall = np.array(pb.getBaseVelocity(body, client)[0]) / (steps * told["fixedTimeStep"])
-        return [told[f"gravityAcceleration{axis}"] for axis in "XYZ"], fall
+        seconds = steps * step_of(client)
+        return gravity_of(client), np.array(pb.getBaseVelocity(body, client)[0]) / seconds
 
 
 def timestep() -> OneStep:

@@ -6,21 +6,18 @@ next step show in what the next step does.
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 
 from ...backends._bullet_client import pb
 from ...interface import Array
-from ...silence import silence
 from ..samples.pendulum import GRAVITY, URDF
 from ..samples.pile import HALF, PLACES, TILT
-from .world import fresh_world, load, put_floor
+from .world import Restore, fresh_world, load, put_floor, saved_in_a_file, saved_in_memory
 
 _TURNS = (np.array((*TILT[1:], TILT[0])) / np.linalg.norm(TILT), *[np.array((0, 0, 0, 1.0))] * 2)
 _NEAR = 0.05  # of what was written; a motor's target is met that well in one step
@@ -183,22 +180,13 @@ RESETS = {
 }
 
 
-def _in_memory(scene: Pile) -> Iterator[Callable[[], None]]:
-    state = pb.saveState(scene.client)
-    yield lambda: pb.restoreState(state, physicsClientId=scene.client)
+def _of_the_world(save: Callable[[int], AbstractContextManager[Restore]]) -> Saved:
+    @contextmanager
+    def saved(scene: Pile) -> Iterator[Callable[[], None]]:
+        with save(scene.client) as restore:
+            yield partial(restore, scene.client)
 
-
-def _in_a_file(scene: Pile) -> Iterator[Callable[[], None]]:
-    with tempfile.TemporaryDirectory() as folder:
-        file = os.fspath(Path(folder) / "world.bullet")
-        with silence():
-            pb.saveBullet(file, physicsClientId=scene.client)
-
-        def restore() -> None:
-            with silence():
-                pb.restoreState(fileName=file, physicsClientId=scene.client)
-
-        yield restore
+    return saved
 
 
 def _read_and_written(scene: Pile) -> Iterator[Callable[[], None]]:
@@ -218,8 +206,8 @@ def _read_and_written(scene: Pile) -> Iterator[Callable[[], None]]:
 
 WAYS_TO_SAVE: dict[str, Saved] = {
     "positions, velocities written": contextmanager(_read_and_written),
-    "saveState, restoreState": contextmanager(_in_memory),
-    "saveBullet, restoreState": contextmanager(_in_a_file),
+    "saveState, restoreState": _of_the_world(saved_in_memory),
+    "saveBullet, restoreState": _of_the_world(saved_in_a_file),
 }
 
 

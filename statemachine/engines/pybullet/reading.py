@@ -23,11 +23,12 @@ from ...description.records import (
     RobotJoint,
     Setting,
 )
-from ...errors import EngineError, ModelError
+from ...errors import ModelError
 from ...installed import engine_version, require
 from ...interface import make_data
 from ...rotations import matrix_from_quat, wxyz_from_xyzw
 from ...silence import silence
+from .world import fresh_world
 
 _KINDS = {0: "hinge", 1: "slide", 2: "ball"}  # JOINT_REVOLUTE, JOINT_PRISMATIC, JOINT_SPHERICAL
 _SHAPES = {2: "sphere", 3: "box", 4: "cylinder", 5: "mesh", 6: "plane", 7: "capsule"}
@@ -42,11 +43,7 @@ def _loaded(path: Path) -> Iterator[tuple[int, list[int]]]:
     """
     urdf.read(path)  # of some bad files PyBullet makes an end of the process
     pb = require("pybullet")
-    client = pb.connect(pb.DIRECT)
-    if client < 0:
-        raise EngineError("PyBullet has no room for another world in this process")
-    try:
-        pb.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=client)
+    with fresh_world() as client:
         with silence() as said:
             try:
                 body = pb.loadURDF(str(path), physicsClientId=client)
@@ -56,8 +53,6 @@ def _loaded(path: Path) -> Iterator[tuple[int, list[int]]]:
         if body < 0:
             raise ModelError(f"PyBullet cannot read {path.name}: {'; '.join(said[-2:])}")
         yield client, [body]
-    finally:
-        pb.disconnect(client)
 
 
 def _everything(client: int) -> list[int]:
@@ -235,13 +230,8 @@ def _size(kind: str, told: Sequence[float]) -> tuple[float, ...]:
 
 def _settings(pb: Any) -> dict[str, Setting]:
     """Of a world that nobody has set anything in."""
-    fresh = pb.connect(pb.DIRECT)
-    if fresh < 0:
-        raise EngineError("PyBullet has no room for another world in this process")
-    try:
-        told = pb.getPhysicsEngineParameters(fresh)
-    finally:
-        pb.disconnect(fresh)
+    with fresh_world() as client:
+        told = pb.getPhysicsEngineParameters(client)
     return {
         "timestep": told["fixedTimeStep"],
         "gravity": tuple(told[f"gravityAcceleration{axis}"] for axis in "XYZ"),
