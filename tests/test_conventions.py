@@ -778,6 +778,20 @@ def test_a_room_of_another_package_may_have_a_part_of_the_parts(
         record("", "theirs")
 
 
+def test_a_room_that_cannot_be_imported_is_left_out(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(engines, "_ROOMS", dict(engines._ROOMS))
+    engines.register("broken", "no_such_package")
+    assert "broken" not in engines.rooms_with("conventions")
+    with pytest.raises(MissingEngineError, match="room of 'broken' cannot be loaded"):
+        ask("gravity", "broken")
+    assert main(("conventions", "gravity")) == 0
+    out, err = capsys.readouterr()
+    assert "room of 'broken'" in err
+    assert "broken" not in out
+
+
 def test_errors_of_the_library() -> None:
     need: Callable[..., Any] = ask
     with pytest.raises(UnknownNameError, match="gravity"):

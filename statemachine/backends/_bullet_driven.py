@@ -104,9 +104,13 @@ class DrivenWorld(HiddenWorld):
         """As it comes, only a world that is loaded anew starts alike."""
         if self._shared.kind != "engine":
             return self
-        other = DrivenWorld(self._shared)
+        other = self._anew()
         self.close()
         return other
+
+    def _anew(self) -> DrivenWorld:
+        """Another one, opened as this one was."""
+        return DrivenWorld(self._shared)
 
     def close(self) -> None:
         """Give the client back."""

@@ -15,8 +15,7 @@ from contextlib import redirect_stdout
 from dataclasses import dataclass
 from typing import Any
 
-from ..engines import part, rooms_with
-from ..engines.call_watch import CallsPart
+from ..engines import needed_part, rooms_with
 from ..errors import BadInputError, StateMachineError, unknown_name
 from ..installed import engine_version, require
 from ..interface import Model
@@ -98,7 +97,8 @@ def record(code: str, engine: str) -> CallRecording:
     if engine not in recorded_engines():
         raise unknown_name("engine whose calls can be recorded", engine, recorded_engines())
     require(engine)
-    watches = [_part(name).watch() for name in (engine, *_part(engine).WORDS.helpers)]
+    helpers = needed_part(engine, "calls").WORDS.helpers
+    watches = [needed_part(name, "calls").watch() for name in (engine, *helpers)]
     namespace: dict[str, Any] = {"__name__": "__main__"}
     done: list[Statement] = []
     error = None
@@ -121,12 +121,6 @@ def record(code: str, engine: str) -> CallRecording:
                 f"the code's {name} is on {value.backend}, and {engine} was to be recorded"
             )
     return CallRecording(engine, engine_version(engine), tuple(done), error)
-
-
-def _part(engine: str) -> CallsPart:
-    own: CallsPart | None = part(engine, "calls")
-    assert own is not None, engine
-    return own
 
 
 def _statements(code: str) -> Iterator[tuple[str, int, Callable[[dict[str, Any]], None]]]:

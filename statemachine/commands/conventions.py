@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..errors import BadInputError
+from ..errors import BadInputError, MissingEngineError
 from ..installed import ENGINES, available
 from ._common import MISSING, PROGRAM, add_json, complain, show
 
@@ -60,7 +60,13 @@ def _engines(asked: str) -> list[str]:
         check_engine(asked)
         return [asked]
     found, missing = available()
-    found += [name for name in room_names() if name not in ENGINES]
+    for name in [name for name in room_names() if name not in ENGINES]:
+        try:
+            check_engine(name)
+        except MissingEngineError as error:
+            missing.append(error)
+        else:
+            found.append(name)
     for error in missing if found else missing[:-1]:
         complain(error, MISSING)
     if not found:

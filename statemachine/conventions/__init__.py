@@ -141,6 +141,7 @@ def check_engine(name: str) -> None:
     """
     if name in ENGINES or name not in room_names():
         require(name)
+    part(name, "conventions")
 
 
 def versions(engines: Sequence[str]) -> dict[str, str]:

@@ -11,9 +11,11 @@ from __future__ import annotations
 import importlib
 import importlib.metadata
 import importlib.util
+from contextlib import suppress
 from typing import Any
 
-from ..errors import BadInputError, UnsupportedError, unknown_name
+from ..errors import BadInputError, MissingEngineError, UnsupportedError, unknown_name
+from ..installed import raise_if_interrupted
 
 _ROOMS: dict[str, str] = {
     name: f"{__name__}.{name}" for name in ("mujoco", "pybullet", "pinocchio")
@@ -66,7 +68,11 @@ def rooms_with(name: str) -> list[str]:
     Args:
         name: One of `PARTS`.
     """
-    return [engine for engine in room_names() if _module(engine, name)]
+    rooms = []
+    for engine in room_names():
+        with suppress(MissingEngineError):
+            rooms += [engine] if _module(engine, name) else []
+    return rooms
 
 
 def part(engine: str | None, name: str) -> Any:
@@ -75,6 +81,9 @@ def part(engine: str | None, name: str) -> Any:
     Args:
         engine: Its name; None for no engine.
         name: One of `PARTS`.
+
+    Raises:
+        MissingEngineError: The engine is not installed here, or its room cannot be imported.
     """
     if name not in PARTS:
         raise unknown_name("part of an engine's room", name, PARTS)
@@ -104,4 +113,11 @@ def needed_part(engine: str, name: str) -> Any:
 def _module(engine: str, name: str) -> str | None:
     """The module of a part, which is not imported; None if there is none."""
     module = f"{_ROOMS[engine]}.{name}"
-    return module if importlib.util.find_spec(module) else None
+    try:
+        return module if importlib.util.find_spec(module) else None
+    except ImportError as error:  # the package of the room
+        raise_if_interrupted(error)
+        raise MissingEngineError(
+            f"the room of {engine!r} cannot be loaded from {_ROOMS[engine]!r}: {error}",
+            engine=engine,
+        ) from error

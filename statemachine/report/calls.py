@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby, zip_longest
 
 from ..calls import Call, CallRecording, Statement
-from ..engines import part
+from ..engines import needed_part
 from ..engines.call_watch import CallWords
 from ..interface import DERIVED
 from ..page import Block, Code, Table, Text
@@ -138,9 +138,7 @@ def _names(changed: Sequence[str]) -> str:
 
 
 def _words(engine: str) -> CallWords:
-    own = part(engine, "calls")
-    assert own is not None, engine
-    return own.WORDS
+    return needed_part(engine, "calls").WORDS
 
 
 def _legend(recordings: Mapping[str, CallRecording]) -> Iterator[Text]:

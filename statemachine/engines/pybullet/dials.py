@@ -18,12 +18,14 @@ import numpy as np
 
 from ...backends import load
 from ...backends._bullet_client import pb
+from ...backends._bullet_driven import DrivenWorld
 from ...backends._bullet_plan import Plan
+from ...backends._bullet_shared import Shared
 from ...backends._bullet_surfaces import Surfaces
 from ...backends._bullet_world import World
 from ...backends.pybullet_backend import PybulletData, PybulletModel
 from ...errors import EngineError
-from ...interface import Model, State
+from ...interface import Model
 from ..parts import Setting
 
 # What a fresh body has: a single-precision literal in the engine.
@@ -161,8 +163,21 @@ def frictionless(model: Model) -> Model:
     return _dialled(model, [_smooth])
 
 
+class DialledWorld(DrivenWorld):
+    """A world that is given some settings when it is opened."""
+
+    def __init__(self, shared: Shared, acts: tuple[Act, ...]) -> None:
+        super().__init__(shared)
+        self._acts = acts
+        for act in acts:
+            act(self.raw)
+
+    def _anew(self) -> DialledWorld:
+        return DialledWorld(self._shared, self._acts)
+
+
 class DialledModel(PybulletModel):
-    """A Model whose every world is given some settings before anything is done in it."""
+    """A Model whose Data have such worlds. What `forward` computes knows nothing of the dials."""
 
     _acts: tuple[Act, ...]
 
@@ -175,38 +190,7 @@ class DialledModel(PybulletModel):
         acts: tuple[Act, ...],
     ) -> None:
         super().__init__(plan, path, substeps, defaults)
-        vars(self)["_acts"] = acts
-
-    def _make_data(self) -> PybulletData:
-        return DialledData(self)
-
-
-class DialledData(PybulletData):
-    """A Data of such a Model. What `forward` computes knows nothing of the dials."""
-
-    __slots__ = ("_dialled",)
-
-    _dialled: int
-
-    def __init__(self, model: DialledModel) -> None:
-        super().__init__(model)
-        self._dialled = -1
-        self._dial()
-
-    def _dial(self) -> None:
-        world = self.raw
-        if world.client != self._dialled:
-            for act in cast("DialledModel", self._home)._acts:
-                act(world)
-            self._dialled = world.client
-
-    def _reset(self, key: int | None) -> None:
-        super()._reset(key)
-        self._dial()  # the engine's own world is loaded anew
-
-    def _set_state(self, state: State) -> None:
-        super()._set_state(state)
-        self._dial()
+        vars(self).update(_acts=acts, _open_world=partial(DialledWorld, self._shared, acts))
 
 
 def _dialled(model: Model, acts: list[Act], plan: Plan | None = None) -> Model:
