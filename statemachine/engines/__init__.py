@@ -14,10 +14,9 @@ import importlib.util
 from typing import Any
 
 from ..errors import BadInputError, UnsupportedError, unknown_name
+from ..installed import ENGINES
 
-_ROOMS: dict[str, str] = {
-    name: f"{__name__}.{name}" for name in ("mujoco", "pybullet", "pinocchio")
-}
+_ROOMS: dict[str, str] = {name: f"{__name__}.{name}" for name in ENGINES}
 # What a room may have.
 PARTS: dict[str, str] = {
     "as_it_comes": "what the engine calls things, and a model as its own users load it",
@@ -35,7 +34,7 @@ PARTS: dict[str, str] = {
 
 
 def room_names() -> list[str]:
-    """Names of the engines that have a room, whether or not they are installed."""
+    """Names of the engines that may have a room, whether or not they are installed."""
     for entry in importlib.metadata.entry_points(group="statemachine.engines"):
         _ROOMS.setdefault(entry.name, entry.value)
     return list(_ROOMS)
@@ -102,5 +101,6 @@ def needed_part(engine: str, name: str) -> Any:
 
 def _module(engine: str, name: str) -> str | None:
     """The module of a part, which is not imported; None if there is none."""
-    module = f"{_ROOMS[engine]}.{name}"
-    return module if importlib.util.find_spec(module) else None
+    room = _ROOMS[engine]
+    built = importlib.util.find_spec(room) and importlib.util.find_spec(f"{room}.{name}")
+    return f"{room}.{name}" if built else None
