@@ -97,6 +97,7 @@ urdf: $(VENV)/run.stamp
 
 # make extras       what figures, films, the viewer and parquet need, too
 extras: $(VENV)/run.stamp
+	@echo "adding figures, films, the viewer and parquet: about half a minute ..."
 	@$(PIP) $(CONSTRAINTS) -e '.[plot,render,mp4,view,parquet]'
 
 # make report       where the engines part when the arm is told one pose, and why: hold.html

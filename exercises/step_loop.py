@@ -260,4 +260,7 @@ def main(functions):
 
 
 if __name__ == "__main__":
-    sys.exit(main(globals()))
+    try:
+        sys.exit(main(globals()))
+    except KeyboardInterrupt:
+        sys.exit(130)

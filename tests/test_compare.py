@@ -19,7 +19,6 @@ from statemachine.compare import (
     Comparison,
     Request,
     compare,
-    parse_tolerances,
     series,
     sides_of,
     touches,
@@ -27,6 +26,7 @@ from statemachine.compare import (
 )
 from statemachine.compare.series import normal_forces, total_forces
 from statemachine.compare.tolerances import COUNT
+from statemachine.comparison import parse_tolerances
 from statemachine.errors import BadInputError, MissingEngineError, TraceError, UnknownNameError
 from statemachine.experiments.scenarios import SCENARIOS
 from statemachine.installed import available
@@ -35,7 +35,7 @@ from statemachine.report import compare as report
 from statemachine.report import terminal
 from statemachine.traces import Trace, record, record_scenario, write
 
-from .conftest import Cli, need_engine
+from .conftest import ROOT, Cli, need_engine
 
 
 def traced(name: str, **options: Any) -> Trace:
@@ -551,3 +551,33 @@ def test_poses_that_are_no_numbers_cost_the_picture_and_no_more(
     assert done.returncode != 0
     assert "no poses of the bodies that are numbers" in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+# Mistakes that were met.
+
+
+def test_a_timestep_in_milliseconds_is_refused(cli: Cli) -> None:
+    done = cli("compare", "hold", "--timestep", "10")
+    assert done.returncode == 2
+    assert "a timestep of 10 s is longer than the run of 2 s" in done.stderr
+
+
+def test_a_file_that_is_no_trace_is_taken_for_no_experiment(cli: Cli, tmp_path: Path) -> None:
+    (tmp_path / "waves.csv").write_text("time\n")
+    done = cli("compare", tmp_path / "waves.csv")
+    assert done.returncode == 2
+    assert "a trace ends in .npz or .parquet" in done.stderr
+
+
+def test_a_model_without_actuators_holds_nothing(cli: Cli) -> None:
+    done = cli("lesson", "hold", "--model", ROOT / "models/so101/so101.urdf")
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert "so101.urdf has no actuators" in done.stderr
+
+
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="no /proc")
+def test_a_place_that_refuses_is_named_and_no_other(cli: Cli) -> None:
+    done = cli("trace", "record", "droop", "--seconds", "0.1", "-o", "/proc/droop.npz")
+    assert done.returncode != 0
+    assert ".part-" not in done.stderr
+    assert "/proc/droop.npz" in done.stderr

@@ -9,7 +9,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.compare import compare, touches
-from statemachine.comparison import ContactNames, same_pairs
+from statemachine.comparison import ContactNames, Gap, largest, nearest, same_pairs, text
 from statemachine.experiments import hold
 from statemachine.experiments.scenarios import SCENARIOS
 from statemachine.report.html.timeline import events_of
@@ -83,8 +83,54 @@ def test_what_the_world_is_made_of_is_told_apart(tmp_path: Path) -> None:
         "</worldbody></mujoco>"
     )
     trace = record(sm.load(path), seconds=0.05)
-    pairs = trace.contact_pairs()
+    pairs = trace.contact_pairs
     assert set(pairs) == {"box on floor", "box on wall"}
     assert sorted(np.concatenate(list(pairs.values())).tolist()) == list(
         range(len(trace["contact_row"]))
     )
+
+
+@pytest.mark.parametrize(
+    ("said", "expected"),
+    [
+        (text.quantity(np.pi / 180, "rad"), "1.00°"),
+        (text.quantity(0.0, "m"), "0 mm"),
+        (text.quantity(2e-7, "m"), "2e-4 mm"),
+        (text.quantity(0.005, "s"), "5.00 ms"),
+        (text.quantity(12.34, "N"), "12.3 N"),
+        (text.quantity(None, "N"), "–"),
+        (text.quantity(float("nan"), "N"), "none"),
+        (text.rounded(0.0025, "m"), "2.5 mm"),
+        (text.distance(1e-12, "rad"), "below 1e-06°"),
+        (text.rough(1e-9, "m"), "1e-06 mm"),
+        (text.rough(float("inf")), "beyond all"),
+        (text.millimetres(-1e-9), "0.00 mm"),
+        (text.signed(-1e-9), "0.0000"),
+        (text.signed(0.5, 1), "+0.5"),
+        (text.vector([-0.0, 1.0], 1), "[0.0 1.0]"),
+        (text.milliseconds(1 / 240), "4.167 ms"),
+        (text.percent(1e-9), "< 1e-6 %"),
+        (text.count(1, "step"), "1 step"),
+        (text.count(2000, "step"), "2,000 steps"),
+        (text.count(0, "limit", zero="no"), "no limits"),
+        (text.listed(["a", "b", "c"]), "a, b and c"),
+        (text.few(["a", "b", "c"], 1), "a and 2 more"),
+        (text.sentence("it is so"), "It is so."),
+        (text.command(["see", "a b"], ("--n", 1, 1), ("--m", 2, 1), ("--x", True, False)),
+         "see 'a b' --m 2 --x"),
+    ],
+)  # fmt: skip
+def test_numbers_and_lists_as_text(said: str, expected: str) -> None:
+    assert said == expected
+
+
+def test_the_largest_and_where_and_what_is_no_number() -> None:
+    assert largest(np.array([1.0, 3.0, 2.0])) == (3.0, 1)
+    assert largest(np.array([1.0, np.nan, np.inf]))[1] == 1
+    assert str(Gap.of(np.array([0.001, 0.002]), "m", ["a", "b"])) == "2 mm at b"
+
+
+def test_the_nearest_row() -> None:
+    time = np.array([0.0, 1.0, 2.0])
+    assert nearest(time, np.array([-1.0, 0.4, 0.6, 5.0])).tolist() == [0, 0, 1, 2]
+    assert nearest(time[:1], np.array([0.0, 3.0])).tolist() == [0, 0]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import dataclasses
 import gc
 import json
@@ -777,17 +776,6 @@ def test_a_room_of_another_package_may_have_a_part_of_the_parts(
     assert phrase == phrasebook.Phrase("load", "a = int(open(file).read())", True, "")
     with pytest.raises(UnknownNameError, match="calls can be recorded"):
         record("", "theirs")
-
-
-@pytest.mark.parametrize("room", ["conventions", "calls"])
-def test_who_asks_names_no_engine(room: str) -> None:
-    for file in (ROOT / "statemachine" / room).glob("*.py"):
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            assert not (isinstance(node, ast.Constant) and node.value in ENGINES), file
-            named = isinstance(node, (ast.FunctionDef, ast.Attribute, ast.Name))
-            assert not (
-                named and {getattr(node, k, "") for k in ("name", "attr", "id")} & {*ENGINES}
-            )
 
 
 def test_errors_of_the_library() -> None:

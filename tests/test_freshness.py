@@ -15,6 +15,7 @@ import pytest
 import statemachine as sm
 from statemachine.backends.mujoco_backend import MujocoData
 from statemachine.comparison import Gap
+from statemachine.comparison.readings import readings
 from statemachine.errors import (
     BadInputError,
     ClosedDataError,
@@ -26,7 +27,7 @@ from statemachine.interface import DERIVED, POSES, Data, Model
 from statemachine.report.as_json import plain
 from statemachine.rotations import matrix_from_quat
 from statemachine.staleness import age
-from statemachine.staleness.age import Scratch, back, readings
+from statemachine.staleness.age import Scratch, back
 from statemachine.staleness.gaps import gaps, told
 from statemachine.staleness.result import table
 

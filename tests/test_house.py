@@ -23,7 +23,7 @@ MAY_NAME = ("backends/", "engines/", "installed.py", "kinematics.py", "witness_f
 NAMES = frozenset(ENGINES) | {engine.module for engine in ENGINES.values()}
 
 STILL_CIRCLES: set[frozenset[str]] = set()
-STILL_TWICE = {"Side"}
+STILL_TWICE: set[str] = set()
 
 
 @cache

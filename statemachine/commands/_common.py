@@ -73,7 +73,7 @@ def on_each_backend(
         options: Its `backend` and `menagerie` are read.
         what: Shown beside the progress.
         model: A model's name or file.
-        run: Called with the Model, the backend's name and a Report.
+        run: Called with the Model, the backend's name and what is told the fraction that is done.
     """
     from ..backends import backend_names, load
     from ..report.progress import progress

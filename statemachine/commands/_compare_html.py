@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import shlex
 import sys
 from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError, MissingEngineError, StateMachineError
 from ..installed import PAIR
+from ._common import PROGRAM
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -147,24 +147,21 @@ def _look(request: Any, trace: Any) -> Any:
 
 def _typed(options: argparse.Namespace, request: Any) -> str:
     """The command as typed, without folders of this machine."""
-    words = ["statemachine compare", *(Path(word).name for word in request.what)]
+    from ..comparison.text import command
+
+    words = [PROGRAM, "compare", *(Path(word).name for word in request.what)]
     if tuple(request.backends) != PAIR:
         words += ["--backends", *request.backends]
-    for flag, value, usual in (
+    return command(
+        words,
         ("--defaults", request.defaults, "model"),
         ("--model", request.model and Path(request.model).name, None),
         ("--menagerie", request.menagerie and "DIR", None),
         ("--seconds", request.seconds, None),
         ("--timestep", request.options.get("timestep"), None),
         ("--seed", request.seed, 0),
-    ):
-        if value != usual:
-            words += [flag, str(value)]
-    for text in options.tolerance:
-        words += ["--tolerance", text]
-    if options.quantity:
-        words += ["--quantity", options.quantity]
-    if options.no_why:
-        words.append("--no-why")
-    words += ["--html", Path(options.html).name]
-    return " ".join([words[0], *(shlex.quote(word) for word in words[1:])])
+        *(("--tolerance", text, None) for text in options.tolerance),
+        ("--quantity", options.quantity or None, None),
+        ("--no-why", options.no_why, False),
+        ("--html", Path(options.html).name, None),
+    )

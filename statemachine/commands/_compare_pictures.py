@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -77,12 +76,14 @@ def checked(options: argparse.Namespace) -> Pictures:
         BadInputError: A file has another suffix or cannot be written, or a figure is none.
         MissingEngineError: An extra is missing, or nothing here can draw a film.
     """
+    from ..traces.whole import check_place
+
     plot, film = (None if word is None else Path(word) for word in (options.plot, options.film))
     if plot is not None:
         from ..report import plot as plots
 
         plots.check_suffix(plot)
-        _check_place(plot)
+        check_place(plot)
     renderer = None
     if film is not None:
         from ..rendering import renderer_here, renderers
@@ -93,7 +94,7 @@ def checked(options: argparse.Namespace) -> Pictures:
         films.check_suffix(film)
         check_speed(options.fps, options.slow)
         check_size(options.size, films.SMALLEST)
-        _check_place(film)
+        check_place(film)
         with progress("looking for OpenGL"):
             renderer = renderer_here(None if options.renderer == "auto" else options.renderer)
         if options.renderer == "auto" and renderer.name != renderers()[0]:
@@ -167,19 +168,6 @@ def _models(options: Any, *traces: Any) -> Any:
             )
         models.append(model)
     return tuple(models)
-
-
-def _check_place(path: Path) -> None:
-    if path.is_dir():
-        raise BadInputError(f"{path} is a folder, not a file")
-    folder = path.parent
-    if not folder.is_dir():
-        raise BadInputError(f"{path} cannot be written: there is no folder {folder}")
-    try:
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise BadInputError(f"{path} cannot be written: {error.strerror}") from None
 
 
 def _size(text: str) -> tuple[int, int]:

@@ -96,7 +96,9 @@ def add_run(parser: argparse.ArgumentParser) -> None:
     )
     add_menagerie(parser)
     parser.add_argument("--seconds", type=float, default=None, metavar="S", help="simulated time")
-    parser.add_argument("--timestep", type=float, default=None, metavar="S", help="on both sides")
+    parser.add_argument(
+        "--timestep", type=float, default=None, metavar="S", help="of each step [s]"
+    )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of what is drawn (0)")
 
 
@@ -151,7 +153,8 @@ def _run_why(options: argparse.Namespace) -> int:
 
 
 def _run_compare(options: argparse.Namespace) -> int:
-    from ..compare import compare, parse_tolerances, sides_of, touches, witness
+    from ..compare import compare, sides_of, touches, witness
+    from ..comparison import parse_tolerances
     from ..report import compare as report
     from ..report.progress import progress
 

@@ -18,7 +18,9 @@ def add(commands: Any) -> None:
         description="Ask the engines themselves, not our backends: every answer is measured.",
     )
     parser.add_argument(
-        "question", nargs="*", help="only these, such as quaternion or gravity (default: all)"
+        "question",
+        nargs="*",
+        help="only these, such as quaternion or gravity (default: all; a wrong name lists them)",
     )
     parser.add_argument("--calls", action="store_true", help="which call does what, each run")
     parser.add_argument(

@@ -41,7 +41,7 @@ def add(commands: Any) -> None:
         help="of the whole path: where to begin, if not at the first",
     )
     path.set_defaults(run=run_path)
-    named = path.add_subparsers(metavar="name")
+    named = path.add_subparsers(metavar="[name]")
     for lesson in LESSONS.values():
         _add_lesson(named, lesson)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 from typing import Any
 
@@ -213,12 +212,15 @@ def run_play(options: argparse.Namespace) -> int:
 
 def _typed_play(options: argparse.Namespace) -> str:
     """The command that plays this again, without paths of this machine."""
-    words = [PROGRAM, "trace", "play", Path(options.file).name, "--backend", options.backend]
-    if options.defaults != "model":
-        words += ["--defaults", options.defaults]
-    if options.model:
-        words += ["--model", Path(options.model).name]
-    return one_line(" ".join(words))
+    from ..comparison.text import command
+
+    return one_line(
+        command(
+            [PROGRAM, "trace", "play", Path(options.file).name, "--backend", options.backend],
+            ("--defaults", options.defaults, "model"),
+            ("--model", options.model and Path(options.model).name, None),
+        )
+    )
 
 
 def run_show(options: argparse.Namespace) -> int:
@@ -258,16 +260,13 @@ def run_pictures(options: argparse.Namespace) -> int:
 def _target(given: str | None, usual: str, suffixes: tuple[str, ...] = ()) -> Path:
     """Where to write, refused before anything runs if that cannot be."""
     from ..traces.files import SUFFIXES
+    from ..traces.whole import check_place
 
     target = Path(given or usual)
     known = suffixes or SUFFIXES
     if target.suffix.lower() not in known:
         raise BadInputError(f"the output ends in {' or '.join(known)}; got {target.name!r}")
-    folder = target.parent
-    if not folder.is_dir():
-        raise BadInputError(f"there is no folder {folder}")
-    if target.is_dir() or not os.access(folder, os.W_OK):
-        raise BadInputError(f"{target} cannot be written")
+    check_place(target)
     return target
 
 
@@ -292,22 +291,23 @@ def _written(trace: Any, target: Path) -> int:
 
 def _typed(options: argparse.Namespace) -> str:
     """The command that records this again, without paths of this machine."""
+    from ..comparison.text import command
+
     words = [PROGRAM, "trace", "record"]
     if options.what:
         words.append(options.what)
     else:
         file, colon, name = options.controller.partition(":")
         words += ["--controller", Path(file).name + colon + name]
-    for flag, usual in (
-        ("backend", DEFAULT),
-        ("defaults", "model"),
-        ("keyframe", None),
-        ("model", None),
-        ("seconds", None),
-        ("timestep", None),
-        ("seed", 0),
-    ):
-        value = getattr(options, flag)
-        if value != usual:
-            words += [f"--{flag}", Path(value).name if flag == "model" else str(value)]
-    return one_line(" ".join(words))
+    return one_line(
+        command(
+            words,
+            ("--backend", options.backend, DEFAULT),
+            ("--defaults", options.defaults, "model"),
+            ("--keyframe", options.keyframe, None),
+            ("--model", options.model and Path(options.model).name, None),
+            ("--seconds", options.seconds, None),
+            ("--timestep", options.timestep, None),
+            ("--seed", options.seed, 0),
+        )
+    )

@@ -12,7 +12,6 @@ from __future__ import annotations
 from .agreement import Agreement, Comparison, Side, compare
 from .series import Series, default_tip, series
 from .sides import Request, sides_of
-from .tolerances import Tolerance, parse_tolerances
 from .touches import Contact, Touch, touches
 from .witness import Witness, witness
 
@@ -23,12 +22,10 @@ __all__ = [
     "Request",
     "Series",
     "Side",
-    "Tolerance",
     "Touch",
     "Witness",
     "compare",
     "default_tip",
-    "parse_tolerances",
     "series",
     "sides_of",
     "touches",

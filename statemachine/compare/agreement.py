@@ -9,13 +9,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..comparison import SAME, common_moments, largest, same_pairs
+from ..comparison import QUANTITIES, SAME, common_moments, largest, same_pairs
 from ..errors import TraceError
 from ..experiments._common import Provenance
 from ..interface import Array
 from ..traces import Trace
 from .notes import notes_on
-from .series import UNITS, Kind, Series, series
+from .series import Series, series
 from .tolerances import tolerance_for
 
 Verdict = Literal["agrees", "settles", "differs"]
@@ -41,7 +41,7 @@ class Agreement:
     """
 
     name: str
-    kind: Kind
+    kind: str
     unit: str
     max: float
     at: float
@@ -140,7 +140,7 @@ def compare(
         TraceError: They share no joint, or too few moments.
     """
     curves = series(one, two, tip)
-    if not any(curve.kind in ("joint", "slide", "body", "body rotation") for curve in curves):
+    if not any(QUANTITIES[curve.kind].own for curve in curves):
         raise TraceError("the traces have no joint in common: nothing can be compared")
     found = [_of_curve(curve, one, two, tolerances) for curve in curves]
     common = common_moments(one, two)
@@ -227,7 +227,7 @@ def _touches(
             Agreement(
                 name=curve.name,
                 kind="contact",
-                unit=UNITS["contact"],
+                unit=curve.unit,
                 max=gap,
                 at=at,
                 rms=gap,

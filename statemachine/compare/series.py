@@ -3,29 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
-from ..comparison import Common, common_moments, same_pairs
+from ..comparison import QUANTITIES, Common, common_moments, same_pairs
 from ..interface import Array, JointType, usual_site
 from ..rotations import angle_between, matrix_from_quat
 from ..traces import Header, Trace
 
-Kind = Literal[
-    "joint", "slide", "tip", "tip rotation", "body", "body rotation", "energy", "contact", "force"
-]
-UNITS: dict[str, str] = {
-    "joint": "rad",
-    "slide": "m",
-    "tip": "m",
-    "tip rotation": "rad",
-    "body": "m",
-    "body rotation": "rad",
-    "energy": "J",
-    "contact": "s",
-    "force": "N",
-}
 NORMAL = ", normal force"  # after a pair of bodies: the sum over its contacts
 
 
@@ -43,7 +28,7 @@ class Series:
     """
 
     name: str
-    kind: Kind
+    kind: str
     time: Array
     one: Array
     two: Array
@@ -52,7 +37,7 @@ class Series:
     @property
     def unit(self) -> str:
         """SI unit of the values."""
-        return UNITS[self.kind]
+        return QUANTITIES[self.kind].unit
 
 
 def series(one: Trace, two: Trace, tip: str | None = None) -> list[Series]:
@@ -100,11 +85,11 @@ def default_tip(*headers: Header) -> str:
 
 def normal_forces(trace: Trace) -> dict[str, Array]:
     """Sum of the normal contact forces (n,) [N] between each pair of bodies."""
-    found = {}
-    for pair, places in trace.contact_pairs().items():
-        found[pair] = np.zeros(len(trace))
-        np.add.at(found[pair], trace["contact_row"][places], trace["contact_force"][places, 0])
-    return found
+    sums = {}
+    for pair, places in trace.contact_pairs.items():
+        sums[pair] = np.zeros(len(trace))
+        np.add.at(sums[pair], trace["contact_row"][places], trace["contact_force"][places, 0])
+    return sums
 
 
 def total_forces(trace: Trace) -> dict[str, Array]:
@@ -113,14 +98,14 @@ def total_forces(trace: Trace) -> dict[str, Array]:
     Friction and all, added as vectors in world axes: neither at least nor at most the sum of
     the normal forces.
     """
-    found = {}
-    pairs = trace.contact_pairs()
+    lengths = {}
+    pairs = trace.contact_pairs
     forces = world_forces(trace) if pairs else np.empty((0, 3))
     for pair, places in pairs.items():
         total = np.zeros((len(trace), 3))
         np.add.at(total, trace["contact_row"][places], forces[places])
-        found[pair] = np.linalg.norm(total, axis=1)
-    return found
+        lengths[pair] = np.linalg.norm(total, axis=1)
+    return lengths
 
 
 def world_forces(trace: Trace) -> Array:
@@ -146,7 +131,7 @@ def tell(one: Trace, two: Trace, column: str) -> bool:
     return True
 
 
-def _scalar(name: str, kind: Kind, common: Common, one: Array, two: Array) -> Series:
+def _scalar(name: str, kind: str, common: Common, one: Array, two: Array) -> Series:
     return Series(name, kind, common.time, one, two, np.abs(one - two))
 
 
@@ -170,7 +155,7 @@ def _joint(
         values.append(trace.qpos[rows, start : start + kind.nq])
     a, b = values
     if kind in (JointType.HINGE, JointType.SLIDE):
-        what: Kind = "joint" if kind is JointType.HINGE else "slide"
+        what = "joint" if kind is JointType.HINGE else "slide"
         return [_scalar(name, what, common, a[:, 0], b[:, 0])]
     found = []
     if kind is JointType.FREE:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ..backends import backend_names, load
+from ..comparison.text import command
 from ..errors import BadInputError, MissingEngineError, StateMachineError, unknown_name
 from ..experiments._common import Progress, part_of, silent
 from ..experiments.scenarios import SCENARIOS, scenario
@@ -57,19 +58,15 @@ class Request:
 
     def typed(self, backend: str) -> str:
         """The command that records one side."""
-        words = ["statemachine trace record", *self.what, f"--backend {backend}"]
-        if self.defaults == "engine":
-            words.append("--defaults engine")
-        for flag, value, usual in (
+        return command(
+            ["statemachine", "trace", "record", *self.what, "--backend", backend],
+            ("--defaults", self.defaults, "model"),
             ("--model", self.model, None),
             ("--menagerie", self.menagerie and "DIR", None),
             ("--seconds", self.seconds, None),
             ("--seed", self.seed, 0),
             ("--timestep", self.options.get("timestep"), None),
-        ):
-            if value != usual:
-                words.append(f"{flag} {value}")
-        return " ".join(words)
+        )
 
 
 def sides_of(
@@ -96,7 +93,10 @@ def sides_of(
         raise BadInputError(
             "compare takes one experiment: it runs on both engines; two traces are files"
         )
-    scenario(request.what[0])
+    what = request.what[0]
+    if what not in SCENARIOS and Path(what).is_file():
+        raise BadInputError(f"{what!r} is no trace: a trace ends in .npz or .parquet")
+    scenario(what)
     for name in request.backends:
         if name not in backend_names():
             raise unknown_name("backend", name, backend_names())
@@ -176,7 +176,7 @@ def _of_traces(request: Request, progress: Progress) -> tuple[tuple[Trace, Trace
     played = play(
         trace,
         model,
-        command=f"statemachine trace play {request.what[0]} --backend {others[0]}",
+        command=command(["statemachine", "trace", "play", request.what[0], "--backend", others[0]]),
         defaults=request.defaults,
         options=options,
         progress=progress,

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
+from ..comparison import Tolerance
 from ..comparison.text import milliseconds, rounded
-from ..errors import BadInputError, unknown_name
 from ..interface import Array
 from ..traces import Trace
-from .series import UNITS, Series
+from .series import Series
 
 # A 12-bit encoder, as in the SO-101's servos (Feetech STS3215).
 COUNT = 2 * np.pi / 4096
@@ -19,14 +18,6 @@ _COUNT_SAYS = "1/4096 turn, one count of a 12-bit encoder as in the SO-101's ser
 _ENERGY = 0.01  # of what the run turns over
 _FORCE = 0.05  # of its mean while it acts
 _BODY, _BODY_TURN = 1e-3, np.radians(1.0)
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """A difference that does not matter: how much [SI], and the reason."""
-
-    value: float
-    reason: str
 
 
 def tolerance_for(
@@ -75,57 +66,6 @@ def tolerance_for(
         longest * (1 + 1e-9),
         f"one timestep, {milliseconds(longest, 3)}: an engine looks at contacts once in a step",
     )
-
-
-def parse_tolerances(words: list[str]) -> dict[str, float]:
-    """Tolerances from words like "joint=0.5deg", "tip=2mm", "energy=0.01".
-
-    Raises:
-        BadInputError: A word is none.
-        UnknownNameError: There is no such kind of quantity.
-    """
-    found = {}
-    for word in words:
-        kind, _, text = word.partition("=")
-        kind = kind.replace("-", " ")
-        if kind not in UNITS:
-            raise unknown_name("kind of quantity", kind, UNITS)
-        unit, scale = UNITS[kind], 0.0
-        for suffix, factor, of in _SUFFIXES:
-            if text.endswith(suffix):
-                text, scale = text.removesuffix(suffix), factor
-                if of != unit:
-                    raise BadInputError(f"{kind} is measured in {_units(unit)}, not in {suffix}")
-                break
-        if not scale:
-            raise BadInputError(f"{word!r} needs a unit: {kind} is measured in {_units(unit)}")
-        try:
-            value = float(text) * scale
-        except ValueError:
-            value = float("nan")
-        if not (np.isfinite(value) and value > 0):
-            raise BadInputError(f"a tolerance reads like joint=0.5deg or tip=2mm; got {word!r}")
-        found[kind] = value
-    return found
-
-
-_SUFFIXES = (
-    ("deg", np.pi / 180, "rad"),
-    ("rad", 1.0, "rad"),
-    ("mm", 1e-3, "m"),
-    ("cm", 1e-2, "m"),
-    ("ms", 1e-3, "s"),
-    ("mJ", 1e-3, "J"),
-    ("m", 1.0, "m"),
-    ("s", 1.0, "s"),
-    ("J", 1.0, "J"),
-    ("N", 1.0, "N"),
-)
-
-
-def _units(unit: str) -> str:
-    """What a quantity may be given in."""
-    return ", ".join(suffix for suffix, _, of in _SUFFIXES if of == unit)
 
 
 def _mean_acting(force: Array) -> float:

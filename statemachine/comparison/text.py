@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterable, Sequence
 
 NONE = "–"  # where there is no number
@@ -175,3 +176,17 @@ def sentence(text: str) -> str:
     """A text with a capital first and a full stop last."""
     text = capital(text)
     return text if text.endswith(".") else f"{text}."
+
+
+def command(words: Iterable[str], *options: tuple[str, object, object]) -> str:
+    """A command as one types it.
+
+    Args:
+        words: What stands in any case.
+        options: A flag, its value, and the value that needs no flag.
+    """
+    typed = [*words]
+    for flag, value, usual in options:
+        if value != usual:
+            typed += [flag] if value is True else [flag, str(value)]
+    return " ".join(map(shlex.quote, typed))

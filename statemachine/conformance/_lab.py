@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..backends import load
-from ..errors import UnsupportedError
-from ..interface import DERIVED, Array, Data, Model, forward, get_state, make_data, reset, step
+from ..comparison.readings import readings
+from ..interface import Array, Contacts, Data, Model, forward, get_state, make_data, reset, step
 
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
 
@@ -101,14 +101,11 @@ def require_raises(
 def snapshot(data: Data) -> dict[str, Array]:
     """Copies of everything derived that this backend yields, contacts included."""
     found: dict[str, Array] = {}
-    for name in DERIVED:
-        try:
-            found[name] = np.array(getattr(data, name))
-        except UnsupportedError:
-            continue
-    contacts = data.contacts
-    found["contacts.dist"] = np.array(contacts.dist)
-    found["contacts.pos"] = np.array(contacts.pos)
+    for name, held in readings(data).items():
+        if isinstance(held, Contacts):
+            found |= {"contacts.dist": np.array(held.dist), "contacts.pos": np.array(held.pos)}
+        else:
+            found[name] = np.array(held)
     return found
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +13,7 @@ from ..backends import on_default
 from ..interface import Model
 from . import _shapes
 from ._shapes import Surface
+from .camera import Camera
 
 # MuJoCo's mjtGeom, in its order.
 _KINDS = ["plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf"]
@@ -68,13 +68,8 @@ class Drawing:
 
     def eye(self, distance: float) -> tuple[float, float, float]:
         """Where the camera is that looks at the centre from so far away [m]."""
-        around, up = math.radians(self.azimuth), math.radians(self.elevation)
-        x, y, z = self.center
-        return (
-            x - distance * math.cos(up) * math.cos(around),
-            y - distance * math.cos(up) * math.sin(around),
-            z - distance * math.sin(up),
-        )
+        x, y, z = Camera(self.center, distance, self.azimuth, self.elevation).eye.tolist()
+        return x, y, z
 
     @property
     def vertices(self) -> int:

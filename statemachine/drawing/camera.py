@@ -56,7 +56,7 @@ class Camera:
         """Where points (n, 3) are in the picture: (n, 2), -1 to 1 from edge to edge."""
         right, up, forward = self.axes
         offset = np.asarray(points) - self.eye
-        depth = offset @ forward
+        depth = np.maximum(offset @ forward, 1e-3)  # what is behind it is far outside
         half = math.tan(math.radians(self.fovy) / 2)
         return (
             np.stack([offset @ right / (half * aspect), offset @ up / half], axis=1)

@@ -1,9 +1,12 @@
 """The engines without us: what each does and calls things when its own users drive it.
 
 Each engine has a room here, a package with its name. A room has parts, modules with the names
-in `PARTS`; conventions, phrasebook, calls, audit, comparison and doctor ask for a part by the
-engine's name, and name no engine themselves. An engine without a part is not asked, and the
-page says so.
+in `PARTS`; conventions, phrasebook, calls, audit, comparison, pictures, grading and doctor ask for
+a part by the engine's name, and name no engine themselves. An engine without a part is not asked,
+and the page says so.
+
+So an engine is `backends/NAME_backend.py`, `engines/NAME` and a row of `installed.ENGINES`; one of
+another distribution declares entry points instead of the row.
 """
 
 from __future__ import annotations
@@ -17,7 +20,8 @@ from ..errors import BadInputError, UnsupportedError, unknown_name
 from ..installed import ENGINES
 
 _ROOMS: dict[str, str] = {name: f"{__name__}.{name}" for name in ENGINES}
-# What a room may have.
+# What a room may have. The protocol of a part, and the records that it gives, are in a module of
+# this package: `measured`, `phrases`, `call_watch`, `auditing`, `parts`.
 PARTS: dict[str, str] = {
     "as_it_comes": "what the engine calls things, and a model as its own users load it",
     "conventions": "what it does with tiny models, for the questions of `conventions`",

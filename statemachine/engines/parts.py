@@ -1,4 +1,4 @@
-"""What the parts of a room offer: a protocol for each part, and the records that it gives.
+"""What the parts "as_it_comes" and "dials" of a room offer, and the records that they give.
 
 A part is a module; its functions are those of the protocol, without `self`.
 """

@@ -6,7 +6,6 @@ import hashlib
 import platform
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
@@ -15,9 +14,10 @@ import numpy as np
 
 from .. import __version__, conventions
 from ..comparison import ContactNames
+from ..comparison.readings import readings
 from ..engines import part
 from ..errors import BadInputError, UnsupportedError
-from ..interface import DERIVED, INPUTS, Array, Contacts, Data, JointType, Model
+from ..interface import INPUTS, Array, Contacts, Data, JointType, Model
 
 Progress = Callable[[float], None]  # told the fraction that is done
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)  # a command to the arm [rad]
@@ -75,7 +75,7 @@ def model_digest(path: Path) -> str:
 
 
 @dataclass(frozen=True)
-class Itself:
+class OwnAnswer:
     """What an engine itself does, asked of it alone: a question, a part of it, the answer."""
 
     question: str
@@ -83,12 +83,12 @@ class Itself:
     answer: str
 
 
-def ask_itself(model: Model, *questions: str) -> tuple[Itself, ...]:
+def own_answers(model: Model, *questions: str) -> tuple[OwnAnswer, ...]:
     """Conventions of the engine behind a Model that emulates some of the contract."""
     if part(model.backend, "as_it_comes") is None:  # the interface is the engine's own
         return ()
     return tuple(
-        Itself(question, finding.of, finding.answer)
+        OwnAnswer(question, finding.of, finding.answer)
         for question in questions
         for finding in conventions.ask(question, model.backend) or ()
     )
@@ -173,15 +173,12 @@ def read_stored(data: Data) -> dict[str, bytes]:
 
 def read_derived(data: Data) -> dict[str, bytes]:
     """The bytes of every derived array that this engine gives, contacts among them."""
-    found = {}
-    for name in DERIVED:
-        with suppress(UnsupportedError):
-            found[name] = np.asarray(getattr(data, name)).tobytes()
-    contacts = data.contacts
-    found["contacts"] = b"".join(
-        array.tobytes() for array in (contacts.geom, contacts.dist, contacts.pos, contacts.force)
-    )
-    return found
+    return {
+        name: b"".join(getattr(held, part).tobytes() for part in ("geom", "dist", "pos", "force"))
+        if isinstance(held, Contacts)
+        else held.tobytes()
+        for name, held in readings(data).items()
+    }
 
 
 def body_pairs(model: Model, contacts: Contacts) -> Counter[str]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..interface import Array, Model, forward, make_data
 from . import stages
-from ._common import Itself, Progress, Provenance, ask_itself, provenance, scalar_joint, silent
+from ._common import OwnAnswer, Progress, Provenance, own_answers, provenance, scalar_joint, silent
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Forward:
     moved: float
     contacts: int
     deepest: float
-    itself: tuple[Itself, ...]
+    itself: tuple[OwnAnswer, ...]
     stages: stages.Stages
     provenance: Provenance
 
@@ -98,7 +98,7 @@ def run(
         moved=moved,
         contacts=count,
         deepest=deepest,
-        itself=ask_itself(model, "write", "step"),
+        itself=own_answers(model, "write", "step"),
         stages=looked,
         provenance=provenance(model),
     )

@@ -81,6 +81,8 @@ def run(
     Raises:
         BadInputError: `target` has the wrong length, or `seconds` is not above 0.
     """
+    if not model.nu:
+        raise BadInputError(f"{model.path.name} has no actuators: nothing in it takes a command")
     if target is None and model.nu != len(TARGET):
         raise BadInputError(f"{model.path.name} has {model.nu} actuators: say where to, by target")
     goal = command(model, TARGET if target is None else target, "target")

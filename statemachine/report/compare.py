@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..compare import Agreement, Comparison, Contact, Touch, Witness
+from ..comparison import QUANTITIES
 from ..comparison.text import few, figure, milliseconds, quantity, sentence, short_time
 from ..page import Page, Table, Text, Verdict
 
@@ -113,22 +114,9 @@ def _reasons(comparison: Comparison) -> list[tuple[str, str, str]]:
         key = (quantity(found.tolerance, found.unit), found.reason)
         shared.setdefault(key, []).append(found.kind)
     return [
-        (", ".join(dict.fromkeys(_PLURAL[kind] for kind in kinds)), value, reason)
+        (", ".join(dict.fromkeys(QUANTITIES[kind].plural for kind in kinds)), value, reason)
         for (value, reason), kinds in shared.items()
     ]
-
-
-_PLURAL = {
-    "joint": "joints",
-    "slide": "slides",
-    "tip": "fingertip",
-    "tip rotation": "rotation of the fingertip",
-    "body": "free bodies",
-    "body rotation": "rotation of free bodies",
-    "energy": "energy",
-    "contact": "first touches",
-    "force": "normal forces",
-}
 
 
 def _summary(comparison: Comparison) -> str:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..compare import Agreement, Comparison, Series, default_tip, series
 from ..compare.tolerances import COUNT
+from ..comparison import QUANTITIES
 from ..comparison.text import few, milliseconds, quantity, reading, short_time
 from ..interface import Array, JointType
 from ..traces import Header, Trace
@@ -80,7 +81,7 @@ def of_comparison(one: Trace, two: Trace, comparison: Comparison, tip: str | Non
     """The figure of two traces: fingertip first, then joints, bodies, energy, touches."""
     found = {agreement.name: agreement for agreement in comparison.agreements}
     curves = series(one, two, tip)
-    shown = [curve for curve in curves if curve.kind in ("joint", "slide", "body", "body rotation")]
+    shown = [curve for curve in curves if QUANTITIES[curve.kind].own]
     kept = _worst_of(shown, found)
     tips = [curve for curve in curves if curve.kind == "tip"]
     energy = [curve for curve in curves if curve.kind == "energy"]

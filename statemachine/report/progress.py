@@ -4,22 +4,14 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Protocol
-
-
-class Report(Protocol):
-    """Told the fraction that is done."""
-
-    def __call__(self, fraction: float, /) -> None: ...
-
 
 _PATIENCE = 0.5  # seconds without a bar
 
 
 @contextmanager
-def progress(what: str) -> Iterator[Report]:
+def progress(what: str) -> Iterator[Callable[[float], None]]:
     """A function to call with the fraction done; a bar appears if it takes long.
 
     Nothing is shown where standard error is no terminal, and nothing stays behind.

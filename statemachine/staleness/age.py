@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..comparison import Gap
+from ..comparison.readings import Readings, readings
 from ..comparison.text import count, listed
-from ..errors import UnsupportedError
 from ..interface import (
     DERIVED,
     INPUTS,
     POSES,
     Array,
     Contacts,
-    Data,
     JointType,
     Model,
     State,
@@ -31,7 +29,6 @@ from ..rotations import times
 from .gaps import gaps, same
 from .result import Row
 
-Readings = Mapping[str, "Array | Contacts"]
 # The inputs that each is computed from; a write to another is no reason why it is stale.
 DEPEND = dict.fromkeys(DERIVED, INPUTS) | {"contacts": INPUTS}
 DEPEND |= dict.fromkeys(POSES, INPUTS[:1])
@@ -90,17 +87,6 @@ class Scratch:
     def close(self) -> None:
         """Give the Data back."""
         self._data.close()
-
-
-def readings(data: Data, copied: bool = False) -> Readings:
-    """Everything derived that the backend of a Data yields."""
-    found: dict[str, Array | Contacts] = {}
-    for name in DERIVED:
-        with suppress(UnsupportedError):
-            array = getattr(data, name)
-            found[name] = np.array(array) if copied else array
-    found["contacts"] = data.contacts
-    return found
 
 
 def row(model: Model, name: str, held: Array | Contacts, now: Array | Contacts, age: Age) -> Row:

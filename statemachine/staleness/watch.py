@@ -16,10 +16,11 @@ from typing import Any, cast
 import numpy as np
 
 from ..comparison import Gap
+from ..comparison.readings import Readings, readings
 from ..comparison.text import few
 from ..errors import BadInputError, StaleReadError
 from ..interface import INPUTS, Array, Contacts, Data, Model, State, get_state
-from .age import DEPEND, Age, Readings, Scratch, age_of, readings, row, stale_row
+from .age import DEPEND, Age, Scratch, age_of, row, stale_row
 from .gaps import told
 from .result import Row, StaleRead, table
 

@@ -68,7 +68,7 @@ def read(path: str | os.PathLike[str]) -> Trace:
         raise
     except Exception as error:  # bytes that are no trace may raise anything in those who read them
         reason = (str(error) or type(error).__name__).splitlines()[0]
-        raise TraceError(f"{source.name}: is no trace: {reason}") from None
+        raise TraceError(f"{source.name} is no trace: {reason}") from None
 
 
 def _known(path: str | os.PathLike[str]) -> Path:

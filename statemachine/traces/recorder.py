@@ -155,13 +155,20 @@ def record_scenario(
     Raises:
         UnsupportedError: The backend lacks one of the options.
         UnknownNameError: The model lacks the keyframe.
+        BadInputError: A timestep is longer than the run.
     """
     chosen = {**scenario.options, **(options or {})}
     replaced = model.replace(**chosen) if chosen else model
+    seconds = scenario.seconds if seconds is None else seconds
+    if 0 < seconds < replaced.timestep:
+        raise BadInputError(
+            f"a timestep of {replaced.timestep:g} s is longer than the run of {seconds:g} s; "
+            "both are in seconds"
+        )
     trace = record(
         replaced,
         scenario.controller(replaced, seed),
-        scenario.seconds if seconds is None else seconds,
+        seconds,
         keyframe=scenario.keyframe,
         experiment=scenario.name,
         says=scenario.says,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -134,22 +135,23 @@ class Trace:
         number = index_of("site", name, self.header.sites)
         return self["site_xpos"][:, number], self["site_xmat"][:, number].reshape(-1, 3, 3)
 
-    def contact_pairs(self) -> dict[str, Ints]:
+    @cached_property
+    def contact_pairs(self) -> Mapping[str, Ints]:
         """Which contacts are of each pair of bodies: their places by "gripper on box"."""
-        found: dict[str, list[int]] = {}
+        of_pair: dict[str, list[int]] = {}
         if "contact_geom" in self:
             header = self.header
             names = ContactNames(
                 header.bodies, header.geoms, header.geom_bodyid, header.body_parentid
             )
             for place, geoms in enumerate(self["contact_geom"].tolist()):
-                found.setdefault(names.pair(*geoms), []).append(place)
-        return {pair: np.array(places) for pair, places in found.items()}
+                of_pair.setdefault(names.pair(*geoms), []).append(place)
+        return {pair: np.array(places) for pair, places in of_pair.items()}
 
     def touches(self) -> dict[str, NDArray[np.bool_]]:
         """When each pair of bodies touches: (n,) bool by "gripper on box"."""
-        found = {}
-        for pair, places in self.contact_pairs().items():
-            found[pair] = np.zeros(len(self), dtype=bool)
-            found[pair][self["contact_row"][places]] = True
-        return found
+        touching = {}
+        for pair, places in self.contact_pairs.items():
+            touching[pair] = np.zeros(len(self), dtype=bool)
+            touching[pair][self["contact_row"][places]] = True
+        return touching

@@ -11,12 +11,29 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
+from ..errors import BadInputError
+
 try:
     import fcntl
 except ImportError:  # Windows
     fcntl = None
 
 _PART = ".part-"  # in the names of files that are being written
+
+
+def check_place(target: Path) -> None:
+    """Refuse a place where no file can be written, before anything is run.
+
+    Raises:
+        BadInputError: It is a folder, or its folder is not there or not to be written into.
+    """
+    folder = target.parent
+    if target.is_dir():
+        raise BadInputError(f"{target} is a folder; name a file in it")
+    if not folder.is_dir():
+        raise BadInputError(f"{target} cannot be written: there is no folder {folder}")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise BadInputError(f"{target} cannot be written: its folder is read-only for you")
 
 
 @contextmanager
@@ -73,9 +90,12 @@ def _part_of(target: Path) -> Iterator[str]:
 def _new_part(target: Path) -> tuple[int | None, str]:
     """A new file's name, and its handle, which holds a lock until it is closed."""
     while True:
-        handle, name = tempfile.mkstemp(
-            dir=target.parent, prefix=f".{target.name}{_PART}", suffix=target.suffix
-        )
+        try:
+            handle, name = tempfile.mkstemp(
+                dir=target.parent, prefix=f".{target.name}{_PART}", suffix=target.suffix
+            )
+        except OSError as error:  # of the file that was asked for, not of the one beside it
+            raise OSError(error.errno, error.strerror, os.fspath(target)) from None
         if fcntl is None:  # an open file could not be renamed
             os.close(handle)
             return None, name

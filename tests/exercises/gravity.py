@@ -47,6 +47,11 @@ def replace_thrown_away(model, seconds=4):
     return on, _fall(model, seconds)
 
 
+@wrong("gravity", "nothing moves in this run, as where there is no gravity")
+def weightless(model, seconds=4):
+    return _fall(model, seconds), _fall(model.replace(gravity=(0, 0, 0)), seconds)
+
+
 @wrong("gravity", "the two lists are swapped")
 def swapped(model, seconds=4):
     return _fall(_limp(model), seconds), _fall(model, seconds)

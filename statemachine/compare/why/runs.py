@@ -12,7 +12,7 @@ from ...traces import Trace, record
 from .factors import FACTORS
 from .gap import Curves, Deviation, Ruler
 from .results import FirstTouch
-from .sides import Changes, Side
+from .sides import AdjustableSide, Changes
 
 
 class Runs:
@@ -20,7 +20,7 @@ class Runs:
 
     def __init__(
         self,
-        sides: list[Side],
+        sides: list[AdjustableSide],
         scenario: Scenario,
         seconds: float,
         seed: int,

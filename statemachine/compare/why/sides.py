@@ -37,8 +37,8 @@ class Change:
 Changes = Mapping[str, Change]
 
 
-class Side(Protocol):
-    """What `attribute` needs of a side.
+class AdjustableSide(Protocol):
+    """A side that `attribute` can build with other settings.
 
     Attributes:
         label: What it is, in words.
@@ -71,7 +71,7 @@ class Side(Protocol):
         ...
 
 
-def side_of(model: Model, options: Mapping[str, Any]) -> Side:
+def side_of(model: Model, options: Mapping[str, Any]) -> AdjustableSide:
     """The side of a Model, in an experiment with some options."""
     own: DialsPart | None = part(model.backend, "dials")
     dials = own.dials(model, options) if own else None

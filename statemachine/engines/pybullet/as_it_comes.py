@@ -19,6 +19,7 @@ from ...backends._bullet_world import ENGINE_TIMESTEP, Tree, World
 from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model
 from ..parts import LeftAlone, Term, WayBack
+from .world import fresh_world
 
 # Before a state is taken, while the jaws still touch what they hold; and after it.
 _BEFORE, _AFTER = 10, 100
@@ -168,12 +169,9 @@ def left_alone(model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...
 
 def _fresh_gravity() -> float:
     """The length of the gravity that a world has before anybody sets it."""
-    client = pb.connect(pb.DIRECT)
-    try:
+    with fresh_world() as client:
         told = pb.getPhysicsEngineParameters(client)
         return float(np.linalg.norm([told[f"gravityAcceleration{axis}"] for axis in "XYZ"]))
-    finally:
-        pb.disconnect(client)
 
 
 def _explicit(world: World, tree: Tree) -> float:

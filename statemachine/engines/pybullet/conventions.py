@@ -11,7 +11,7 @@ from ...interface import Array
 from ..measured import Futures, LetGo, Measurement, OneStep, ReadTwice, Sliding
 from ..samples import floor, joint_tree, marked, pendulum
 from . import pile
-from .world import limp, load, put_floor, world
+from .world import fresh_world, limp, load, put_floor
 from .world import timestep as step_of
 
 
@@ -28,7 +28,7 @@ def _marks(client: int, body: int) -> Array:
 def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
     """Four numbers into resetBasePositionAndOrientation."""
     turned = []
-    with world() as client:
+    with fresh_world() as client:
         body = load(client, marked.URDF)
         for four in fours:
             pb.resetBasePositionAndOrientation(body, (0, 0, 0), four, client)
@@ -41,7 +41,7 @@ def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
 
 def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Array, Array]:
     """Three and three numbers into resetBaseVelocity, in this order, and one short step."""
-    with world() as client:
+    with fresh_world() as client:
         body = load(client, marked.URDF)
         pb.setTimeStep(seconds, client)
         pb.resetBasePositionAndOrientation(body, place.tolist(), four.tolist(), client)
@@ -53,7 +53,7 @@ def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Arr
 
 def gravity(steps: int) -> tuple[list[float], Array]:
     """A body in a world that was told nothing, let go; without the damping that bodies have."""
-    with world() as client:
+    with fresh_world() as client:
         body = load(client, marked.URDF)
         pb.changeDynamics(body, -1, linearDamping=0, physicsClientId=client)
         told = pb.getPhysicsEngineParameters(client)
@@ -65,7 +65,7 @@ def gravity(steps: int) -> tuple[list[float], Array]:
 
 def timestep() -> OneStep:
     """A body at 1 m/s, one step; and whatever number of the world's has changed in it."""
-    with world() as client:
+    with fresh_world() as client:
         body = load(client, marked.URDF)
         pb.changeDynamics(body, -1, linearDamping=0, physicsClientId=client)
         start = pb.getBasePositionAndOrientation(body, client)[0][0]
@@ -83,7 +83,7 @@ def actuation(seconds: float) -> list[LetGo]:
     """As loadURDF leaves the joint, with gravity set, and with its motor switched off."""
     runs = []
     for part, off in (("as loaded", False), ("motor off", True)):
-        with world() as client:
+        with fresh_world() as client:
             body = load(client, pendulum.URDF, fixed=True)
             pb.setGravity(0, 0, -pendulum.GRAVITY, client)
             if off:
@@ -106,7 +106,7 @@ def command(torque: float) -> dict[str, list[float]]:
     modes = {"TORQUE_CONTROL": {}, "VELOCITY_CONTROL": {"targetVelocity": 1e3}}
     speeds: dict[str, list[float]] = {mode: [] for mode in modes}
     for mode, values in modes.items():
-        with world() as client:
+        with fresh_world() as client:
             body = load(client, pendulum.URDF, fixed=True)
             limp(body, client)
             pb.setJointMotorControl2(
@@ -121,13 +121,13 @@ def command(torque: float) -> dict[str, list[float]]:
 
 def damping(seconds: float, fast: float) -> tuple[float, float]:
     """As loadURDF leaves them; of the joint, the motor is switched off."""
-    with world() as client:
+    with fresh_world() as client:
         body = load(client, marked.URDF)
         pb.resetBaseVelocity(body, (1, 0, 0), (0, 0, 0), client)
         for _ in range(round(seconds / step_of(client))):
             pb.stepSimulation(client)
         end = pb.getBaseVelocity(body, client)[0][0]
-    with world() as client:
+    with fresh_world() as client:
         body = load(client, pendulum.URDF, fixed=True)
         limp(body, client)
         pb.resetJointState(body, 0, 0, fast, physicsClientId=client)
@@ -157,13 +157,13 @@ def _depth(client: int) -> float:
 
 def write(angle: float, deep: float) -> list[ReadTwice]:
     """Write by resetJointState to a pendulum, then a ball that is put into the floor."""
-    with world() as client:
+    with fresh_world() as client:
         body = load(client, pendulum.URDF, fixed=True)
         _tip(client, body, compute=True)
         pb.resetJointState(body, 0, angle, 0, client)
         read = _tip(client, body)
         tip = ReadTwice("the tip", read, _tip(client, body, compute=True), pendulum.tip_at(angle))
-    with world() as client:
+    with fresh_world() as client:
         ball = _put_ball(client, 1)
         pb.performCollisionDetection(client)
         at = (0, 0, floor.RADIUS - deep)
@@ -175,7 +175,7 @@ def write(angle: float, deep: float) -> list[ReadTwice]:
 
 def step(speed: float, deep: float) -> list[ReadTwice]:
     """A limp pendulum on its way, and a ball on its way out of the floor."""
-    with world() as client:
+    with fresh_world() as client:
         body = load(client, pendulum.URDF, fixed=True)
         limp(body, client)
         pb.resetJointState(body, 0, 0, speed, client)
@@ -183,7 +183,7 @@ def step(speed: float, deep: float) -> list[ReadTwice]:
         read, again = _tip(client, body), _tip(client, body, compute=True)
         angle = pb.getJointState(body, 0, client)[0]
         tip = ReadTwice("the tip", read, again, pendulum.tip_at(angle))
-    with world() as client:
+    with fresh_world() as client:
         ball = _put_ball(client, floor.RADIUS - deep)
         pb.resetBaseVelocity(ball, (0, 0, speed), (0, 0, 0), client)
         pb.stepSimulation(client)
@@ -195,7 +195,7 @@ def step(speed: float, deep: float) -> list[ReadTwice]:
 
 def joints() -> dict[str, list[str]]:
     """The indices of the joints, from a URDF."""
-    with world() as client:
+    with fresh_world() as client:
         body = load(client, joint_tree.URDF, fixed=True)
         count = pb.getNumJoints(body, client)
         return {"URDF": [pb.getJointInfo(body, k, client)[1].decode() for k in range(count)]}
@@ -209,7 +209,7 @@ def reset() -> dict[str, dict[str, bool]]:
 def _kept_after(way: pile.Restart) -> dict[str, bool]:
     # Half of anything is not what it has at the start.
     kept = {quantity: pile.survives(quantity, 0.5, way) for quantity in pile.QUANTITIES}
-    with world() as client:
+    with fresh_world() as client:
         scene = pile.build(client)
         bodies = pb.getNumBodies(client)
         way.call(scene)
@@ -220,7 +220,7 @@ def friction() -> dict[str, Sliding]:
     """A block on a floor."""
 
     def speed(block: float, ground: float, lean: float) -> float:
-        with world() as client:
+        with fresh_world() as client:
             below = put_floor(client)
             box = pb.createCollisionShape(
                 pb.GEOM_BOX, halfExtents=floor.BLOCK, physicsClientId=client
@@ -264,7 +264,7 @@ def future(moments: Sequence[float], steps: int) -> Mapping[str, Sequence[Future
     """Boxes that fall, set back to the start or to the middle; each trial in its own world."""
 
     def middle(saved: pile.Saved, moment: float) -> Futures:
-        with world() as client:
+        with fresh_world() as client:
             scene = pile.build(client)
             pile.run(scene, round(moment / step_of(client)))
             with saved(scene) as restore:
@@ -273,7 +273,7 @@ def future(moments: Sequence[float], steps: int) -> Mapping[str, Sequence[Future
                 return first, pile.run(scene, steps)
 
     def start(way: pile.Restart) -> Futures:
-        with world() as client:
+        with fresh_world() as client:
             scene = pile.build(client)
             return pile.run(scene, steps), pile.run(way(scene), steps)
 

@@ -20,7 +20,7 @@ from ...interface import Array
 from ...silence import silence
 from ..samples.pendulum import GRAVITY, URDF
 from ..samples.pile import HALF, PLACES, TILT
-from .world import load, put_floor, world
+from .world import fresh_world, load, put_floor
 
 _TURNS = (np.array((*TILT[1:], TILT[0])) / np.linalg.norm(TILT), *[np.array((0, 0, 0, 1.0))] * 2)
 _NEAR = 0.05  # of what was written; a motor's target is met that well in one step
@@ -145,7 +145,7 @@ QUANTITIES = {
 
 def survives(quantity: str, value: float, way: Callable[[Pile], Pile]) -> bool:
     """Whether a number that was written is there after a way, in a world of its own."""
-    with world() as client:
+    with fresh_world() as client:
         scene = build(client)
         QUANTITIES[quantity].write(scene, value)
         return abs(QUANTITIES[quantity].read(way(scene)) - value) < _NEAR * abs(value)

@@ -10,7 +10,7 @@ from ...silence import silence
 
 
 @contextmanager
-def world() -> Iterator[int]:
+def fresh_world() -> Iterator[int]:
     """The number of a client of its own, which is gone afterwards."""
     client = connect()
     try:

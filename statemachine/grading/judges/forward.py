@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...comparison.text import rounded, vector
 from ...interface import Array, Data, Model, forward, make_data
 from ..answers import Answer
 from ..calls import Remark
@@ -101,7 +102,7 @@ def judge(answer: Answer, world: ExerciseWorld, right: Tips) -> list[Remark]:
     return [
         Remark(
             "readings 2 and 3 are equal: the write changed nothing that is derived; the second "
-            f"forward found the fingertip {_mm(moved)} away, and no time passed",
+            f"forward found the fingertip {rounded(moved, 'm')} away, and no time passed",
             True,
         )
     ]
@@ -111,7 +112,7 @@ def _all_at_once(given: Array, answer: Answer, tips: Tips, tolerance: float) -> 
     """One mistake that gives all four readings."""
     if near(given, tips.readings, tolerance):
         return []
-    last = f"all four readings are the last one, {_vector(given[3])}: "
+    last = f"all four readings are the last one, {vector(given[3])} m: "
     copies = "Keep copies: data.site_xpos[…].copy()"
     if near(given, np.tile(given[3], (4, 1)), 0):
         if answer.memory[3] == 0 or all(answer.live):
@@ -133,11 +134,11 @@ def _all_at_once(given: Array, answer: Answer, tips: Tips, tolerance: float) -> 
 def _why(k: int, given: Array, world: ExerciseWorld, tips: Tips, answer: Answer) -> str:
     """What reading k is, as far as the run shows it."""
     right, found = tips.readings[k], given[k]
-    away = f"{_mm(float(np.linalg.norm(found - right)))} away"
+    away = f"{rounded(float(np.linalg.norm(found - right)), 'm')} away"
     fresh, old, new = tips.readings[0], tips.readings[1], tips.readings[3]
     slack = TOLERANCE + grain(found)
     if not np.isfinite(found).all():
-        return f"you return {_vector(found)}"
+        return f"you return {vector(found)} m"
     if world.where and near(found, tips.course[k], slack):
         return "that belongs to the course's own scene, not to the model that you got"
     if grain(found) and near(found, right, slack):
@@ -158,7 +159,8 @@ def _why(k: int, given: Array, world: ExerciseWorld, tips: Tips, answer: Answer)
         return f"forward was called before it: a new Data has nothing derived yet; you are {away}"
     if k == 3 and (text := next(_poses(found, world.model, answer, away), "")):
         return text
-    return f"you return {told_apart(found, right, _vector)} is expected, {away}"
+    apart = told_apart(found, right, lambda place, digits: f"{vector(place, digits)} m")
+    return f"you return {apart} is expected, {away}"
 
 
 def _poses(found: Array, model: Model, answer: Answer, away: str) -> Iterator[str]:
@@ -217,11 +219,3 @@ def _written(start: Inputs, inputs: Inputs) -> dict[str, list[int]]:
         name: np.flatnonzero(getattr(inputs, name) != getattr(start, name)).tolist()
         for name in ("qpos", "qvel", "ctrl")
     }
-
-
-def _mm(metres: float) -> str:
-    return f"{metres * 1e3:.3g} mm"
-
-
-def _vector(values: Array, decimals: int = 4) -> str:
-    return "[" + " ".join(f"{v + 0.0:.{decimals}f}" for v in values) + "] m"

@@ -143,6 +143,8 @@ def _why(given: list[Array], limp: bool, world: ExerciseWorld, fall: Fall, answe
             return f"{figures}: {text}"
     if not any(run.own for run in answer.runs):
         return f"{figures}: {_NO_STEP}"
+    if float(abs(mine).max()) <= TOLERANCE < float(abs(right).max()):
+        return f"{figures}: nothing moves in this run, as where there is no gravity"
     return figures + _late(mine, limp, world, fall, answer)
 
 

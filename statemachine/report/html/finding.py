@@ -10,11 +10,11 @@ import numpy as np
 from ...compare import Agreement, Comparison, Series
 from ...compare.agreement import SETTLED
 from ...compare.why import FACTORS, Attribution, FactorTrial
+from ...comparison import QUANTITIES
 from ...comparison.text import capital, milliseconds, percent, quantity, short_time, significant
 from ..why_words import amount
 from .timeline import Event
 
-MOTION = ("joint", "slide", "tip", "tip rotation", "body", "body rotation")
 _SOME = 0.1  # share of the gap from which on a factor is a cause
 _WORTH = 0.005  # share below which a factor is not named beside others
 _PROOF = 1e-3  # of the gap: nearer than this until the first touch, the touch parts them
@@ -120,7 +120,7 @@ def window(comparison: Comparison) -> str:
 
 def _in_the_end(comparison: Comparison, curves: Sequence[Series]) -> str:
     """What of the motion is still apart, as a mean over the end, and whether it still changes."""
-    motion = [found for found in comparison.agreements if found.kind in MOTION]
+    motion = [found for found in comparison.agreements if QUANTITIES[found.kind].moves]
     still = [found for found in motion if found.verdict == "differs" and found.settled >= 0]
     over = f"On average over {window(comparison)}"
     if not still and any(found.verdict == "differs" for found in motion):
@@ -192,7 +192,7 @@ def subject(
 def leading(comparison: Comparison) -> Agreement | None:
     """The quantity farthest beyond its tolerance; of the motion if any of that is beyond."""
     beyond = [each for each in comparison.agreements if each.verdict != "agrees"]
-    motion = [each for each in beyond if each.kind in MOTION]
+    motion = [each for each in beyond if QUANTITIES[each.kind].moves]
     return max(motion or beyond, key=_finite_first, default=comparison.worst)
 
 

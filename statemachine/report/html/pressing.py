@@ -45,7 +45,7 @@ def pressing(trace: Trace, until: float) -> Pressing | None:
     if not len(rows):
         return Pressing({}, None, False, 0.0, 0.0, "", {})
     pairs = np.empty(len(trace["contact_row"]), dtype=object)
-    for pair, places in trace.contact_pairs().items():
+    for pair, places in trace.contact_pairs.items():
         pairs[places] = pair
     pairs = pairs[inside]
     normal = trace["contact_force"][inside][:, 0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...drawing import Drawing
+from ...drawing.camera import Camera
 from ...interface import Array
 from ...traces import Trace
 from .budget import Budget
@@ -16,7 +18,7 @@ from .geometry import bones_of, mesh_as_data, mesh_of, packed, quantised
 from .timeline import Frames
 
 _FAR = 8.0  # extents of the model beyond which nothing is drawn
-OPENING = 0.6  # of the camera from top to bottom [rad]
+OPENING = 0.6  # of the camera from top to bottom [rad]; the script has it too
 _WAY = 2000  # points of the way of a site
 _DASH = 0.0015  # m between these
 _CLOSE = 0.05  # of the scene: a gap below it is looked at from near
@@ -45,7 +47,7 @@ class Scene:
         notes: What a reader should know of the picture, in sentences.
         poses: For each side (n, nbody, 3) positions at the moments shown.
         tips: For each side (n, 3), or None.
-        camera: target (3,), distance [m], azimuth and elevation [rad].
+        camera: Where the script begins to look from.
         strongest: The largest contact force that is drawn [N].
     """
 
@@ -53,7 +55,7 @@ class Scene:
     notes: tuple[str, ...]
     poses: tuple[Array, Array] | None = None
     tips: tuple[Array, Array] | None = None
-    camera: tuple[Array, float, float, float] | None = None
+    camera: Camera | None = None
     strongest: float = 0.0
 
 
@@ -128,7 +130,6 @@ def scene_of(
         )
     if any(_most_at_once(trace) > few for trace in traces):
         notes.append(f"Of the contacts of a moment the {few} strongest are drawn.")
-    target, distance, azimuth, elevation = camera
     data = {
         "moving": [int(_moves(one, two, body)) for body in range(len(two.header.bodies))],
         "low": low.tolist(),
@@ -136,7 +137,13 @@ def scene_of(
         "extent": extent,
         **_nearness(tips, start, extent),
         "floor": _floor(drawings),
-        "camera": [*target.tolist(), distance, azimuth, elevation],
+        # The script has the angles of the camera about the target, not of its view.
+        "camera": [
+            *camera.target,
+            camera.distance,
+            math.radians(camera.azimuth) - math.pi,
+            -math.radians(camera.elevation),
+        ],
         "meshes": [mesh_as_data(mesh) for mesh in meshes],
         "sides": sides,
     }
@@ -298,9 +305,7 @@ def _floor(drawings: Sequence[Drawing]) -> float | None:
     return None
 
 
-def _camera(
-    poses: Sequence[Array], tips: tuple[Array, Array] | None, extent: float
-) -> tuple[Array, float, float, float]:
+def _camera(poses: Sequence[Array], tips: tuple[Array, Array] | None, extent: float) -> Camera:
     """From the side on which the fingertip's way is seen at its full width, near enough."""
     points = np.concatenate([pos[:, 1:].reshape(-1, 3) for pos in poses])
     points = points[np.isfinite(points).all(axis=1)]
@@ -312,26 +317,19 @@ def _camera(
     points = points[np.abs(points - target).max(axis=1) <= 2 * extent]
     way = tips[0] if tips is not None else points
     flat = way[:, :2] - way[:, :2].mean(axis=0)
-    size, axes = np.linalg.eigh(flat.T @ flat)
-    along = axes[:, 1] if size[1] > 0 else np.array([1.0, 0.0])
+    size, ways = np.linalg.eigh(flat.T @ flat)
+    along = ways[:, 1] if size[1] > 0 else np.array([1.0, 0.0])
     along = along if along[0] >= 0 else -along
-    azimuth, elevation = float(np.arctan2(along[1], along[0])) - np.pi / 2 + 0.35, 0.3
-    right, up, back = axes_of(azimuth, elevation)
-    seen = points @ np.array([right, up, back]).T
+    around = float(np.arctan2(along[1], along[0])) + np.pi / 2 + 0.35
+    angles = math.degrees(around), -math.degrees(0.3), math.degrees(OPENING)
+    axes = np.array(Camera((0.0, 0.0, 0.0), 0.0, *angles).axes)
+    seen = points @ axes.T
     low, high = seen.min(axis=0), seen.max(axis=0)
     middle = (low + high) / 2
     # Origins of bodies do not tell how thick these are.
     apart = np.abs(seen - middle) + 0.14 * extent
     slope = np.tan(OPENING / 2)
     needs = np.maximum(apart[:, 0] / (ASPECT * slope), apart[:, 1] / slope)
-    distance = float((needs + seen[:, 2] - middle[2]).max())
-    target = middle @ np.array([right, up, back])
-    return target, distance, azimuth, elevation
-
-
-def axes_of(azimuth: float, elevation: float) -> tuple[Array, Array, Array]:
-    """Right, up and back of a camera, as unit vectors of the world."""
-    flat = np.cos(elevation)
-    back = np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)])
-    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
-    return right, np.cross(back, right), back
+    distance = float((needs - (seen[:, 2] - middle[2])).max())
+    x, y, z = (middle @ axes).tolist()
+    return Camera((x, y, z), distance, *angles)

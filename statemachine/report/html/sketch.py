@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ...comparison.text import short_time
+from ...drawing.camera import Camera
 from ...interface import Array
 from ...traces import Trace
 from .markup import Html, tag
-from .scene import ASPECT, OPENING, Scene, axes_of
+from .scene import ASPECT, Scene
 from .timeline import Frames
 
 _HIGH = 400.0
@@ -60,13 +61,7 @@ def _stick(start: Array, end: Array, look: str) -> Html:
     )
 
 
-def _seen(points: Array, camera: tuple[Array, float, float, float]) -> Array:
+def _seen(points: Array, camera: Camera) -> Array:
     """Points (n, 3) on the picture (n, 2), by the camera that the script begins with."""
-    target, distance, azimuth, elevation = camera
-    right, up, back = axes_of(azimuth, elevation)
-    apart = points - (target + distance * back)
-    depth = np.maximum(-(apart @ back), 1e-3)
-    size = _HIGH / (2 * np.tan(OPENING / 2))
-    x = _WIDE / 2 + size * (apart @ right) / depth
-    y = _HIGH / 2 - size * (apart @ up) / depth
-    return np.clip(np.column_stack([x, y]), -1e4, 1e4)
+    x, y = camera.seen(points, _WIDE / _HIGH).T
+    return np.clip(np.column_stack([_WIDE * (1 + x), _HIGH * (1 - y)]) / 2, -1e4, 1e4)

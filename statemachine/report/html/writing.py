@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from ...errors import BadInputError
-from ...traces.whole import replace_file
+from ...traces.whole import check_place, replace_file
 
 SUFFIXES = (".html", ".htm")
 
@@ -16,18 +16,12 @@ def check_target(path: str | os.PathLike[str]) -> Path:
     """Where a report is to be written, checked before anything is run.
 
     Raises:
-        BadInputError: It is no name of a page, or its folder is not there or not to be written.
+        BadInputError: It is no name of a page, or see `check_place`.
     """
     target = Path(path)
     if target.suffix.lower() not in SUFFIXES:
         raise BadInputError(f"a report is a file .html; got {target.name!r}")
-    if target.is_dir():
-        raise BadInputError(f"{target} is a folder; name a file in it")
-    folder = target.parent
-    if not folder.is_dir():
-        raise BadInputError(f"there is no folder {folder} to write {target.name} into")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise BadInputError(f"the folder {folder} cannot be written into")
+    check_place(target)
     return target
 
 

@@ -1,0 +1,173 @@
+"""What the base of a hidden world promises a backend, on the example that is built on it."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.errors import DivergedError, EngineError, ReadOnlyError, UnsupportedError
+
+from .conftest import registered
+from .hidden_world import ExampleModel, ExampleWorld
+
+
+@pytest.fixture
+def model() -> Iterator[sm.Model]:
+    with registered("hidden", "tests.hidden_world:load") as name:
+        yield sm.load("so101/scene_box", backend=name)
+
+
+def held(model: sm.Model) -> sm.Data:
+    """A Data in the middle of contact, where the solver's memory decides the last bits."""
+    data = sm.make_data(model)
+    sm.reset(model, data, 0)
+    data.ctrl[0] += 0.2
+    sm.step(model, data, 25)
+    return data
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, RuntimeError])
+@pytest.mark.parametrize("at", [1, 3])
+def test_a_step_that_is_stopped_did_not_happen(
+    model: sm.Model, monkeypatch: pytest.MonkeyPatch, stop: type[BaseException], at: int
+) -> None:
+    right, count = ExampleWorld.step, 0
+
+    def stopping(self: ExampleWorld) -> None:
+        nonlocal count
+        count += 1
+        right(self)
+        if count == at:
+            raise stop
+
+    with held(model) as data, held(model) as twin:
+        before, force = sm.get_state(model, data), data.qfrc_constraint.copy()
+        with monkeypatch.context() as patch:
+            patch.setattr(ExampleWorld, "step", stopping)
+            with pytest.raises(stop):
+                sm.step(model, data, 3)
+        assert sm.get_state(model, data) == before
+        assert np.array_equal(data.qfrc_constraint, force)
+        for each in (data, twin):
+            sm.step(model, each, 10)
+        assert sm.get_state(model, data) == sm.get_state(model, twin)
+
+
+def test_what_was_not_read_before_a_stop_is_computed_after_it(
+    model: sm.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with held(model) as data, held(model) as twin:
+        with monkeypatch.context() as patch:
+            patch.setattr(ExampleWorld, "read", lambda _: 1 / 0)
+            with pytest.raises(ZeroDivisionError):
+                sm.step(model, data)
+        # By another world, which starts from the moment before the last step.
+        assert np.array_equal(data.xpos, twin.xpos)
+        assert np.allclose(data.qfrc_constraint, twin.qfrc_constraint, atol=1e-9)
+
+
+def test_an_engine_that_gives_up_is_an_error_until_a_reset(
+    model: sm.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class GaveUpError(Exception):
+        pass
+
+    def give_up(_: ExampleWorld) -> None:
+        raise GaveUpError("no memory")
+
+    monkeypatch.setattr(ExampleWorld, "errors", (GaveUpError,))
+    with held(model) as data:
+        with monkeypatch.context() as patch:
+            patch.setattr(ExampleWorld, "step", give_up)
+            with pytest.raises(EngineError, match="MuJoCo gave up: no memory"):
+                sm.step(model, data)
+        with pytest.raises(DivergedError, match="gave up"):
+            sm.step(model, data)
+        sm.reset(model, data)
+        sm.step(model, data)
+
+
+@pytest.mark.parametrize("all_at_the_end", [False, True])
+def test_a_coordinate_that_diverges_is_named(
+    model: sm.Model, monkeypatch: pytest.MonkeyPatch, all_at_the_end: bool
+) -> None:
+    right = ExampleWorld.read
+
+    def growing(self: ExampleWorld) -> tuple[np.ndarray, np.ndarray]:
+        qpos, qvel = right(self)
+        qvel[2] = np.nan
+        return qpos, qvel
+
+    if all_at_the_end:
+        monkeypatch.setattr(ExampleWorld, "looks_at_all", False)
+        monkeypatch.setattr(ExampleWorld, "diverging", lambda _: False)
+    with held(model) as data:
+        before, start = [array.copy() for array in (data.qpos, data.qvel)], data.time
+        with monkeypatch.context() as patch:
+            patch.setattr(ExampleWorld, "read", growing)
+            with pytest.raises(DivergedError, match=r"qvel\[2\] \(elbow_flex\)") as caught:
+                sm.step(model, data, 4)
+        steps = 4 if all_at_the_end else 1
+        assert caught.value.time == pytest.approx(start + steps * model.timestep)
+        assert np.array_equal(data.qpos, before[0])
+        assert np.array_equal(data.qvel, before[1])
+
+
+def test_what_an_engine_does_not_tell_is_refused(
+    model: sm.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ExampleWorld, "untold", frozenset({"qfrc_limit"}))
+    with held(model) as data:
+        for verb in (sm.step, sm.forward):
+            verb(model, data)
+            with pytest.raises(UnsupportedError, match="forces by part"):
+                _ = data.qfrc_limit
+            assert data.qfrc_bias.any()
+
+
+def test_a_world_that_keeps_traces_is_another_after_a_reset(
+    model: sm.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def renewed(self: ExampleWorld) -> ExampleWorld:
+        other = ExampleWorld(self._model)
+        self.close()
+        return other
+
+    monkeypatch.setattr(ExampleWorld, "renewed", renewed)
+    with held(model) as data:
+        first = data.raw
+        sm.reset(model, data)
+        assert data.raw is not first
+        again = data.raw
+        sm.reset(model, data)  # it was not used
+        assert data.raw is again
+        sm.forward(model, data)
+        assert data.xpos.any()
+
+
+def test_an_input_that_is_read_only_is_found_before_the_world_moves(model: sm.Model) -> None:
+    with held(model) as data:
+        before = sm.get_state(model, data)
+        data.qvel.setflags(write=False)
+        with pytest.raises(ReadOnlyError, match="qvel was made read-only"):
+            sm.step(model, data)
+        data.qvel.setflags(write=True)
+        assert sm.get_state(model, data) == before
+
+
+def test_substeps_and_a_pickle_end_at_the_same_bits(model: sm.Model) -> None:
+    finer = model.replace(substeps=3)
+    copy = pickle.loads(pickle.dumps(finer))
+    assert isinstance(copy, ExampleModel)
+    states = []
+    for each in (finer, copy):
+        with held(each) as data:
+            sm.forward(each, data)
+            states.append((sm.get_state(each, data), data.qacc.tobytes()))
+    assert states[0] == states[1]
+    passed = states[0][0].time - model.keyframes[0].time
+    assert passed == pytest.approx(25 * model.timestep)
