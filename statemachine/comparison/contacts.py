@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TypeVar
 from weakref import WeakKeyDictionary
 
@@ -62,7 +62,7 @@ class ContactNames:
             told = [
                 name for name, owner in zip(own, owners, strict=True) if name not in ("", owner)
             ]
-            self._pairs[one, two] = pair, pair + (f" ({', '.join(told)})" if told else "")
+            self._pairs[one, two] = pair, pair + (f" ({' on '.join(told)})" if told else "")
         return self._pairs[one, two]
 
     def _owner(self, geom: int) -> str:
@@ -80,6 +80,18 @@ class ContactNames:
 
 
 _OF: WeakKeyDictionary[Model, ContactNames] = WeakKeyDictionary()
+
+
+def together(contacts: Iterable[str]) -> str:
+    """Contacts in a list, the geoms of one pair of bodies behind it: "a on b (c, d), e on f"."""
+    geoms: dict[str, list[str]] = {}
+    for contact in contacts:
+        pair, _, told = contact.partition(" (")
+        geoms.setdefault(pair, []).append(told.removesuffix(")"))
+    return ", ".join(
+        f"{pair} ({', '.join(filter(None, told))})" if any(told) else pair
+        for pair, told in geoms.items()
+    )
 
 
 def same_pairs(one: Mapping[str, _T], two: Mapping[str, _T]) -> dict[str, _T]:
