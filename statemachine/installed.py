@@ -60,6 +60,7 @@ class Engine:
     places: str  # the same in words
     probe: str  # an attribute that only the right package of that name has
     role: str  # what it is here for
+    runs: bool = True  # whether there is a backend for it
 
 
 DEFAULT = "mujoco"  # what runs where nothing else is asked for; it compiles MJCF for all others
@@ -101,6 +102,7 @@ ENGINES = {
             places="Linux and macOS",
             probe="buildModelFromMJCF",
             role="the witness of `statemachine fingertip`",
+            runs=False,
         ),
     )
 }

@@ -23,7 +23,7 @@ import statemachine as sm
 from statemachine import audit
 from statemachine.audit import apart, elsewhere, falls, look, repeat, restore
 from statemachine.audit.conclusions import conclude
-from statemachine.audit.drivers import drivers
+from statemachine.audit.drivers import drivers_of
 from statemachine.audit.findings import AuditFinding
 from statemachine.audit.points import points
 from statemachine.backends import mujoco_backend
@@ -310,7 +310,7 @@ def asked(
     model = sm.load(SCENE, backend=backend)
     places = tuple(point for point in points(model, 0)[0] if point.name in only)
     found: list[AuditFinding] = []
-    for driver in drivers(model, 0):
+    for driver in drivers_of(model, 0):
         for point in places:
             found += QUESTIONS[question](driver, driver.run(point, 30))
     return found
@@ -552,7 +552,7 @@ def test_a_thread_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch) -> No
 
 def _engine() -> tuple[Driver, tuple[ReferenceRun, ...]]:
     model = sm.load(SCENE)
-    driver = drivers(model, 0)[0]
+    driver = drivers_of(model, 0)[0]
     return driver, tuple(
         driver.run(point, 30) for point in points(model, 0)[0] if point.name == "keyframe"
     )

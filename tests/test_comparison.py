@@ -9,7 +9,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.compare import compare, touches
-from statemachine.comparison import ContactNames, Gap, largest, nearest, same_pairs, text
+from statemachine.comparison import ContactNames, Gap, largest, nearest, same_pairs, text, together
 from statemachine.experiments import hold
 from statemachine.experiments.scenarios import SCENARIOS
 from statemachine.report.html.timeline import events_of
@@ -66,8 +66,13 @@ def test_who_comes_first_and_what_has_no_name(tmp_path: Path) -> None:
     assert names.geoms(floor, hand) == names.geoms(hand, floor) == "hand on floor"
     assert names.geoms(ball, hand) == "hand on body 2 (ball)"
     assert names.geoms(other, hand) == names.pair(ball, hand) == "hand on body 2"
-    assert names.geoms(top, ball) == "body 2 on table (ball, top)"
+    assert names.geoms(top, ball) == "body 2 on table (ball on top)"
     assert names.pair(below, other) == "body 2 on world"
+
+
+def test_the_geoms_of_one_pair_stand_together() -> None:
+    assert together(["a on b (c)", "d on b", "a on b (e)"]) == "a on b (c, e), d on b"
+    assert together([]) == ""
 
 
 def test_pairs_of_two_models_are_called_alike() -> None:

@@ -133,7 +133,7 @@ def forward_steps_the_world_itself(right: Any, self: Any, name: str) -> Any:
     if moment is None or name in POSES or self._lives:
         return right(self, name)
     present = self.present()
-    found = _parts().hidden.looked_at(self.world, moment)
+    found = _parts().hidden.values_of(self.world, moment)
     self.restart(self.time, present)
     self.moment = moment
     return found

@@ -97,6 +97,14 @@ def test_a_state_reads_as_what_it_holds(backend: str) -> None:
         state.blob = b""  # pyright: ignore[reportAttributeAccessIssue]
 
 
+def test_a_model_tells_what_it_was_compiled_to(backend: str) -> None:
+    model = sm.load("so101/scene_box", backend=backend)
+    assert model.compiled.nq == model.nq
+    assert np.array_equal(model.compiled.key_qpos[0], model.keyframes[0].qpos)
+    faster = model.replace(timestep=0.001)
+    assert (model.compiled.opt.timestep, faster.compiled.opt.timestep) == (0.005, 0.001)
+
+
 def test_json_has_no_nan() -> None:
     assert dumps({"a": float("nan"), "b": np.array([1.0, np.inf])}) == dumps(
         {"a": None, "b": [1.0, None]}

@@ -19,7 +19,7 @@ from ..interface import Model
 from ..interface.checks import as_count
 from . import apart, elsewhere, falls, look, repeat, restore
 from .conclusions import Conclusion, conclude
-from .drivers import drivers
+from .drivers import drivers_of
 from .findings import AuditFinding
 from .interface_driver import InterfaceDriver
 from .points import points
@@ -29,14 +29,14 @@ STEPS = 60  # of each future
 
 @dataclass(frozen=True)
 class Audited:
-    """One of those that were audited.
+    """An engine, or the interface to it, and all that was found.
 
     Attributes:
         layer: "engine" or "interface".
         name: What a page calls it.
         legend: What the names of its ways to save mean.
         points: The save points, as measured.
-        findings: All that was tried, one finding a trial.
+        findings: What came of every trial.
         conclusion: What follows from them.
     """
 
@@ -65,8 +65,8 @@ class Audit:
 
     @property
     def holds(self) -> bool:
-        """Whether nothing is broken that is promised."""
-        return all(each.holds for one in self.audited for each in one.findings)
+        """Whether every promise is kept."""
+        return all(finding.holds for driver in self.audited for finding in driver.findings)
 
 
 def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = silent) -> Audit:
@@ -86,42 +86,43 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
         raise BadInputError(f"seed must not be negative; got {seed}")
     if not model.nv:
         raise BadInputError(f"nothing moves in {model.path.name}: it has no state to audit")
-    places, without = points(model, seed)
-    everyone = drivers(model, seed)
-    interface = next(each for each in everyone if isinstance(each, InterfaceDriver))
-    runs, diverged = _runs(everyone, places, nstep)
-    states = {each.point.name: interface.state(each.point) for each in runs[interface]}
+    save_points, without = points(model, seed)
+    drivers = drivers_of(model, seed)
+    interface = next(driver for driver in drivers if isinstance(driver, InterfaceDriver))
+    runs, diverged = _runs(drivers, save_points, nstep)
+    states = {run.point.name: interface.state(run.point) for run in runs[interface]}
     if not states:
         raise BadInputError(f"nothing can be saved in {model.path.name}: {'; '.join(diverged)}")
-    job = elsewhere.Job(model, seed, nstep, states, tuple(map(type, everyone)))
-    found: dict[Driver, list[AuditFinding]] = {driver: [] for driver in everyone}
+    job = elsewhere.Job(model, seed, nstep, states, tuple(map(type, drivers)))
+    findings: dict[Driver, list[AuditFinding]] = {driver: [] for driver in drivers}
     with ThreadPoolExecutor(1) as pool:
-        answer = pool.submit(elsewhere.run, job)
-        work = [(driver, each) for driver in everyone for each in runs[driver]]
-        for done, (driver, each) in enumerate(work):
-            progress(done / (len(work) + len(everyone)))
+        child = pool.submit(elsewhere.run, job)
+        work = [(driver, run) for driver in drivers for run in runs[driver]]
+        for done, (driver, run) in enumerate(work):
+            progress(done / (len(work) + len(drivers)))
             for question in _OF_A_RUN:
-                found[driver] += question(driver, each)
-        for done, driver in enumerate(everyone, start=len(work)):
-            progress(done / (len(work) + len(everyone)))
-            found[driver] += restore.smallest(driver, runs[driver], found[driver])
-            found[driver] += restore.forgets(driver, runs[driver])
-            found[driver] += apart.threads(driver, runs[driver])
-            found[driver] += elsewhere.findings(answer.result(), driver, runs[driver])
+                findings[driver] += question(driver, run)
+        for done, driver in enumerate(drivers, start=len(work)):
+            progress(done / (len(work) + len(drivers)))
+            findings[driver] += restore.smallest(driver, runs[driver], findings[driver])
+            findings[driver] += restore.forgets(driver, runs[driver])
+            findings[driver] += apart.threads(driver, runs[driver])
+            findings[driver] += elsewhere.findings(child.result(), driver, runs[driver])
             if driver.layer == "engine":
-                found[driver] += falls.findings(driver)
-        found[interface] += elsewhere.pickled(answer.result(), interface, runs[interface], states)
+                findings[driver] += falls.findings(driver)
+        findings[interface] += elsewhere.pickled(child.result(), interface, runs[interface], states)
     audited = []
-    for driver in everyone:
-        seen = tuple(driver.measure(each.point) for each in runs[driver])
-        findings = tuple(found[driver])
+    for driver in drivers:
+        measured = tuple(driver.measure(run.point) for run in runs[driver])
+        of_driver = tuple(findings[driver])
+        conclusion = conclude(of_driver)
         audited.append(
-            Audited(driver.layer, driver.name, driver.legend, seen, findings, conclude(findings))
+            Audited(driver.layer, driver.name, driver.legend, measured, of_driver, conclusion)
         )
     return Audit(nstep, tuple(audited), without + diverged, provenance(model, seed))
 
 
-# Each asks a driver about one save point, given the run from there that nothing disturbed.
+# A question to a driver about one save point, given the run from there that nothing disturbed.
 _OF_A_RUN: tuple[Callable[[Driver, ReferenceRun], Iterator[AuditFinding]], ...] = (
     repeat.again,
     repeat.after_reset,
@@ -135,21 +136,21 @@ _OF_A_RUN: tuple[Callable[[Driver, ReferenceRun], Iterator[AuditFinding]], ...] 
 
 
 def _runs(
-    everyone: Sequence[Driver], places: Sequence[SavePoint], steps: int
+    drivers: Sequence[Driver], save_points: Sequence[SavePoint], steps: int
 ) -> tuple[dict[Driver, list[ReferenceRun]], tuple[str, ...]]:
-    """The undisturbed runs, from points at which nobody diverges; and a line for each other."""
-    runs: dict[Driver, list[ReferenceRun]] = {driver: [] for driver in everyone}
+    """The undisturbed runs, from points at which no driver diverges; a line for each other."""
+    runs: dict[Driver, list[ReferenceRun]] = {driver: [] for driver in drivers}
     without: list[str] = []
-    for point in places:
+    for point in save_points:
         try:
             # The interface first: it raises, where an engine may go on and warn.
-            knowing = [each for each in reversed(everyone) if not each.lacks(point)]
-            found = [(driver, driver.run(point, steps)) for driver in knowing]
-            reasons = [(each.name, each.lacks(point)) for each in everyone]
+            able = [driver for driver in reversed(drivers) if not driver.lacks(point)]
+            undisturbed = [(driver, driver.run(point, steps)) for driver in able]
+            reasons = [(driver.name, driver.lacks(point)) for driver in drivers]
             without += [f"{point.name}: on {name}, {why}" for name, why in reasons if why]
         except DivergedError:
             without.append(f"{point.name}: the run diverges")
             continue
-        for driver, run in found:
+        for driver, run in undisturbed:
             runs[driver].append(run)
     return runs, tuple(without)

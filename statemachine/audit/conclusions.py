@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ..engines.auditing import ONLY
@@ -35,8 +35,8 @@ class Conclusion:
     """What the findings say of the state.
 
     Attributes:
-        suffice: Candidates whose future was exact at every save point, into everything.
-        fail: The others, and the worst of each.
+        suffice: Candidates whose future was exact at every save point, whatever was restored.
+        fail: The others, and the largest gap of each.
         agree: Candidates whose restores have one future, be it that of the run or not.
         missing: Components without which something differs, and what.
         idle: Components without which nothing differs.
@@ -70,67 +70,73 @@ class Conclusion:
 
 def conclude(findings: Sequence[AuditFinding]) -> Conclusion:
     """Draw the conclusion of one driver's findings."""
-    against = [each for each in findings if each.into != EACH_OTHER]
-    tried = _by_case(each for each in against if each.experiment == RESTORE)
-    among = _by_case(
-        each for each in findings if each.experiment == RESTORE and each.into == EACH_OTHER
+    restores = [finding for finding in findings if finding.experiment == RESTORE]
+    tried = _by_case(finding for finding in restores if finding.into != EACH_OTHER)
+    among = _by_case(finding for finding in restores if finding.into == EACH_OTHER)
+    left_out = _by_case(
+        finding
+        for finding in findings
+        if finding.experiment == WITHOUT and finding.into != EACH_OTHER
     )
-    left = _by_case(each for each in against if each.experiment == WITHOUT)
-    missing = tuple(_missing(name, of) for name, of in left.items() if _differing(of))
     alone = tried.pop(ONLY, None)
     return Conclusion(
-        suffice=tuple(name for name, of in tried.items() if not _differing(of)),
-        fail={n: worst([f.gap for f in of]) for n, of in tried.items() if _differing(of)},
-        agree=tuple(n for n, of in among.items() if n in tried and not _differing(of)),
-        missing=missing,
-        idle=tuple(name for name, of in left.items() if not _differing(of)),
+        suffice=tuple(case for case in tried if not _differing(tried[case])),
+        fail={case: _worst(tried[case]) for case in tried if _differing(tried[case])},
+        agree=tuple(case for case in among if case in tried and not _differing(among[case])),
+        missing=tuple(_missing(name, left_out[name]) for name in _that_matter(left_out)),
+        idle=tuple(name for name in left_out if name not in _that_matter(left_out)),
         smallest=None if alone is None else not _differing(alone),
         forgotten=_forgotten(findings),
         touching=_touching(findings),
         not_read_back={
-            name: points
-            for name, of in tried.items()
-            if (points := _differing(each for each in of if each.gap.first == 0))
+            case: points
+            for case, of_case in tried.items()
+            if (points := _differing(finding for finding in of_case if finding.gap.first == 0))
         },
     )
 
 
 def _by_case(findings: Iterable[AuditFinding]) -> dict[str, list[AuditFinding]]:
-    found: dict[str, list[AuditFinding]] = {}
-    for each in findings:
-        found.setdefault(each.case, []).append(each)
-    return found
+    cases: dict[str, list[AuditFinding]] = {}
+    for finding in findings:
+        cases.setdefault(finding.case, []).append(finding)
+    return cases
+
+
+def _that_matter(cases: Mapping[str, Sequence[AuditFinding]]) -> list[str]:
+    return [name for name, findings in cases.items() if _differing(findings)]
 
 
 def _differing(findings: Iterable[AuditFinding]) -> tuple[str, ...]:
-    """Save points at which one differs, each once."""
-    return tuple(dict.fromkeys(each.point for each in findings if not each.gap.exact))
+    """The save points at which a future differs."""
+    return tuple(dict.fromkeys(finding.point for finding in findings if not finding.gap.exact))
+
+
+def _worst(findings: Sequence[AuditFinding]) -> FutureGap:
+    return worst([finding.gap for finding in findings])
 
 
 def _missing(name: str, findings: Sequence[AuditFinding]) -> Missing:
-    itself = _differing(each for each in findings if each.into == ITSELF)
-    return Missing(name, _differing(findings), itself, worst([each.gap for each in findings]))
+    itself = _differing(finding for finding in findings if finding.into == ITSELF)
+    return Missing(name, _differing(findings), itself, _worst(findings))
 
 
 def _forgotten(findings: Iterable[AuditFinding]) -> dict[str, tuple[str, ...]]:
-    found: dict[str, dict[str, None]] = {}
-    for each in findings:
-        if each.experiment == FORGETS and each.into != NOT_RESTORED:
-            of = found.setdefault(each.into, {})
-            if not each.gap.exact:
-                of[each.case] = None
-    return {way: tuple(of) for way, of in found.items()}
+    """What each way to save does not bring back."""
+    forgotten: dict[str, dict[str, None]] = {}
+    for finding in findings:
+        if finding.experiment == FORGETS and finding.into != NOT_RESTORED:
+            cases = forgotten.setdefault(finding.into, {})
+            if not finding.gap.exact:
+                cases[finding.case] = None
+    return {way: tuple(cases) for way, cases in forgotten.items()}
 
 
 def _touching(findings: Sequence[AuditFinding]) -> dict[str, tuple[FutureGap, FutureGap]]:
-    found = {}
-    for off in findings:
-        if off.experiment == NO_CONTACTS:
-            (standing,) = (
-                each.gap
-                for each in findings
-                if each.experiment == RESTORE
-                and (each.case, each.into, each.point) == (off.case, off.into, off.point)
-            )
-            found[off.point] = (standing, off.gap)
-    return found
+    """By save point the same restore, as it stands and with contacts switched off."""
+    restores = {(f.case, f.into, f.point): f.gap for f in findings if f.experiment == RESTORE}
+    return {
+        off.point: (restores[off.case, off.into, off.point], off.gap)
+        for off in findings
+        if off.experiment == NO_CONTACTS
+    }

@@ -9,7 +9,7 @@ from ..interface import Model
 from .interface_driver import InterfaceDriver
 
 
-def drivers(model: Model, seed: int) -> tuple[Driver, ...]:
+def drivers_of(model: Model, seed: int) -> tuple[Driver, ...]:
     """The engine behind a Model, where its room has a driver, and the interface to it."""
     room: AuditPart | None = part(model.backend, "audit")
     engine = (room.driver(model, seed),) if room else ()

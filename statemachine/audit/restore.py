@@ -28,7 +28,11 @@ def smallest(
     driver: Driver, runs: Sequence[ReferenceRun], findings: Sequence[AuditFinding]
 ) -> Iterator[AuditFinding]:
     """Only the components without which something differed, tried at each point."""
-    broke = [each.case for each in findings if each.experiment == WITHOUT and not each.gap.exact]
+    broke = [
+        finding.case
+        for finding in findings
+        if finding.experiment == WITHOUT and not finding.gap.exact
+    ]
     way = driver.only(tuple(dict.fromkeys(broke)))
     if way is not None:
         for run in runs:
@@ -48,17 +52,17 @@ def _tried(driver: Driver, run: ReferenceRun, way: SaveMethod) -> Iterator[Audit
 
 def _futures(driver: Driver, run: ReferenceRun, way: SaveMethod) -> dict[str, Array]:
     """What follows from a restore, by what was restored."""
-    point, found = run.point, {}
+    point, futures = run.point, {}
     with driver.at(point) as machine, way.save(machine) as restore:
         driver.drive(machine, point, run.steps)
         for into in (ITSELF,) if way.travels else (ITSELF, AGAIN):
             restore(machine)
-            found[into] = driver.drive(machine, point, run.steps)
+            futures[into] = driver.drive(machine, point, run.steps)
         for into, other in ((FRESH, driver.new), (USED, driver.used)) if way.travels else ():
             with other(point) as target:
                 restore(target)
-                found[into] = driver.drive(target, point, run.steps)
-    return found
+                futures[into] = driver.drive(target, point, run.steps)
+    return futures
 
 
 def forgets(driver: Driver, runs: Sequence[ReferenceRun]) -> Iterator[AuditFinding]:
@@ -68,9 +72,9 @@ def forgets(driver: Driver, runs: Sequence[ReferenceRun]) -> Iterator[AuditFindi
     know whether the change shows at all, without a restore. At the point with most contacts:
     where nothing touches, nobody would miss a friction.
     """
-    run = max(runs, key=lambda each: driver.measure(each.point).contacts, default=None)
-    hiding = driver.hidden_state(run.point) if run else None
-    if run is None or hiding is None:
+    run = max(runs, key=lambda run: driver.measure(run.point).contacts, default=None)
+    hidden = driver.hidden_state(run.point) if run else None
+    if run is None or hidden is None:
         return
 
     def future(save: Save | None, change: Callable[[Machine], None] | None) -> Array:
@@ -80,10 +84,10 @@ def forgets(driver: Driver, runs: Sequence[ReferenceRun]) -> Iterator[AuditFindi
             restore(machine)
             return driver.drive(machine, run.point, run.steps)
 
-    ways = {NOT_RESTORED: None, **hiding.ways}
+    ways = {NOT_RESTORED: None, **hidden.ways}
     for name, save in ways.items():
         unchanged = future(save, None)
-        for what, change in hiding.changes.items():
+        for what, change in hidden.changes.items():
             off = gap(unchanged, future(save, change), driver.coordinates)
             yield finding_of(driver, FORGETS, run, what, name, off, promised=False)
 
@@ -96,15 +100,15 @@ def _nothing(_machine: Machine) -> Iterator[Restore]:
 
 def contacts_off(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
     """How far off the best that can be written is where nothing touches any more."""
-    hiding = driver.hidden_state(run.point)
-    if hiding is None:
+    hidden = driver.hidden_state(run.point)
+    if hidden is None:
         return
-    with driver.at(run.point) as machine, hiding.best.save(machine) as restore:
-        hiding.let_pass(machine)
+    with driver.at(run.point) as machine, hidden.best.save(machine) as restore:
+        hidden.let_pass(machine)
         alone = driver.drive(machine, run.point, run.steps)
         with driver.new(run.point) as other:
             restore(other)
-            hiding.let_pass(other)
+            hidden.let_pass(other)
             future = driver.drive(other, run.point, run.steps)
     off = gap(alone, future, driver.coordinates)
-    yield finding_of(driver, NO_CONTACTS, run, hiding.best.name, FRESH, off, promised=False)
+    yield finding_of(driver, NO_CONTACTS, run, hidden.best.name, FRESH, off, promised=False)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol, cast
 
 from ..errors import BadInputError, MissingEngineError, unknown_name
-from ..installed import DEFAULT, raise_if_interrupted, require
+from ..installed import DEFAULT, ENGINES, raise_if_interrupted, require
 from ..interface import Model
 from ..models import resolve
 from ._hidden_data import HiddenData, HiddenModel
@@ -48,8 +48,9 @@ class Backend:
 
 
 _BACKENDS: dict[str, Backend] = {
-    "mujoco": Backend("statemachine.backends.mujoco_backend:load", engine="mujoco"),
-    "pybullet": Backend("statemachine.backends.pybullet_backend:load", engine="pybullet"),
+    name: Backend(f"{__name__}.{name}_backend:load", engine=name)
+    for name, engine in ENGINES.items()
+    if engine.runs
 }
 
 

@@ -188,10 +188,10 @@ class LookAhead:
         """Contacts and forces of a moment."""
         with HiddenWorld.lock:
             self.world = self._open() if self.world is None else self.world.renewed()
-            return looked_at(self.world, moment)
+            return values_of(self.world, moment)
 
 
-def looked_at(world: HiddenWorld, moment: Moment) -> dict[str, Any]:
+def values_of(world: HiddenWorld, moment: Moment) -> dict[str, Any]:
     """What a world tells of a moment, but for what kinematics alone gives."""
     world.look(moment)
     poses, values = dict[str, Any](), dict[str, Any]()

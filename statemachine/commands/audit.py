@@ -16,7 +16,7 @@ def add(commands: Any) -> None:
         description="Save a run, go on, restore it, go on again, and compare every byte: on the "
         "engine itself, by its own functions, and through this interface. And whether forward, "
         "several steps in one call, threads and other processes change anything.",
-        epilog="Exit code 1 means that something is broken that is promised: that two restores "
+        epilog="Exit code 1 means that a promise is broken: that two restores "
         "of a State agree (and, where a backend says so, go on as the run itself), that step(n) "
         "is n steps, that forward and reading perturb nothing, that reset is a fresh start, that "
         "another Data, threads and processes change nothing. What an engine itself forgets is a "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .contacts import ContactNames, same_pairs
+from .contacts import ContactNames, same_pairs, together
 from .gap import Gap, largest
 from .moments import SAME, Common, common_moments, nearest
 from .quantities import QUANTITIES, Quantity, Tolerance, parse_tolerances
@@ -20,4 +20,5 @@ __all__ = [
     "nearest",
     "parse_tolerances",
     "same_pairs",
+    "together",
 ]

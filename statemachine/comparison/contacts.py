@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TypeVar
 from weakref import WeakKeyDictionary
 
@@ -31,7 +31,7 @@ class ContactNames:
         self._geoms = list(geoms)
         self._body_of = [int(body) for body in geom_bodyid]
         self._parents = [int(parent) for parent in body_parentid]
-        self._pairs: dict[tuple[int, int], str] = {}
+        self._pairs: dict[tuple[int, int], tuple[str, str]] = {}
 
     @classmethod
     def of(cls, model: Model) -> ContactNames:
@@ -47,23 +47,27 @@ class ContactNames:
 
     def pair(self, one: int, two: int) -> str:
         """The bodies of two geoms that touch: "gripper on floor"."""
-        if (one, two) not in self._pairs:
-            self._pairs[one, two] = " on ".join(map(self._owner, self._ordered(one, two)))
-        return self._pairs[one, two]
+        return self._names(one, two)[0]
 
     def geoms(self, one: int, two: int) -> str:
         """The same, and which of a body's geoms it is: "gripper on floor (fixed_stud_1)"."""
-        names = [self._geoms[geom] for geom in self._ordered(one, two)]
-        owners = map(self._owner, self._ordered(one, two))
-        told = [name for name, owner in zip(names, owners, strict=True) if name not in ("", owner)]
-        return self.pair(one, two) + (f" ({', '.join(told)})" if told else "")
+        return self._names(one, two)[1]
+
+    def _names(self, one: int, two: int) -> tuple[str, str]:
+        """Both, worked out once: a contact lasts for many steps."""
+        if (one, two) not in self._pairs:
+            ordered = sorted((one, two), key=self._distance, reverse=True)
+            owners = [self._owner(geom) for geom in ordered]
+            pair, own = " on ".join(owners), [self._geoms[geom] for geom in ordered]
+            told = [
+                name for name, owner in zip(own, owners, strict=True) if name not in ("", owner)
+            ]
+            self._pairs[one, two] = pair, pair + (f" ({' on '.join(told)})" if told else "")
+        return self._pairs[one, two]
 
     def _owner(self, geom: int) -> str:
         body = self._body_of[geom]
         return self._bodies[body] if body else self._geoms[geom] or self._bodies[0]
-
-    def _ordered(self, one: int, two: int) -> list[int]:
-        return sorted((one, two), key=self._distance, reverse=True)
 
     def _distance(self, geom: int) -> tuple[int, int]:
         """How many bodies are between a geom and the world, and the number of its own."""
@@ -76,6 +80,18 @@ class ContactNames:
 
 
 _OF: WeakKeyDictionary[Model, ContactNames] = WeakKeyDictionary()
+
+
+def together(contacts: Iterable[str]) -> str:
+    """Contacts in a list, the geoms of one pair of bodies behind it: "a on b (c, d), e on f"."""
+    geoms: dict[str, list[str]] = {}
+    for contact in contacts:
+        pair, _, told = contact.partition(" (")
+        geoms.setdefault(pair, []).append(told.removesuffix(")"))
+    return ", ".join(
+        f"{pair} ({', '.join(filter(None, told))})" if any(told) else pair
+        for pair, told in geoms.items()
+    )
 
 
 def same_pairs(one: Mapping[str, _T], two: Mapping[str, _T]) -> dict[str, _T]:

@@ -90,7 +90,7 @@ class Drawing:
 def drawing_of(model: Model) -> Drawing:
     """The visual geoms of a model, on whichever backend it is.
 
-    MuJoCo reads the same file for it where the model is another engine's. Geoms of groups 3
+    It is drawn from what MuJoCo made of the same file, whatever the engine. Geoms of groups 3
     to 5, by convention what touches and is not seen, are drawn only where nothing but the
     world would be seen without them.
 
@@ -98,7 +98,7 @@ def drawing_of(model: Model) -> Drawing:
         MissingEngineError: MuJoCo is not installed here.
         ModelError: MuJoCo cannot read the file.
     """
-    raw = on_default(model).raw
+    raw = model.compiled if model.compiled is not None else on_default(model).raw
     seen = raw.geom_group < _SEEN_GROUPS
     if not raw.geom_bodyid[seen].any():
         seen[:] = True

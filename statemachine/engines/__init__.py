@@ -1,9 +1,12 @@
 """The engines without us: what each does and calls things when its own users drive it.
 
 Each engine has a room here, a package with its name. A room has parts, modules with the names
-in `PARTS`; conventions, phrasebook, calls, audit, comparison and doctor ask for a part by the
-engine's name, and name no engine themselves. An engine without a part is not asked, and the
-page says so.
+in `PARTS`; conventions, phrasebook, calls, audit, comparison, pictures, grading and doctor ask for
+a part by the engine's name, and name no engine themselves. An engine without a part is not asked,
+and the page says so.
+
+So an engine is `backends/NAME_backend.py`, `engines/NAME` and a row of `installed.ENGINES`; one of
+another distribution declares entry points instead of the row.
 """
 
 from __future__ import annotations
@@ -15,13 +18,11 @@ from contextlib import suppress
 from typing import Any
 
 from ..errors import BadInputError, MissingEngineError, UnsupportedError, unknown_name
-from ..installed import raise_if_interrupted
+from ..installed import ENGINES, raise_if_interrupted
 
-_ROOMS: dict[str, str] = {
-    name: f"{__name__}.{name}" for name in ("mujoco", "pybullet", "pinocchio")
-}
+_ROOMS: dict[str, str] = {name: f"{__name__}.{name}" for name in ENGINES}
 # What a room may have. The protocol of a part, and the records that it gives, are in a module of
-# this package: `measured`, `phrases`, `call_watch`, `parts`.
+# this package: `measured`, `phrases`, `call_watch`, `auditing`, `parts`.
 PARTS: dict[str, str] = {
     "as_it_comes": "what the engine calls things, and a model as its own users load it",
     "conventions": "what it does with tiny models, for the questions of `conventions`",
@@ -38,7 +39,7 @@ PARTS: dict[str, str] = {
 
 
 def room_names() -> list[str]:
-    """Names of the engines that have a room, whether or not they are installed."""
+    """Names of the engines that may have a room, whether or not they are installed."""
     for entry in importlib.metadata.entry_points(group="statemachine.engines"):
         _ROOMS.setdefault(entry.name, entry.value)
     return list(_ROOMS)
@@ -112,12 +113,14 @@ def needed_part(engine: str, name: str) -> Any:
 
 def _module(engine: str, name: str) -> str | None:
     """The module of a part, which is not imported; None if there is none."""
-    module = f"{_ROOMS[engine]}.{name}"
+    room = _ROOMS[engine]
+    module = f"{room}.{name}"
+    if room.startswith(f"{__name__}.") and not importlib.util.find_spec(room):
+        return None  # an engine of the table that has no room
     try:
         return module if importlib.util.find_spec(module) else None
     except ImportError as error:  # the package of the room
         raise_if_interrupted(error)
         raise MissingEngineError(
-            f"the room of {engine!r} cannot be loaded from {_ROOMS[engine]!r}: {error}",
-            engine=engine,
+            f"the room of {engine!r} cannot be loaded from {room!r}: {error}", engine=engine
         ) from error

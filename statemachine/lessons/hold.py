@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison import largest
+from ..comparison import largest, together
 from ..comparison.text import apart, position, short_time
 from ..experiments import hold
 from ..interface import Array
@@ -173,8 +173,8 @@ def _end(result: hold.Hold) -> str:
         return text + " The robot touched nothing."
     text += (
         f" The robot touches something in {result.contact_steps} of {len(result.time) - 1} steps, "
-        f"first at {result.first_contact:.3f} s: {', '.join(result.touched)}; at the end: "
-        f"{', '.join(result.touching) or 'nothing'}"
+        f"first at {result.first_contact:.3f} s: {together(result.touched)}; at the end: "
+        f"{together(result.touching) or 'nothing'}"
     )
     gaps = np.abs(result.qpos[-1] - result.goal)
     text += f". The joint farthest from its goal is then {_farthest(result, gaps)}"

@@ -172,8 +172,8 @@ def compare(
         "python": platform.python_version(),
     }
     for robot in robots:
-        engine, _, version = robot.reader.partition(" ")
-        if version:
+        if robot.format != "URDF":  # which no engine has read
+            engine, _, version = robot.reader.partition(" ")
             versions[engine] = version
     return Compared(_side(trees[0]), _side(trees[1]), found, digits, versions)
 
