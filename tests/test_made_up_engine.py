@@ -81,23 +81,23 @@ def _slow(*words: str) -> object:
 
 
 LESSONS = [
-    _slow("objects"),
+    ("objects", "--worlds", "3"),
     ("state",),
     ("write",),
-    _slow("forward"),
+    ("forward",),
     ("hold",),
-    _slow("gravity"),
-    _slow("reset"),
-    _slow("replay"),
-    _slow("time"),
-    _slow("speed"),
+    _slow("gravity", "--seconds", "0.5", "--longer", "0"),
+    ("reset",),
+    ("replay", "--steps", "100"),
+    ("time",),
+    ("speed", "--steps", "200"),
     _slow("questions"),
 ]
 
 
 @pytest.mark.usefixtures("engine")
 @pytest.mark.parametrize("lesson", LESSONS, ids=" ".join)
-def test_every_lesson_runs_on_it(capsys: Output, lesson: tuple[str]) -> None:
+def test_every_lesson_runs_on_it(capsys: Output, lesson: tuple[str, ...]) -> None:
     assert NAME in said(capsys, "lesson", *lesson, *ON)
 
 
