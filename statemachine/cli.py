@@ -5,24 +5,23 @@ from __future__ import annotations
 import argparse
 import codecs
 import difflib
+import importlib
 import io
 import os
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from typing import Any, NoReturn
 
 from . import __version__
-from .commands import COMMANDS, lesson
+from .commands import COMMANDS
 from .commands._common import BAD_INPUT, MISSING, NO_OUTPUT, PROGRAM, complain
 from .errors import EngineWarning, MissingEngineError, StateMachineError
 from .installed import raise_if_interrupted
-from .lessons import LESSONS
 from .report.terminal import spelled
 
 _SAID: set[str] = set()
-_NAMES = [command.__name__.rpartition(".")[2] for command in COMMANDS]
 
 
 class _Parser(argparse.ArgumentParser):
@@ -36,9 +35,11 @@ class _Parser(argparse.ArgumentParser):
             known = [choice.strip() for choice in choices.rstrip(")").split(",")]
             close = difflib.get_close_matches(given, known, n=1, cutoff=0.5)
             hint = f". Did you mean {close[0]}?" if close else ""
+            from .lessons import LESSONS
+
             if given in LESSONS:
                 hint = f". Did you mean {PROGRAM} lesson {given}?"
-            elif given in _NAMES:
+            elif given in COMMANDS:
                 hint = f". Did you mean {PROGRAM} {given}?"
             message = f"{wrong}no {given!r}; known: {', '.join(known)}{hint}"
         if "expected one argument" in message:
@@ -47,7 +48,8 @@ class _Parser(argparse.ArgumentParser):
                 message += f" (one that begins with a minus: {flag}={typed})"
         if message.startswith("unrecognized arguments: -"):
             given = message.split()[2].partition("=")[0]
-            close = difflib.get_close_matches(given, _flags(self, sys.argv[1:]), n=1, cutoff=0.6)
+            known = _flags(_parser(COMMANDS), sys.argv[1:])
+            close = difflib.get_close_matches(given, known, n=1, cutoff=0.6)
             message += f". Did you mean {close[0]}?" if close else ""
         print(f"{self.prog}: {message}", file=sys.stderr)
         raise SystemExit(BAD_INPUT)
@@ -115,14 +117,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _options(words: list[str]) -> argparse.Namespace:
-    parser = _parser()
-    for k, word in enumerate(words[1:], start=1):
-        if words[k - 1] == "lesson":  # a station may be called by its number
-            words[k] = lesson.by_number(word)
-    options = parser.parse_args(words)
-    if getattr(options, "run", None) is None:
-        options.run = lesson.overview
-    return options
+    named = next((word for word in words if word in COMMANDS), "lesson")
+    if named == "lesson":
+        from .commands import lesson
+
+        for k, word in enumerate(words[1:], start=1):
+            if words[k - 1] == "lesson":  # a station may be called by its number
+                words[k] = lesson.by_number(word)
+        options = _parser([named]).parse_args(words)
+        if getattr(options, "run", None) is None:
+            options.run = lesson.overview
+        return options
+    return _parser([named]).parse_args(words)
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *where: Any) -> None:
@@ -140,7 +146,8 @@ def _let_go_of_output() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(wanted: Collection[str]) -> argparse.ArgumentParser:
+    """A parser that knows all commands, and the options of some."""
     parser = _Parser(
         prog=PROGRAM,
         description="A physics simulator is a state machine that you advance.",
@@ -148,6 +155,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")
     commands = parser.add_subparsers(metavar="command")
-    for command in COMMANDS:
-        command.add(commands)
+    for name, says in COMMANDS.items():
+        command = commands.add_parser(name, help=says)
+        if name in wanted:
+            importlib.import_module(f".commands.{name}", __package__).add(command)
     return parser

@@ -1,12 +1,20 @@
 """The commands of the command line, one file each; importing them loads no engine.
 
-A command is a module with `add(commands)`, which gives the parser a subparser whose
-default `run` takes the parsed options and returns the exit code.
+A command is a module of this package, imported when it is typed, with `add(parser)`: it gives the
+parser its options, and the default `run`, which takes the parsed options and returns the exit code.
 """
 
 from __future__ import annotations
 
-from . import audit, check, compare, conventions, doctor, fingertip, lesson, trace, view
-
-# In the order in which --help shows them.
-COMMANDS = (lesson, check, conventions, audit, fingertip, compare, trace, view, doctor)
+# What --help says of each, in its order.
+COMMANDS = {
+    "lesson": "the guided path, or one station of it",
+    "check": "judge an exercise by what it does",
+    "conventions": "what each engine takes for granted, asked of the engines",
+    "audit": "what exactly the state is, found by saving, restoring and comparing bytes",
+    "fingertip": "the engine's fingertip against an independent witness",
+    "compare": "where two engines part, by how much, and why",
+    "trace": "record a run, play it on another engine, look into it, draw it",
+    "view": "a running simulation in the browser, with sliders",
+    "doctor": "what this machine has, and what to do",
+}

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
 from ._common import add_backend, add_json, add_menagerie, add_model, on_each_backend, show
 
 
-def add(commands: Any) -> None:
-    """The subparser."""
-    parser = commands.add_parser(
-        "audit",
-        help="what exactly the state is, found by saving, restoring and comparing bytes",
-        description="Save a run, go on, restore it, go on again, and compare every byte: on the "
+def add(parser: argparse.ArgumentParser) -> None:
+    """Its options."""
+    parser.description = (
+        "Save a run, go on, restore it, go on again, and compare every byte: on the "
         "engine itself, by its own functions, and through this interface. And whether forward, "
-        "several steps in one call, threads and other processes change anything.",
-        epilog="Exit code 1 means that a promise is broken: that two restores "
+        "several steps in one call, threads and other processes change anything."
+    )
+    parser.epilog = (
+        "Exit code 1 means that a promise is broken: that two restores "
         "of a State agree (and, where a backend says so, go on as the run itself), that step(n) "
         "is n steps, that forward and reading perturb nothing, that reset is a fresh start, that "
         "another Data, threads and processes change nothing. What an engine itself forgets is a "
-        "fact, not a fault: it is shown, and the exit code is 0.",
+        "fact, not a fault: it is shown, and the exit code is 0."
     )
     add_backend(parser)
     add_model(parser, "so101/scene_box")

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
 from . import _mutants
 from ._common import add_backend, add_json, show
 
 
-def add(commands: Any) -> None:
-    """The subparser."""
-    parser = commands.add_parser(
-        "check",
-        help="judge an exercise by what it does",
-        description="Call each function of a student's file on several models, in a process of "
+def add(parser: argparse.ArgumentParser) -> None:
+    """Its options."""
+    parser.description = (
+        "Call each function of a student's file on several models, in a process of "
         "its own with limits, and say what is wrong with what it does. Or, with --mutants: put "
-        "faults into the arm, and say which of them a student's tests catch.",
+        "faults into the arm, and say which of them a student's tests catch."
     )
     parser.add_argument(
         "file", nargs="?", metavar="FILE", help="the student's file, like step_loop.py"

@@ -12,22 +12,18 @@ from . import _compare_pictures as pictures
 from ._common import PROGRAM, add_json, add_menagerie, complain, show
 
 
-def add(commands: Any) -> None:
-    """The subparser."""
-    parser = commands.add_parser(
-        "compare",
-        help="where two engines part, by how much, and why",
-        description=(
-            "Run an experiment on two engines, or open recorded traces, and compare: each\n"
-            "quantity with its tolerance and a verdict. One trace: its ctrl is played on\n"
-            "the other engine."
-        ),
-        epilog=(
-            f"experiments:\n{experiments()}\n\n"
-            "Exit code 1: something differs; with --why: something stays unexplained."
-        ),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+def add(parser: argparse.ArgumentParser) -> None:
+    """Its options."""
+    parser.description = (
+        "Run an experiment on two engines, or open recorded traces, and compare: each\n"
+        "quantity with its tolerance and a verdict. One trace: its ctrl is played on\n"
+        "the other engine."
     )
+    parser.epilog = (
+        f"experiments:\n{experiments()}\n\n"
+        "Exit code 1: something differs; with --why: something stays unexplained."
+    )
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument(
         "what",
         nargs="*",

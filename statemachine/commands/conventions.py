@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
 from ..errors import BadInputError, MissingEngineError
 from ..installed import ENGINES, available
 from ._common import MISSING, PROGRAM, add_json, complain, show
 
 
-def add(commands: Any) -> None:
-    """The subparser."""
-    parser = commands.add_parser(
-        "conventions",
-        help="what each engine takes for granted, asked of the engines",
-        description="Ask the engines themselves, not our backends: every answer is measured.",
-    )
+def add(parser: argparse.ArgumentParser) -> None:
+    """Its options."""
+    parser.description = "Ask the engines themselves, not our backends: every answer is measured."
     parser.add_argument(
         "question",
         nargs="*",

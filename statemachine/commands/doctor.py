@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
 from ._common import MISSING, add_json, show
 
 
-def add(commands: Any) -> None:
-    """The subparser."""
-    parser = commands.add_parser("doctor", help="what this machine has, and what to do")
+def add(parser: argparse.ArgumentParser) -> None:
+    """Its options."""
     add_json(parser, "findings")
     parser.set_defaults(run=run)
 

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
 from ._common import add_backend, add_json, add_menagerie, add_model, on_each_backend, show
 
 
-def add(commands: Any) -> None:
-    """The subparser."""
-    parser = commands.add_parser(
-        "fingertip",
-        help="the engine's fingertip against an independent witness",
-        description="Compare a site's pose on an engine with Pinocchio's, over many poses.",
-    )
+def add(parser: argparse.ArgumentParser) -> None:
+    """Its options."""
+    parser.description = "Compare a site's pose on an engine with Pinocchio's, over many poses."
     add_backend(parser)
     add_model(parser, "so101")
     add_menagerie(parser)

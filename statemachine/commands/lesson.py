@@ -22,26 +22,22 @@ from ._common import (
 )
 
 
-def add(commands: Any) -> None:
-    """The subparser, with one of its own for each station."""
-    path = commands.add_parser(
-        "lesson",
-        help="the guided path, or one station of it",
-        description="Without a name: all stations, one after the other.",
-        epilog="In a terminal each station asks for a prediction before it shows the answer.",
-    )
-    _add_shared(path)
-    path.add_argument(
+def add(parser: argparse.ArgumentParser) -> None:
+    """Its options, and a parser for each station."""
+    parser.description = "Without a name: all stations, one after the other."
+    parser.epilog = "In a terminal each station asks for a prediction before it shows the answer."
+    _add_shared(parser)
+    parser.add_argument(
         "--from",
         dest="start",
         type=by_number,
         choices=[lesson.name for lesson in STATIONS],
         default=None,
         metavar="STATION",
-        help="of the whole path: where to begin, if not at the first",
+        help="of the whole parser: where to begin, if not at the first",
     )
-    path.set_defaults(run=run_path)
-    named = path.add_subparsers(metavar="[name]")
+    parser.set_defaults(run=run_path)
+    named = parser.add_subparsers(metavar="[name]")
     for lesson in LESSONS.values():
         _add_lesson(named, lesson)
 

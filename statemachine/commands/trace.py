@@ -22,13 +22,9 @@ from ._common import (
 from .compare import EXPERIMENTS, add_defaults, add_run, experiments
 
 
-def add(commands: Any) -> None:
-    """The subparser, with one for each thing to do."""
-    parser = commands.add_parser(
-        "trace",
-        help="record a run, play it on another engine, look into it, draw it",
-        description="Everything that a run did, in a file that opens without an engine.",
-    )
+def add(parser: argparse.ArgumentParser) -> None:
+    """A parser for each thing to do."""
+    parser.description = "Everything that a run did, in a file that opens without an engine."
     parser.set_defaults(run=lambda _options: _none_given())
     named = parser.add_subparsers(metavar="action")
     _add_record(named)

@@ -16,13 +16,11 @@ _PORT = 8080
 _MODEL = "so101/scene_box"
 
 
-def add(commands: Any) -> None:
-    """The subparser."""
-    parser = commands.add_parser(
-        "view",
-        help="a running simulation in the browser, with sliders",
-        description="Show a simulation in the browser at the pace of the clock, with a slider "
-        "for each actuator; the other engine beside it as a ghost. Ctrl-C ends it.",
+def add(parser: argparse.ArgumentParser) -> None:
+    """Its options."""
+    parser.description = (
+        "Show a simulation in the browser at the pace of the clock, with a slider "
+        "for each actuator; the other engine beside it as a ghost. Ctrl-C ends it."
     )
     parser.add_argument(
         "traces", nargs="*", metavar="TRACE", help="play this recording; a second one is the ghost"
