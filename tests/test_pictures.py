@@ -524,7 +524,7 @@ def test_ctrl_c_leaves_no_half_film_and_no_process(
     )
     try:
         deadline = time.monotonic() + 60
-        while not _drawing(child.pid) and time.monotonic() < deadline and child.poll() is None:
+        while not _drawing(tmp_path) and time.monotonic() < deadline and child.poll() is None:
             time.sleep(0.05)
         time.sleep(1)
         os.killpg(child.pid, signal.SIGINT)
@@ -534,19 +534,19 @@ def test_ctrl_c_leaves_no_half_film_and_no_process(
     assert child.returncode == 130, said
     assert "Traceback" not in said
     assert sorted(path.name for path in tmp_path.iterdir()) == ["one.npz", "two.npz"]
-    assert not _drawing(child.pid)
+    assert not _drawing(tmp_path)
 
 
-def _drawing(group: int) -> list[str]:
-    """Processes of a group that draw or encode."""
+def _drawing(place: Path) -> list[str]:
+    """Processes that draw or encode in a folder."""
     found = []
     for folder in Path("/proc").glob("[0-9]*"):
         try:
-            words = (folder / "stat").read_text().rpartition(")")[2].split()
+            there = (folder / "cwd").readlink() == place
             command = (folder / "cmdline").read_bytes()
         except OSError:
             continue
-        if int(words[2]) == group and (b"rendering._child" in command or b"ffmpeg" in command):
+        if there and (b"rendering._child" in command or b"ffmpeg" in command):
             found.append(command.decode())
     return found
 

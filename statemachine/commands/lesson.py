@@ -37,7 +37,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="of the whole parser: where to begin, if not at the first",
     )
     parser.set_defaults(run=run_path)
-    named = parser.add_subparsers(metavar="[name]")
+    named = parser.add_subparsers(metavar="name")
     for lesson in LESSONS.values():
         _add_lesson(named, lesson)
 

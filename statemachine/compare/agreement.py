@@ -53,7 +53,6 @@ class Agreement:
     verdict: Verdict
     note: str = ""
 
-    @property
     def tolerances(self) -> float:
         """How many tolerances the largest difference is; what is no number is beyond all."""
         if self.max == 0:
@@ -118,7 +117,7 @@ class Comparison:
     @property
     def worst(self) -> Agreement | None:
         """The quantity that is farthest beyond its tolerance; None if nothing was compared."""
-        return max(self.agreements, key=lambda found: found.tolerances, default=None)
+        return max(self.agreements, key=Agreement.tolerances, default=None)
 
 
 def compare(

@@ -68,7 +68,13 @@ def write_mp4(path: Path, pictures: Iterator[Any], size: tuple[int, int], fps: f
 
 
 def _feed(command: list[str], pictures: Iterator[Any], said: Any) -> None:
-    child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said)
+    child = subprocess.Popen(
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=said,
+        start_new_session=True,  # a Ctrl-C of the terminal is ours to hear, and to end it then
+    )
     assert child.stdin is not None
     try:
         try:

@@ -187,7 +187,7 @@ def _worst_of(shown: list[Series], found: dict[str, Agreement]) -> list[Series]:
     """All of them, or, of very many, those that are farthest beyond their tolerance."""
     if len(shown) <= MOST:
         return shown
-    share = {name: agreement.tolerances for name, agreement in found.items()}
+    share = {name: agreement.tolerances() for name, agreement in found.items()}
     kept = sorted(shown, key=lambda curve: -share.get(curve.name, 0.0))[:MOST]
     return [curve for curve in shown if any(curve is one for one in kept)]
 

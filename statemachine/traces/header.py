@@ -170,6 +170,11 @@ class Header:
         """A name for each joint: its own, or "joint 0" by its number."""
         return tuple(name or f"joint {k}" for k, name in enumerate(self.joints))
 
+    @property
+    def body_labels(self) -> tuple[str, ...]:
+        """A name for each body: its own, or "body 1" by its number."""
+        return tuple(name or f"body {k}" for k, name in enumerate(self.bodies))
+
     def _check(self) -> None:
         _check_fields(self)
         for name in ("nq", "nv", "nu", "substeps"):

@@ -142,7 +142,7 @@ class Trace:
         if "contact_geom" in self:
             header = self.header
             names = ContactNames(
-                header.bodies, header.geoms, header.geom_bodyid, header.body_parentid
+                header.body_labels, header.geoms, header.geom_bodyid, header.body_parentid
             )
             for place, geoms in enumerate(self["contact_geom"].tolist()):
                 of_pair.setdefault(names.pair(*geoms), []).append(place)

@@ -54,7 +54,7 @@ def curves_section(
                 data_table(curve, found, labels), class_="data"),
             class_="quantity-row",
         )  # fmt: skip
-        shown[found.verdict].append((-found.tolerances, row))
+        shown[found.verdict].append((-found.tolerances(), row))
     beyond = [row for v in ("differs", "settles") for _, row in sorted(shown[v], key=_first)]
     within = [row for _, row in sorted(shown["agrees"], key=_first)]
     key = tag(

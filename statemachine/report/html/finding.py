@@ -198,7 +198,8 @@ def leading(comparison: Comparison) -> Agreement | None:
 
 def _finite_first(found: Agreement) -> float:
     """How many tolerances it is beyond; what is no number comes last."""
-    return found.tolerances if np.isfinite(found.tolerances) else -1.0
+    share = found.tolerances()
+    return share if np.isfinite(share) else -1.0
 
 
 def parting(comparison: Comparison) -> float | None:
