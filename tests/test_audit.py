@@ -97,6 +97,7 @@ def of_pybullet() -> audit.Audit:
     return audit.run(sm.load(SCENE, backend="pybullet"), steps=40)
 
 
+@pytest.mark.slow
 def test_mujoco_needs_its_warm_start_in_contact(of_mujoco: audit.Audit) -> None:
     engine, interface = of_mujoco.audited
     found = engine.conclusion
@@ -244,6 +245,7 @@ def test_any_model_has_save_points(body: str, tmp_path: Path) -> None:
     assert result.audited[0].conclusion.smallest is True
 
 
+@pytest.mark.slow
 def test_components_of_other_models_are_tried(tmp_path: Path) -> None:
     file = tmp_path / "model.xml"
     file.write_text(
@@ -265,6 +267,7 @@ def test_a_model_without_anything_that_moves_is_refused(tmp_path: Path) -> None:
         audit.run(sm.load(file))
 
 
+@pytest.mark.slow
 def test_where_a_run_diverges_it_is_not_saved(tmp_path: Path) -> None:
     file = tmp_path / "model.xml"
     file.write_text(
@@ -483,6 +486,7 @@ def test_a_fault_is_found(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert finder in broken(asked(question))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("question", QUESTIONS)
 def test_without_a_fault_nothing_is_found(question: str, backend: str) -> None:
     found = asked(question, backend)

@@ -246,6 +246,7 @@ _LINK = st.tuples(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(links=st.lists(_LINK, min_size=1, max_size=4), random=st.randoms(use_true_random=False))
 def test_fixed_links_weigh_what_mujoco_makes_of_them(
@@ -578,6 +579,7 @@ def test_split() -> None:
     assert split("so101") == ("so101", None)
 
 
+@pytest.mark.slow
 def test_the_command(cli: Cli, tmp_path: Path) -> None:
     same = cli("compare", "--models", "so101", "so101")
     assert same.returncode == 0, same.stderr

@@ -196,6 +196,7 @@ def of_look(one: Trace, two: Trace, look: SideDrawing) -> Made:
     return compare(one, two), one, two, look
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["hold", "gravity", "box", "hold.engine"])
 def test_it_is_small(name: str, tmp_path: Path) -> None:
     experiment, _, engine = name.partition(".")
