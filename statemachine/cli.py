@@ -118,17 +118,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _options(words: list[str]) -> argparse.Namespace:
     named = next((word for word in words if word in COMMANDS), "lesson")
-    if named == "lesson":
-        from .commands import lesson
+    parser = _parser([named])
+    if named != "lesson":
+        return parser.parse_args(words)
+    from .commands import lesson
 
-        for k, word in enumerate(words[1:], start=1):
-            if words[k - 1] == "lesson":  # a station may be called by its number
-                words[k] = lesson.by_number(word)
-        options = _parser([named]).parse_args(words)
-        if getattr(options, "run", None) is None:
-            options.run = lesson.overview
-        return options
-    return _parser([named]).parse_args(words)
+    for k, word in enumerate(words[1:], start=1):
+        if words[k - 1] == "lesson":  # a station may be called by its number
+            words[k] = lesson.by_number(word)
+    options = parser.parse_args(words)
+    if getattr(options, "run", None) is None:
+        options.run = lesson.overview
+    return options
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *where: Any) -> None:

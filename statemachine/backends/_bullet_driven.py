@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ..interface import DERIVED, POSES, Array
-from ..interface.checks import HUGE
 from ..rotations import matrix_from_quat
 from . import _dense as dense
 from ._bullet_arm import Arm, Motors
@@ -17,9 +16,8 @@ from ._bullet_contacts import contacts
 from ._bullet_law import Law
 from ._bullet_shared import Shared, free_dynamics
 from ._bullet_world import World
-from ._hidden_world import HiddenWorld, Moment, Read
+from ._hidden_world import HiddenWorld, Moment, Read, bounded
 
-_MANY = HUGE * HUGE
 _TOLD = ("qfrc_bias", "qfrc_actuator")  # of the forces, by PyBullet as it comes
 
 # What each arm knows of the step before: contact (n,) and friction (n,).
@@ -85,10 +83,7 @@ class DrivenWorld(HiddenWorld):
 
     def diverging(self) -> bool:
         """Looks at the arms only: to read free bodies takes longer."""
-        for arm in self._arms:
-            if not arm.angles.dot(arm.angles) + arm.speed.dot(arm.speed) < _MANY:
-                return True
-        return False
+        return not all(bounded(arm.angles, arm.speed) for arm in self._arms)
 
     def read(self) -> tuple[Array, Array]:
         """As the base says."""

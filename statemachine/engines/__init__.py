@@ -88,7 +88,8 @@ def part(engine: str | None, name: str) -> Any:
     """
     if name not in PARTS:
         raise unknown_name("part of an engine's room", name, PARTS)
-    if engine is None or engine not in room_names():
+    # What is installed is looked through for names that are not known alone: that takes long.
+    if engine is None or (engine not in _ROOMS and engine not in room_names()):
         return None
     module = _module(engine, name)
     return importlib.import_module(module) if module else None
