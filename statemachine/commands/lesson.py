@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError
@@ -64,6 +65,12 @@ def _add_shared(parser: argparse.ArgumentParser, default: Any = None) -> None:
         action="store_true",
         default=default or False,
         help="do not ask for predictions, do not wait",
+    )
+    parser.add_argument(
+        "--record",
+        default=default,
+        metavar="FILE",
+        help="keep your predictions in this file, with a score, to hand in",
     )
 
 
@@ -135,6 +142,7 @@ def run(options: argparse.Namespace) -> int:
             f"{PROGRAM} lesson --from {options.start}, or {PROGRAM} lesson {lesson.name}"
         )
     values = {option.key: getattr(options, option.key) for option in lesson.options}
+    ask = _asking(options)
     page, results = _compute(options, lesson, options.model, values)
     names = list(LESSONS)
     later = names[names.index(lesson.name) + 1 :]
@@ -142,7 +150,7 @@ def run(options: argparse.Namespace) -> int:
     from ..report.quiz import Stopped
 
     try:
-        return show(page, results, options.json, f"Next: {following}", _asking(options))
+        return show(page, results, options.json, f"Next: {following}", _of(ask, lesson))
     except Stopped:
         return 0
 
@@ -169,7 +177,7 @@ def run_path(options: argparse.Namespace) -> int:
             if not options.json:
                 title = f"{number} of {len(STATIONS)}: {page.title}"
                 last = number == len(STATIONS)
-                terminal.show(replace(page, title=title), _AFTER if last else "", ask)
+                terminal.show(replace(page, title=title), _AFTER if last else "", _of(ask, lesson))
         except (Stopped, KeyboardInterrupt) as stop:
             if ask:
                 print(f"\nGo on later with: {PROGRAM} lesson --from {lesson.name}")
@@ -214,4 +222,18 @@ def _asking(options: argparse.Namespace) -> Any:
     """What puts a question to the reader; None where nobody would answer."""
     from ..report.quiz import ask, can_ask
 
-    return ask if can_ask() and not (options.json or options.no_questions) else None
+    asks = can_ask() and not (options.json or options.no_questions)
+    if options.record is None:
+        return ask if asks else None
+    if not asks:
+        raise BadInputError("--record keeps what you predict: it needs a terminal that asks")
+    from ..report.predictions import Predictions
+
+    return Predictions(Path(options.record), ask)
+
+
+def _of(ask: Any, lesson: Lesson) -> Any:
+    """`ask` for the questions of this lesson."""
+    if hasattr(ask, "lesson"):
+        ask.lesson = lesson.name
+    return ask
