@@ -15,7 +15,7 @@ import numpy as np
 import statemachine as sm
 from benchmarks.interleave import Ratio, interleaved
 from statemachine import __version__
-from statemachine.experiments._common import silent
+from statemachine.scenarios.runs import silent
 from statemachine.traces import recorder
 
 STEPS = 500

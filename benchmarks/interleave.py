@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from statemachine.experiments.in_turns import Ratio, in_turns
+from statemachine.lessons.in_turns import Ratio, in_turns
 
 _NULL = "the baseline again (null)"
 

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,9 @@ from statemachine import backends
 from statemachine.backends import backend_engine, backend_names
 from statemachine.errors import MissingEngineError
 from statemachine.installed import ENGINES, require
+from statemachine.interface import Model
+from statemachine.lessons import LESSONS
+from statemachine.lessons.session import take
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
@@ -30,6 +34,11 @@ def need_engine(name: str) -> None:
         if name in REQUIRED:
             pytest.fail(f"STATEMACHINE_REQUIRE names {name}: {error}")
         pytest.skip(str(error))
+
+
+def lesson_result(name: str, model: Model, **options: Any) -> Any:
+    """What a lesson finds on a Model."""
+    return take(LESSONS[name], model, model.backend, options).result
 
 
 def _shared(path: Path) -> Path:

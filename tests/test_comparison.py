@@ -10,11 +10,12 @@ import pytest
 import statemachine as sm
 from statemachine.compare import compare, touches
 from statemachine.comparison import ContactNames, Gap, largest, nearest, same_pairs, text, together
-from statemachine.experiments import hold
-from statemachine.experiments.scenarios import SCENARIOS
 from statemachine.report.html.timeline import events_of
 from statemachine.report.plot_panels import of_trace
+from statemachine.scenarios import SCENARIOS
 from statemachine.traces import Trace, record, record_scenario, shipped
+
+from .conftest import lesson_result
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,7 @@ def test_a_contact_has_one_name_in_lesson_comparison_page_and_freshness(trace: T
     assert [touch.name for touch in of_trace(trace).touches] == [name]
     # The lesson and freshness also say which of the gripper's geoms it is.
     model = sm.load("so101/scene")
-    lesson = hold.run(model, seconds=0.5)
+    lesson = lesson_result("hold", model, seconds=0.5)
     assert lesson.touched
     assert all(touch.startswith(f"{name} (") for touch in lesson.touched)
     with sm.make_data(model) as data:

@@ -1,4 +1,4 @@
-"""The experiments through their functions: what the pages and the JSON are made of."""
+"""The lessons through their functions: what the pages and the JSON are made of."""
 
 from __future__ import annotations
 
@@ -13,25 +13,18 @@ import pytest
 
 import statemachine as sm
 from statemachine.errors import BadInputError
-from statemachine.experiments import (
-    _common,
-    fingertip,
-    forward,
-    gravity,
-    hold,
-    in_turns,
-    replay,
-    speed,
-    state,
-)
+from statemachine.experiments import fingertip, forward, replay, speed, state
+from statemachine.lessons import in_turns
+from statemachine.lessons._fall import Forces, milestones
 from statemachine.models import models_dir
+from statemachine.scenarios.provenance import provenance
 
-from .conftest import need_engine
+from .conftest import lesson_result, need_engine
 
 
 def test_provenance_covers_included_files(tmp_path: Path) -> None:
     home = models_dir() / "so101"
-    made = _common.provenance(sm.load("so101/scene_box"))
+    made = provenance(sm.load("so101/scene_box"))
     files = ("scene_box", "scene", "so101")
     content = b"".join((home / f"{name}.xml").read_bytes() for name in files)
     assert made.model_sha256 == hashlib.sha256(content).hexdigest()
@@ -39,20 +32,20 @@ def test_provenance_covers_included_files(tmp_path: Path) -> None:
 
 
 def test_milestones() -> None:
-    assert _common.milestones(4.0) == [0, 1, 2, 3, 4]
-    assert _common.milestones(0.5) == [0, 0.5]
-    assert _common.milestones(60) == [0, 1, 2, 3, 4, 10, 20, 30, 50, 60]
+    assert milestones(4.0) == [0, 1, 2, 3, 4]
+    assert milestones(0.5) == [0, 0.5]
+    assert milestones(60) == [0, 1, 2, 3, 4, 10, 20, 30, 50, 60]
 
 
 def test_forces_sum_with_the_bias_on_the_other_side() -> None:
-    forces = _common.Forces(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
+    forces = Forces(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
     assert forces.total == 2 + 3 + 4 + 5 + 6 + 7 - 1
-    assert _common.Forces(1.0, None, 0, 0, 0, 0, 0).total is None
+    assert Forces(1.0, None, 0, 0, 0, 0, 0).total is None
 
 
 def test_gravity_is_read_at_the_moment_of_the_end() -> None:
     model = sm.load("so101/scene")
-    found = gravity.run(model, seconds=1.0)
+    found = lesson_result("gravity", model, seconds=1.0)
     with sm.make_data(model) as data:
         sm.step(model, data, 200)
         sm.forward(model, data)
@@ -70,7 +63,7 @@ def test_gravity_is_read_at_the_moment_of_the_end() -> None:
 
 
 def test_hold_tracks_the_worst_joint_and_the_speed() -> None:
-    found = hold.run(sm.load("so101/scene"), seconds=0.2)
+    found = lesson_result("hold", sm.load("so101/scene"), seconds=0.2)
     gaps = np.abs(found.qpos - found.goal)
     assert np.array_equal(found.error, gaps.max(axis=1))
     assert np.abs(found.speed).max() > 1.0
@@ -79,9 +72,9 @@ def test_hold_tracks_the_worst_joint_and_the_speed() -> None:
 
 
 def test_hold_that_ends_at_the_first_touch_says_so() -> None:
-    whole = hold.run(sm.load("so101/scene"), seconds=0.5)
+    whole = lesson_result("hold", sm.load("so101/scene"), seconds=0.5)
     assert whole.first_contact is not None
-    found = hold.run(sm.load("so101/scene"), seconds=whole.first_contact)
+    found = lesson_result("hold", sm.load("so101/scene"), seconds=whole.first_contact)
     assert found.touching
     assert found.first_contact == pytest.approx(whole.first_contact)
 

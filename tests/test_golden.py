@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.experiments import hold
+from statemachine.scenarios import TARGET
 
 Golden = Callable[[str], np.ndarray]
 
@@ -71,7 +71,7 @@ def test_servos_off(golden: Golden) -> None:
 def test_hold_until_and_after_its_first_contact(golden: Golden) -> None:
     table = golden("golden_hold")
     expected = _angles(table)
-    run = _run(hold.TARGET, 400)
+    run = _run(TARGET, 400)
     first = int(np.flatnonzero(table["ncon"])[0])
     assert first == 56
     assert np.abs(run[:first] - expected[:first]).max() < 1e-15

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import termios
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,14 +22,17 @@ import pytest
 from rich.cells import cell_len
 
 import statemachine as sm
-from statemachine.experiments.in_turns import Ratio
+from statemachine.errors import StateMachineError
 from statemachine.lessons import LESSONS, STATIONS, module
+from statemachine.lessons.in_turns import Ratio
 from statemachine.lessons.records import Session
-from statemachine.lessons.session import Taken, load_line, page_of_lesson, play, take
+from statemachine.lessons.session import Play, Taken, Watch, load_line, page_of_lesson, take
 from statemachine.page import Code, Page, Printed, Question, Text, Verdict
 from statemachine.report import quiz
+from statemachine.scenarios import SCENARIOS
+from statemachine.traces.recorder import record_scenario
 
-from .conftest import ROOT, Cli, need_engine
+from .conftest import ROOT, Cli, lesson_result, need_engine
 
 _TIMED = {"time", "speed", "objects", "questions"}  # print wall times
 _QUICK = {"speed": {"steps": 200}, "gravity": {"longer": 0.0}, "forward": {"seconds": 0.4}}
@@ -90,12 +93,79 @@ def test_what_is_shown_is_what_a_student_would_see(name: str, tmp_path: Path) ->
     assert done.stdout == taken.printed
 
 
-def test_an_error_in_the_code_is_its_last_line() -> None:
-    code = "import statemachine as sm\nprint(1)\nsm.load('so101', backend='mujcoo')\nprint(2)\n"
-    lines = play(code).splitlines()
-    assert lines[0] == "1"
-    assert lines[1].startswith("UnknownNameError: no backend named 'mujcoo'")
-    assert len(lines) == 2
+def test_an_error_in_the_code_ends_the_lesson() -> None:
+    code = "import statemachine as sm\nprint(1)\nsm.step(1, 2)\nprint(2)\n"
+    with Play(code, sm.load("so101")) as play, pytest.raises(TypeError):
+        play()
+    assert play.printed == "1\n"
+
+
+def test_a_lesson_sees_the_lines_of_its_code_and_each_step(backend: str) -> None:
+    model = sm.load("so101", backend=backend)
+    code = (
+        "import statemachine as sm\nmodel = sm.load('so101')\ndata = sm.make_data(model)\n"
+        "data.ctrl[1] = 0.1\nsm.step(model, data, 3)\nprint(data.time)\n"
+    )
+
+    class Seen(Watch):
+        def __init__(self) -> None:
+            self.lines: list[str] = []
+            self.times: list[float] = []
+
+        def before_step(self, model: sm.Model, data: sm.Data) -> None:
+            self.times.append(data.time)
+
+        def after_line(self, source: str, names: Mapping[str, Any]) -> None:
+            self.lines.append(source)
+
+    seen = Seen()
+    with Play(code, model) as watched, Play(code, model) as alone:
+        watched(seen)
+        alone()
+        assert seen.lines == code.splitlines()
+        assert seen.times == [0.0, 0.005, 0.01]
+        assert watched.names["model"] is model
+        ends = [play.worlds[0][1].qpos.tobytes() for play in (watched, alone)]
+        assert ends[0] == ends[1]  # three steps, or one call for three
+        data = watched.worlds[0][1]
+    with pytest.raises(StateMachineError, match="closed"):
+        sm.step(model, data)
+
+
+@pytest.mark.parametrize("name", list(LESSONS))
+def test_the_run_of_a_lesson_is_the_one_that_is_seen(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    played: list[str] = []
+    play = Play.__call__
+
+    def once(self: Play, watch: Watch | None = None) -> Mapping[str, Any]:
+        played.append(self._code)
+        return play(self, watch)
+
+    monkeypatch.setattr(Play, "__call__", once)
+    _, taken = _take(name, "mujoco")
+    assert played.count(taken.code) == 1
+
+
+@pytest.mark.parametrize(
+    ("lesson", "of", "name"),
+    [
+        ("hold", lambda found: found.qpos[-1], "hold"),
+        ("gravity", lambda found: found.servos_on.qpos, "droop"),
+        ("gravity", lambda found: found.servos_off.qpos, "gravity"),
+        ("gravity", lambda found: found.longer["no floor"].qpos, "fall"),
+    ],
+)
+def test_a_lesson_runs_what_is_compared(
+    lesson: str, of: Callable[[Any], np.ndarray], name: str, backend: str
+) -> None:
+    model = sm.load("so101/scene", backend=backend)
+    seconds = 0.5 if lesson == "gravity" else 2.0
+    options = {"longer": seconds} if lesson == "gravity" else {}
+    found = of(lesson_result(lesson, model, seconds=seconds, **options))
+    trace = record_scenario(SCENARIOS[name], model, seconds=seconds)
+    assert found.tobytes() == trace.qpos[-1].tobytes()
 
 
 def test_the_line_that_loads_a_model() -> None:

@@ -26,7 +26,6 @@ from statemachine.compare.why import Attribution, Deviation, FactorTrial, FirstT
 from statemachine.comparison.text import quantity
 from statemachine.drawing import drawing_of
 from statemachine.errors import BadInputError
-from statemachine.experiments.scenarios import SCENARIOS
 from statemachine.page import Page, Verdict
 from statemachine.report.html import SideDrawing, check_target, report, write_report
 from statemachine.report.html.between import shown_series
@@ -35,6 +34,7 @@ from statemachine.report.html.finding import headline
 from statemachine.report.html.geometry import bones_of, mesh_of, octahedral
 from statemachine.report.html.pressing import pressing, pressing_words
 from statemachine.report.html.timeline import events_of, frames_of
+from statemachine.scenarios import SCENARIOS
 from statemachine.traces import Trace, record_scenario, shipped, write
 
 from .browser import Tab, browser

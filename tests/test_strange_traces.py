@@ -18,10 +18,10 @@ import statemachine as sm
 from statemachine import compare as comparing
 from statemachine.compare import Agreement, Comparison, compare, witness
 from statemachine.errors import BadInputError, ModelFileError, TraceError
-from statemachine.experiments.scenarios import SCENARIOS
 from statemachine.interface import JointType
 from statemachine.report import compare as report
 from statemachine.report import terminal
+from statemachine.scenarios import SCENARIOS
 from statemachine.traces import Trace, model_file, read, record, write
 
 from .conftest import Cli, need_engine

@@ -22,7 +22,7 @@ from statemachine.errors import (
     TraceError,
     UnknownNameError,
 )
-from statemachine.experiments.scenarios import SCENARIOS
+from statemachine.scenarios import SCENARIOS
 from statemachine.traces import (
     COLUMNS,
     CONTACTS,

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Literal
 
 import statemachine as sm
-from statemachine.experiments.scenarios import SCENARIOS
+from statemachine.scenarios import SCENARIOS
 from statemachine.traces import Trace, record_scenario, write
 
 FOLDER = Path(__file__).resolve().parents[2] / "statemachine" / "traces" / "recorded"

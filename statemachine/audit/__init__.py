@@ -14,9 +14,10 @@ from dataclasses import dataclass
 
 from ..engines.auditing import Driver, Measured, ReferenceRun, SavePoint
 from ..errors import BadInputError, DivergedError
-from ..experiments._common import Progress, Provenance, provenance, silent
 from ..interface import Model
 from ..interface.checks import as_count
+from ..scenarios.provenance import Provenance, provenance
+from ..scenarios.runs import Progress, silent
 from . import apart, elsewhere, falls, look, repeat, restore
 from .conclusions import Conclusion, conclude
 from .drivers import drivers_of

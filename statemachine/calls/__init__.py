@@ -21,7 +21,16 @@ from ..installed import engine_version, require
 from ..interface import Model
 from .recorder import CLOSED, NEW, Call, CallRecorder
 
-__all__ = ["CLOSED", "NEW", "Call", "CallRecording", "Statement", "record", "recorded_engines"]
+__all__ = [
+    "CLOSED",
+    "NEW",
+    "Call",
+    "CallRecording",
+    "Statement",
+    "record",
+    "recorded_engines",
+    "statements",
+]
 
 
 @dataclass(frozen=True)
@@ -103,7 +112,7 @@ def record(code: str, engine: str) -> CallRecording:
     done: list[Statement] = []
     error = None
     with CallRecorder(watches) as recorder:
-        for source, line, run in _statements(code):
+        for source, line, run in statements(code):
             out = io.StringIO()
             recorder.begin()
             try:
@@ -123,8 +132,8 @@ def record(code: str, engine: str) -> CallRecording:
     return CallRecording(engine, engine_version(engine), tuple(done), error)
 
 
-def _statements(code: str) -> Iterator[tuple[str, int, Callable[[dict[str, Any]], None]]]:
-    """Source, first line, and a function that runs it, of each top-level statement."""
+def statements(code: str) -> Iterator[tuple[str, int, Callable[[dict[str, Any]], None]]]:
+    """Source, first line, and a function that runs it in a namespace, of each statement."""
     name = "<lesson>"
     lines = code.splitlines()
     linecache.cache[name] = (len(code), None, [f"{line}\n" for line in lines], name)

@@ -127,8 +127,8 @@ def _looks(request: Any, traces: tuple[Any, Any]) -> tuple[Any, Any]:
 def _look(request: Any, trace: Any) -> Any:
     from ..backends import load
     from ..drawing import drawing_of
-    from ..experiments._common import provenance
     from ..report.html import SideDrawing
+    from ..scenarios.provenance import provenance
 
     header = trace.header
     file = header.provenance.model_file

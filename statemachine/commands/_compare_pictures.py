@@ -150,7 +150,7 @@ def write(
 def _models(options: Any, *traces: Any) -> Any:
     """What the traces are drawn with; a word where it is not what they were recorded with."""
     from ..backends import load
-    from ..experiments._common import provenance
+    from ..scenarios.provenance import provenance
 
     models = []
     for trace in traces:

@@ -47,7 +47,7 @@ def explain(request: Any, quantity: str | None, progress: Any) -> Any:
     """
     from ..backends import load
     from ..compare.why import attribute
-    from ..experiments.scenarios import scenario
+    from ..scenarios import scenario
 
     asked = scenario(request.what[0])
     asked = replace(asked, options={**asked.options, **request.options})

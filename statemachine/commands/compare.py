@@ -59,7 +59,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=run)
 
 
-# As `experiments.scenarios.SCENARIOS`, which needs NumPy; a test compares them.
+# As `scenarios.SCENARIOS`, which needs NumPy; a test compares them.
 EXPERIMENTS = {
     "hold": "go to one pose; a finger meets the floor",
     "gravity": "servos off: the arm falls onto the floor",

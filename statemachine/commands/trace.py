@@ -125,8 +125,8 @@ def run_record(options: argparse.Namespace) -> int:
             f"record what? Either an experiment ({', '.join(EXPERIMENTS)}) or --controller FILE.py"
         )
     from ..backends import load
-    from ..experiments.scenarios import scenario
     from ..report.progress import progress
+    from ..scenarios import scenario
     from ..traces import record, record_scenario
     from ..traces.controllers import controller_from
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ..comparison import QUANTITIES, SAME, common_moments, largest, same_pairs
 from ..errors import TraceError
-from ..experiments._common import Provenance
 from ..interface import Array
+from ..scenarios.provenance import Provenance
 from ..traces import Trace
 from .notes import notes_on
 from .series import Series, series

@@ -10,9 +10,9 @@ from typing import Any, Literal
 from ..backends import backend_names, load
 from ..comparison.text import command
 from ..errors import BadInputError, MissingEngineError, StateMachineError, unknown_name
-from ..experiments._common import Progress, part_of, silent
-from ..experiments.scenarios import SCENARIOS, scenario
 from ..installed import DEFAULT, PAIR
+from ..scenarios import SCENARIOS, scenario
+from ..scenarios.runs import Progress, part_of, silent
 from ..traces import Trace, model_file, play, read, record_scenario, shipped
 from ..traces.files import SUFFIXES
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import StateMachineError
-from ..experiments._common import model_files
 from ..installed import WITNESS
 from ..kinematics import Kinematics
+from ..scenarios.provenance import model_files
 from ..traces import Header, Trace, model_file
 from .series import default_tip
 

@@ -18,7 +18,9 @@ from ..interface import Array, JointType, Model, forward, make_data
 from ..interface.checks import as_count
 from ..kinematics import Kind, Kinematics, Pose
 from ..rotations import angle_between, matrix_from_quat
-from ._common import Progress, Provenance, carried_by, provenance, silent
+from ..scenarios.provenance import Provenance, provenance
+from ..scenarios.robot import carried_by
+from ..scenarios.runs import Progress, silent
 
 _MOST = 1_000_000
 TOLERANCE = 1e-12  # metres, and entries of the rotation matrix

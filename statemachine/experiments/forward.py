@@ -6,9 +6,33 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import conventions
+from ..engines import part
 from ..interface import Array, Model, forward, make_data
+from ..scenarios.provenance import Provenance, provenance
+from ..scenarios.robot import scalar_joint
+from ..scenarios.runs import Progress, silent
 from . import stages
-from ._common import OwnAnswer, Progress, Provenance, own_answers, provenance, scalar_joint, silent
+
+
+@dataclass(frozen=True)
+class OwnAnswer:
+    """What an engine itself does, asked of it alone: a question, a part of it, the answer."""
+
+    question: str
+    part: str
+    answer: str
+
+
+def own_answers(model: Model, *questions: str) -> tuple[OwnAnswer, ...]:
+    """Conventions of the engine behind a Model that emulates some of the contract."""
+    if part(model.backend, "as_it_comes") is None:  # the interface is the engine's own
+        return ()
+    return tuple(
+        OwnAnswer(question, finding.of, finding.answer)
+        for question in questions
+        for finding in conventions.ask(question, model.backend) or ()
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,8 @@ from ..backends import load
 from ..errors import BadInputError
 from ..interface import Data, Model, make_data, step
 from ..interface.checks import as_count
-from ._common import Progress, Provenance, provenance, silent
+from ..scenarios.provenance import Provenance, provenance
+from ..scenarios.runs import Progress, silent
 
 _TIMES = 5  # repetitions; the median counts
 _WORLDS_MOST = 100

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..interface import Model, make_data, step
-from ._common import Progress, Provenance, provenance, silent, steps_in
+from ..scenarios.provenance import Provenance, provenance
+from ..scenarios.runs import Progress, silent, steps_in
 
 _NAP = 0.2  # seconds in which nothing is called
 

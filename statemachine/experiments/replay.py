@@ -26,7 +26,9 @@ from ..interface import (
     step,
 )
 from ..interface.checks import as_count
-from ._common import Progress, Provenance, body_pairs, command, part_of, provenance, silent
+from ..scenarios.provenance import Provenance, provenance
+from ..scenarios.robot import body_pairs, command
+from ..scenarios.runs import Progress, part_of, silent
 
 Break = Literal["extra-step", "late-ctrl"]
 BREAKS: tuple[Break, ...] = ("extra-step", "late-ctrl")

@@ -8,17 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..interface import INPUTS, Data, JointType, Model, forward, make_data, reset, step
-from ._common import (
-    Progress,
-    Provenance,
-    body_pairs,
-    carried_by,
-    moved_by_actuators,
-    provenance,
-    read_derived,
-    read_stored,
-    silent,
-)
+from ..lessons._bytes import read_derived, read_stored
+from ..scenarios.provenance import Provenance, provenance
+from ..scenarios.robot import body_pairs, carried_by, moved_by_actuators
+from ..scenarios.runs import Progress, silent
 
 _WATCHED = 600  # steps under the keyframe's own ctrl
 

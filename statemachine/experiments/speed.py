@@ -10,8 +10,9 @@ from ..backends import load
 from ..engines import part
 from ..interface import Data, Model, make_data, reset, step
 from ..interface.checks import as_count
-from ._common import Progress, Provenance, provenance, silent
-from .in_turns import Ratio, in_turns
+from ..scenarios.provenance import Provenance, provenance
+from ..scenarios.runs import Progress, silent
+from ..lessons.in_turns import Ratio, in_turns
 
 _ROUNDS = 20
 _MOST = 20_000  # steps of a round; between rounds the progress moves and Ctrl-C is heard

@@ -7,17 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..interface import INPUTS, Array, Data, Model, forward, make_data, step
-from ._common import (
-    TARGET,
-    Progress,
-    Provenance,
-    provenance,
-    read_derived,
-    read_stored,
-    scalar_joint,
-    silent,
-    steps_in,
-)
+from ..lessons._bytes import read_derived, read_stored
+from ..scenarios import TARGET
+from ..scenarios.provenance import Provenance, provenance
+from ..scenarios.robot import scalar_joint
+from ..scenarios.runs import Progress, silent, steps_in
 
 STORED = (*INPUTS, "time")
 _Looks = list[dict[str, bytes]]  # the bytes of every array, before and after each call

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ..engines import part
 from ..engines.parts import AsItComes, Term
 from ..interface import JointType, Model, make_data, reset
-from ._common import Provenance, provenance
+from ..scenarios.provenance import Provenance, provenance
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,9 @@ from ..interface import (
     set_state,
     step,
 )
-from ._common import Provenance, is_slide, provenance, read_derived, scalar_joint
+from ..lessons._bytes import read_derived
+from ..scenarios.provenance import Provenance, provenance
+from ..scenarios.robot import is_slide, scalar_joint
 
 
 @dataclass(frozen=True)

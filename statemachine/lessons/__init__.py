@@ -1,9 +1,9 @@
 """The lessons: what each is called, asks and takes. Importing this loads no engine.
 
-A lesson is a module with three functions: `code(options, load)` is what a student would
-type, `run(model, options, progress)` computes the lesson's result on one backend, and
-`page(results, session)` says what the results, by backend, mean. Terminal, documentation
-and notebook are made from the same three.
+A lesson is one module with three functions: `code(model, options, load)` is what a student
+types, `run(play, options, progress)` runs that code once, looks on, and returns what was found,
+and `page(results, session)` says what the results, by backend, mean. Terminal, documentation and
+notebook are made from the same three.
 """
 
 from __future__ import annotations

@@ -1,15 +1,21 @@
-"""What catches the falling joint: longer runs, with and without anything to touch."""
+"""A joint left alone: its way, the forces on it at the end, and what catches it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..comparison.text import apart, position
-from ..experiments import gravity
+from ..engines.parts import LeftAlone
+from ..errors import UnsupportedError
+from ..interface import Array, Data, forward
 from ..page import Table, Text, Traces, Verdict
+from ..scenarios.provenance import Provenance
+from ..scenarios.robot import carried_by, scalar_joint, touching
+from ..scenarios.runs import Progress, steps_in
 from ._words import where
 
 _BALANCE = 1e-3  # N·m or N; a sum below it is zero
@@ -17,7 +23,175 @@ _CREEP = 0.05  # of the way; a joint that goes on by more has not settled
 _FURTHER = 0.02  # rad or m; less is not worth a cause
 
 
-def longer(results: Mapping[str, gravity.Gravity]) -> list[Any]:
+@dataclass(frozen=True)
+class Forces:
+    """The generalized forces on one joint at one moment [N·m; of a slide, N].
+
+    `bias` is on the other side of the equation of motion, so that gravity acts as
+    -bias; a part that the engine does not yield is None. `total` is what is left over
+    to accelerate the joint: zero at rest.
+    """
+
+    bias: float | None
+    actuator: float | None
+    passive: float | None
+    friction: float | None
+    contact: float | None
+    limit: float | None
+    equality: float | None
+
+    @property
+    def total(self) -> float | None:
+        """Sum of all parts, -bias among them; None if one is missing."""
+        parts = (
+            self.actuator,
+            self.passive,
+            self.friction,
+            self.contact,
+            self.limit,
+            self.equality,
+        )
+        if self.bias is None or any(part is None for part in parts):
+            return None
+        return sum(part for part in parts if part is not None) - self.bias
+
+
+def forces_on(data: Data, dof: int) -> Forces:
+    """Forces on a degree of freedom, of the moment that `data`'s derived arrays show."""
+
+    def part(name: str) -> float | None:
+        try:
+            return float(getattr(data, f"qfrc_{name}")[dof])
+        except UnsupportedError:
+            return None
+
+    return Forces(
+        bias=part("bias"),
+        actuator=part("actuator"),
+        passive=part("passive"),
+        friction=part("friction"),
+        contact=part("contact"),
+        limit=part("limit"),
+        equality=part("equality"),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Droop:
+    """One run from the default pose under an untouched ctrl.
+
+    Attributes:
+        time: (n,) moments [s]; position: (n,) of the joint then [rad; of a slide, m].
+        path: (steps + 1,) its position after each step.
+        qpos: (nq,) at the end.
+        forces: On the joint at the end, after `forward`.
+        velocity, acceleration: Of the joint at the end [rad/s, rad/s²; or with m].
+        touches: When each contact of what the joint carries was first found [s]; the longer
+            runs look at their end only.
+        touching: Those that are there at the end.
+        ctrl_is_zero: Whether ctrl still is, at the end.
+    """
+
+    time: Array
+    position: Array
+    path: Array
+    qpos: Array
+    forces: Forces
+    velocity: float
+    acceleration: float
+    touches: dict[str, float]
+    touching: tuple[str, ...]
+    ctrl_is_zero: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Gravity:
+    """The same run with the actuators on and off.
+
+    Attributes:
+        joint: The joint that was watched; slide: whether it is one, and no hinge.
+        servo: Whether a position servo drives it.
+        longer: The actuators off for longer, under the names "floor" (with contacts) and
+            "no floor" (nothing can touch anything).
+        alone: The joint on the engine as it comes, where that differs from the contract.
+    """
+
+    joint: str
+    slide: bool
+    servo: bool
+    servos_on: Droop
+    servos_off: Droop
+    longer: dict[str, Droop]
+    alone: tuple[LeftAlone, ...]
+    provenance: Provenance
+
+
+class Falling:
+    """A joint of a Data that is stepped, noted after each step."""
+
+    def __init__(self, data: Data, joint: str, seconds: float, progress: Progress) -> None:
+        model = self._model = data.model
+        self._data, self._progress = data, progress
+        self._place, self._dof = scalar_joint(model, joint)
+        self._bodies = carried_by(model, [int(model.jnt_bodyid[model.joint_id(joint)])])
+        self._total = steps_in(model, seconds)
+        marks = milestones(self._total * model.timestep)
+        self._marks = {round(mark / model.timestep) for mark in marks}
+        self._times: list[float] = []
+        self._positions: list[float] = []
+        self._path: list[float] = []
+        self._touches: dict[str, float] = {}
+        self._look()
+
+    def note(self, contacts: bool) -> None:
+        """A step is over; `contacts`: whether to look at them, too."""
+        if contacts:  # those of a step are of the state that it started from
+            for touch in touching(self._model, self._data.contacts, self._bodies):
+                self._touches.setdefault(touch, self._began)
+        self._look()
+
+    def end(self) -> Droop:
+        """Look at the state after the last step."""
+        model, data = self._model, self._data
+        forward(model, data)
+        at_end = touching(model, data.contacts, self._bodies)
+        for touch in at_end:
+            self._touches.setdefault(touch, data.time)
+        return Droop(
+            time=np.array(self._times),
+            position=np.array(self._positions),
+            path=np.array(self._path),
+            qpos=data.qpos.copy(),
+            forces=forces_on(data, self._dof),
+            velocity=float(data.qvel[self._dof]),
+            acceleration=float(data.qacc[self._dof]),
+            touches=self._touches,
+            touching=at_end,
+            ctrl_is_zero=not data.ctrl.any(),
+        )
+
+    def _look(self) -> None:
+        row = len(self._path)
+        self._began = self._data.time
+        self._path.append(float(self._data.qpos[self._place]))
+        if row in self._marks:
+            self._times.append(self._data.time)
+            self._positions.append(self._path[-1])
+        if row % 1000 == 0:
+            self._progress(row / self._total)
+
+
+def milestones(seconds: float) -> list[float]:
+    """Times worth a row of a table: 0, 1, 2, 3, 4, 10, 20, 30, 50, 100 …, and the end."""
+    marks: list[float] = [0.0, 1.0, 2.0, 3.0, 4.0]
+    decade = 10.0
+    while decade <= seconds:
+        marks += [decade, 2 * decade, 3 * decade, 5 * decade]
+        decade *= 10
+    return [mark for mark in marks if mark < seconds * (1 - 1e-9)] + [seconds]
+
+
+def longer(results: Mapping[str, Gravity]) -> list[Any]:
     """What catches the falling joint: with and without a floor, and for longer."""
     columns = {
         f"{where(results, name)}{label}": run
@@ -67,12 +241,12 @@ def longer(results: Mapping[str, gravity.Gravity]) -> list[Any]:
     return blocks
 
 
-def longer_apart(results: Mapping[str, gravity.Gravity]) -> list[tuple[str, Any]]:
+def longer_apart(results: Mapping[str, Gravity]) -> list[tuple[str, Any]]:
     """Rows of the differences: the ends of the longer runs."""
     first = next(iter(results.values()))
 
     def say(label: str) -> Any:
-        def gap(one: gravity.Gravity, two: gravity.Gravity) -> str:
+        def gap(one: Gravity, two: Gravity) -> str:
             if label not in one.longer or label not in two.longer:
                 return "–"
             ends = [each.longer[label].position[-1] for each in (one, two)]
@@ -86,9 +260,7 @@ def longer_apart(results: Mapping[str, gravity.Gravity]) -> list[tuple[str, Any]
     ]
 
 
-def _caught(
-    prefix: str, result: gravity.Gravity, floor: gravity.Droop, free: gravity.Droop
-) -> Text | Verdict:
+def _caught(prefix: str, result: Gravity, floor: Droop, free: Droop) -> Text | Verdict:
     """Whether it is the contact that catches the joint, and whether it stays there."""
     slide, end = result.slide, float(floor.time[-1])
     short = float(result.servos_off.time[-1])

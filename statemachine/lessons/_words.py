@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ..comparison.text import capital, milliseconds
+from ..interface import Model
 from ..page import Code, Page, Printed, Question, Table, Text
+from ..scenarios.runs import steps_in
 from .records import Session
 
 WORDS = (
@@ -37,6 +40,22 @@ def typed(session: Session, question: Question | None = None) -> list[Code | Que
     """The code of a lesson, a prediction, and what it printed."""
     code = Code(session.code.splitlines())
     return [code, *([question] if question else []), Printed(session.printed)]
+
+
+def spans(model: Model, marks: Sequence[float], seconds: float) -> tuple[str, str]:
+    """The head of a loop that steps from mark to mark, and what it gives `step` as nstep.
+
+    Args:
+        model: Its timestep counts.
+        marks: Times at which the loop stops [s]; seconds: the last.
+        seconds: See marks.
+    """
+    total = steps_in(model, seconds)
+    ends = sorted({0, total, *(k for t in marks if 0 < (k := round(t / model.timestep)) < total)})
+    counts = [b - a for a, b in itertools.pairwise(ends)]
+    if len(set(counts)) == 1:
+        return f"for _ in range({len(counts)}):", str(counts[0])
+    return f"for n in ({', '.join(map(str, counts))}):", "n"
 
 
 def emulation(results: Mapping[str, Any], *promises: str) -> list[Text]:

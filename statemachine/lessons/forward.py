@@ -17,8 +17,10 @@ _WHEN = ("before it", "after it")
 _MOMENTS = ("xpos", "site_xpos", "contacts", "qacc")  # shown of what a step leaves behind
 
 
-def run(model: Any, options: Mapping[str, Any], progress: Any) -> forward.Forward:
+def run(play: Any, options: Mapping[str, Any], progress: Any) -> forward.Forward:
     """Four readings."""
+    model = play.model
+    play()
     return forward.run(
         model,
         joint=options["joint"],
@@ -29,7 +31,7 @@ def run(model: Any, options: Mapping[str, Any], progress: Any) -> forward.Forwar
     )
 
 
-def code(options: Mapping[str, Any], load: str) -> str:
+def code(model: Any, options: Mapping[str, Any], load: str) -> str:
     """The four readings."""
     return f"""\
 import statemachine as sm

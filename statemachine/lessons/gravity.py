@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
 from ..comparison import largest
 from ..comparison.text import apart, position, short_time, signed
-from ..experiments import gravity
+from ..engines import part
+from ..engines.parts import AsItComes
+from ..errors import UnsupportedError
+from ..interface import Data, Model, make_data, step
 from ..page import Page, Question, Table, Text, Verdict
-from ._fall import longer, longer_apart
-from ._words import differences, emulation, page_of, typed, where
+from ..scenarios import SCENARIOS
+from ..scenarios.provenance import provenance
+from ..scenarios.robot import is_slide, scalar_joint
+from ..scenarios.runs import Progress, part_of, steps_in
+from ._fall import Droop, Falling, Gravity, longer, longer_apart, milestones
+from ._words import differences, emulation, page_of, spans, typed, where
 from .records import Session
+from .session import Play, Watch
 
 _PARTS = (
     ("gravity (−bias)", "bias"),
@@ -30,36 +39,86 @@ _SLOW = 0.01  # rad/s or m/s; a joint below it is at rest or creeps
 _STARTS = 0.02  # rad/s² or m/s²; a joint beyond it is about to move
 
 
-def run(model: Any, options: Mapping[str, Any], progress: Any) -> gravity.Gravity:
-    """Servos on, servos off."""
-    return gravity.run(
-        model,
-        seconds=options["seconds"],
-        joint=options["joint"],
-        longer=options["longer"],
-        progress=progress,
-    )
-
-
-def code(options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """The same seconds with the servos on and off; ctrl is never written."""
+    scalar_joint(model, options["joint"])
+    off = ", ".join(f"{name}={value}" for name, value in SCENARIOS["gravity"].options.items())
+    loop, nstep = spans(model, milestones(options["seconds"]), options["seconds"])
     return f"""\
 import numpy as np
 import statemachine as sm
 
 model = {load}
-limp = model.replace(actuation=False)  # another Model: servos off
+limp = model.replace({off})  # another Model: servos off
 slot = model.jnt_qposadr[model.joint_id({options["joint"]!r})]
 for each in (model, limp):
     data = sm.make_data(each)
-    for _ in range(4):
-        sm.step(each, data, round(1 / each.timestep))
+    {loop}
+        sm.step(each, data, {nstep})
         print(np.degrees(data.qpos[slot]).round(3), end="  ")
     print()
 """
 
 
-def page(results: Mapping[str, gravity.Gravity], session: Session) -> Page:
+def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Gravity:
+    """Watch both runs; then the servos off for longer, with and without anything to touch."""
+    model, joint, seconds = play.model, options["joint"], options["seconds"]
+    limp = model.replace(**SCENARIOS["gravity"].options)
+    runs = {}
+    if options["longer"]:
+        steps_in(model, options["longer"])  # says what is wrong with it
+        runs["floor"] = limp
+        with suppress(UnsupportedError):
+            runs["no floor"] = model.replace(**SCENARIOS["fall"].options)
+    total = 2 * seconds + len(runs) * options["longer"]
+    both = _Both(joint, seconds, part_of(progress, 0.0, 2 * seconds / total))
+    play(both)
+    on, off = (both.falls[data].end() for _, data in play.worlds)
+    fallen = {}
+    for number, (name, each) in enumerate(runs.items()):
+        start = 2 * seconds + number * options["longer"]
+        share = part_of(progress, start / total, options["longer"] / total)
+        fallen[name] = _left_alone(each, joint, options["longer"], share)
+    which = model.joint_id(joint)
+    own: AsItComes | None = part(model.backend, "as_it_comes")
+    return Gravity(
+        joint=joint,
+        slide=is_slide(model, joint),
+        servo=bool(np.isfinite(model.actuator_kp[model.actuator_jntid == which]).any()),
+        servos_on=on,
+        servos_off=off,
+        longer=fallen,
+        alone=own.left_alone(model, seconds, which) if own else (),
+        provenance=provenance(model),
+    )
+
+
+class _Both(Watch):
+    """The joint in each Data, step by step, and what touches."""
+
+    def __init__(self, joint: str, seconds: float, progress: Progress) -> None:
+        self._joint, self._seconds, self._progress = joint, seconds, progress
+        self.falls: dict[Data, Falling] = {}
+
+    def before_step(self, model: Model, data: Data) -> None:
+        if data not in self.falls:
+            share = part_of(self._progress, len(self.falls) / 2, 1 / 2)
+            self.falls[data] = Falling(data, self._joint, self._seconds, share)
+
+    def after_step(self, model: Model, data: Data) -> None:
+        self.falls[data].note(contacts=True)
+
+
+def _left_alone(model: Model, joint: str, seconds: float, progress: Progress) -> Droop:
+    with make_data(model) as data:
+        fall = Falling(data, joint, seconds, progress)
+        for _ in range(steps_in(model, seconds)):
+            step(model, data)
+            fall.note(contacts=False)
+        return fall.end()
+
+
+def page(results: Mapping[str, Gravity], session: Session) -> Page:
     """The table of the course, and the balance of forces at its end."""
     first = next(iter(results.values()))
     columns = {
@@ -130,7 +189,7 @@ def page(results: Mapping[str, gravity.Gravity], session: Session) -> Page:
     return page_of("You never wrote ctrl", results, blocks)
 
 
-def _question(first: gravity.Gravity) -> Question | None:
+def _question(first: Gravity) -> Question | None:
     if first.slide or not first.servo:
         return None
     droop = abs(float(first.servos_on.position[-1]))
@@ -144,9 +203,7 @@ def _question(first: gravity.Gravity) -> Question | None:
     )
 
 
-def _worst(
-    one: gravity.Gravity, two: gravity.Gravity, which: str, touching: bool | None = None
-) -> str:
+def _worst(one: Gravity, two: Gravity, which: str, touching: bool | None = None) -> str:
     """The largest distance between two runs, before or after the first touch of either."""
     runs = [getattr(result, which) for result in (one, two)]
     timestep = one.provenance.timestep
@@ -164,7 +221,7 @@ def _worst(
     return found if found.startswith("below") else f"{found} at {short_time(row * timestep)}"
 
 
-def _alone(name: str, result: gravity.Gravity) -> list[Table | Text]:
+def _alone(name: str, result: Gravity) -> list[Table | Text]:
     """The engine without our adapter: what its own defaults do to the joint."""
     unit = _unit(result)
     rows = [
@@ -209,7 +266,7 @@ def _alone(name: str, result: gravity.Gravity) -> list[Table | Text]:
     return blocks
 
 
-def _introduction(first: gravity.Gravity) -> str:
+def _introduction(first: Gravity) -> str:
     runs = (first.servos_on, first.servos_off)
     text = "Nobody writes ctrl in either run"
     if all(run.ctrl_is_zero for run in runs):
@@ -222,16 +279,16 @@ def _introduction(first: gravity.Gravity) -> str:
     return f"{text}. No position servo drives {first.joint}."
 
 
-def _unit(result: gravity.Gravity) -> str:
+def _unit(result: Gravity) -> str:
     return "N" if result.slide else "N·m"
 
 
-def _part(run: gravity.Droop, part: str) -> float | None:
+def _part(run: Droop, part: str) -> float | None:
     value = getattr(run.forces, part)
     return -value if part == "bias" and value is not None else value
 
 
-def _finding(name: str, run: gravity.Droop, first: gravity.Gravity) -> Text | Verdict:
+def _finding(name: str, run: Droop, first: Gravity) -> Text | Verdict:
     """Who carries the load, if the joint is at rest and its forces balance."""
     total, load = run.forces.total, _part(run, "bias")
     if abs(run.velocity) > _SLOW or abs(run.acceleration) > _STARTS:

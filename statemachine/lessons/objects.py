@@ -14,12 +14,14 @@ from .records import Session
 _CHEAP = 5  # times; a Data that is not cheaper than that is no bargain
 
 
-def run(model: Any, options: Mapping[str, Any], progress: Any) -> objects.Objects:
+def run(play: Any, options: Mapping[str, Any], progress: Any) -> objects.Objects:
     """Costs, and several Data of one Model."""
+    model = play.model
+    play()
     return objects.run(model, worlds=options["worlds"], progress=progress)
 
 
-def code(options: Mapping[str, Any], load: str) -> str:
+def code(model: Any, options: Mapping[str, Any], load: str) -> str:
     """Two Data of one Model, of which one is stepped."""
     return f"""\
 import statemachine as sm

@@ -3,30 +3,63 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from ..comparison.text import count, degrees, duration, millimetres
-from ..experiments import questions
+from ..experiments import forward, objects, pace, replay, state
+from ..interface import Model
 from ..page import Page, Question, Text, Verdict
+from ..scenarios.provenance import Provenance, provenance
+from ..scenarios.runs import Progress, part_of
+from . import LESSONS, gravity
 from ._words import page_of, where
 from .records import Session
+from .session import Play, take
 
-_Results = Mapping[str, questions.Answers]
 # What is asked, what the run says, and whether that bears out the right choice.
 _Answered = tuple[Question, str, bool]
+# The lessons that answer, by the field of `Answers`, with little to do.
+_ASKED: dict[str, tuple[str, dict[str, Any]]] = {
+    "forward": ("forward", {"seconds": 0.1}),
+    "state": ("state", {}),
+    "replay": ("replay", {"steps": 150}),
+    "gravity": ("gravity", {"seconds": 4.0, "longer": 0.0}),
+    "objects": ("objects", {"worlds": 3}),
+    "pace": ("time", {}),
+}
 
 
-def run(model: Any, options: Mapping[str, Any], progress: Any) -> questions.Answers:
-    """All six."""
-    return questions.run(model, progress=progress)
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """What each question is answered by."""
+
+    forward: forward.Forward
+    state: state.Layout
+    replay: replay.Replay
+    gravity: gravity.Gravity
+    objects: objects.Objects
+    pace: pace.Pace
+    provenance: Provenance
 
 
-def code(options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """None: the code of the stations has been shown."""
     return ""
 
 
-def page(results: _Results, session: Session) -> Page:
+def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Answers:
+    """Take each of the lessons that answer."""
+    play()
+    model, answers = play.model, {}
+    for number, (field, (name, values)) in enumerate(_ASKED.items()):
+        share = part_of(progress, number / len(_ASKED), 1 / len(_ASKED))
+        taken = take(LESSONS[name], model, model.backend, values, progress=share)
+        answers[field] = taken.result
+    return Answers(**answers, provenance=provenance(model))
+
+
+def page(results: Mapping[str, Answers], session: Session) -> Page:
     """Question, answer, and the figures behind it."""
     blocks: list[Any] = [
         Text("Think first, then read: under each question stands what the run says about it.")
@@ -45,7 +78,7 @@ def page(results: _Results, session: Session) -> Page:
     return page_of("Check yourself", results, blocks)
 
 
-def _stale(answers: questions.Answers) -> _Answered:
+def _stale(answers: Answers) -> _Answered:
     asked = Question(
         "You write data.qpos[1] = 0.8 and read the fingertip from data.site_xpos. It has not "
         "moved. Why?",
@@ -66,7 +99,7 @@ def _stale(answers: questions.Answers) -> _Answered:
     )
 
 
-def _slots(answers: questions.Answers) -> _Answered:
+def _slots(answers: Answers) -> _Answered:
     layout = answers.state
     asked = Question(
         f"nq is {layout.nq} and nv is {layout.nv}. What must you not do?",
@@ -97,7 +130,7 @@ def _slots(answers: questions.Answers) -> _Answered:
     return asked, f"the slots differ: {names}", True
 
 
-def _truth(answers: questions.Answers) -> _Answered:
+def _truth(answers: Answers) -> _Answered:
     asked = Question(
         "A run is repeated, and ends in the same bits. What can you not conclude from that?",
         (
@@ -121,7 +154,7 @@ def _truth(answers: questions.Answers) -> _Answered:
     )
 
 
-def _held(answers: questions.Answers) -> _Answered:
+def _held(answers: Answers) -> _Answered:
     end = answers.gravity.servos_on.time[-1]
     asked = Question(
         f"A colleague makes a Data, steps it for {end:g} s without writing ctrl, sees the arm stay "
@@ -151,7 +184,7 @@ def _held(answers: questions.Answers) -> _Answered:
     return asked, text, held and abs(off.position[-1]) > abs(on.position[-1])
 
 
-def _two(answers: questions.Answers) -> _Answered:
+def _two(answers: Answers) -> _Answered:
     asked = Question(
         "Why two objects, a Model and a Data, and not one?",
         (
@@ -171,7 +204,7 @@ def _two(answers: questions.Answers) -> _Answered:
     )
 
 
-def _fast(answers: questions.Answers) -> _Answered:
+def _fast(answers: Answers) -> _Answered:
     asked = Question(
         "Your loop brings data.time to 100 s in 5 s by the clock. Is the simulation too fast?",
         (

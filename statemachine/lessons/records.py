@@ -46,16 +46,23 @@ class Session:
 
 
 class Module(Protocol):
-    """What a lesson's module offers."""
+    """What a lesson's module offers, in the order in which one reads it."""
 
-    def run(self, model: Any, options: Mapping[str, Any], progress: Any) -> Any:
-        """Compute the lesson's result on one backend."""
+    def code(self, model: Any, options: Mapping[str, Any], load: str) -> str:
+        """What is typed: the code for this Model; `load` is the call that loads it.
+
+        Raises:
+            StateMachineError: The Model has not what the lesson is about, or an option is wrong.
+        """
         ...
 
-    def code(self, options: Mapping[str, Any], load: str) -> str:
-        """The code as a student would type it; `load` is the call that loads the model."""
+    def run(self, play: Any, options: Mapping[str, Any], progress: Any) -> Any:
+        """What is run: `play` (a `session.Play`) is called once, and is the code's own run.
+
+        What else the lesson compares that run with is run here, too.
+        """
         ...
 
     def page(self, results: Mapping[str, Any], session: Session) -> Page:
-        """Say what the results, by backend, mean; `session` is the code and what it printed."""
+        """What is said: the results by backend; `session` is the code and what it printed."""
         ...

@@ -16,8 +16,10 @@ from ._words import differences, page_of, sentence, typed, where
 from .records import Session
 
 
-def run(model: Any, options: Mapping[str, Any], progress: Any) -> replay.Replay:
+def run(play: Any, options: Mapping[str, Any], progress: Any) -> replay.Replay:
     """Two runs."""
+    model = play.model
+    play()
     return replay.run(
         model,
         steps=options["steps"],
@@ -27,7 +29,7 @@ def run(model: Any, options: Mapping[str, Any], progress: Any) -> replay.Replay:
     )
 
 
-def code(options: Mapping[str, Any], load: str) -> str:
+def code(model: Any, options: Mapping[str, Any], load: str) -> str:
     """Two runs from the keyframe, compared."""
     write, said = "data.ctrl[:2] += np.array((0.4, -0.2))[: model.nu]", "  # pan and lift"
     if options["ctrl"]:

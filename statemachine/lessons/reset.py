@@ -12,12 +12,14 @@ from ._words import differences, emulation, page_of, sentence, typed, where
 from .records import Session
 
 
-def run(model: Any, options: Mapping[str, Any], progress: Any) -> reset.Reset:
+def run(play: Any, options: Mapping[str, Any], progress: Any) -> reset.Reset:
     """A reset, and each keyframe."""
+    model = play.model
+    play()
     return reset.run(model, progress=progress)
 
 
-def code(options: Mapping[str, Any], load: str) -> str:
+def code(model: Any, options: Mapping[str, Any], load: str) -> str:
     """Step, reset, and reset to a keyframe."""
     return f"""\
 import statemachine as sm

@@ -1,22 +1,128 @@
-"""The code of a lesson, run as a student would run it, and what it prints."""
+"""A lesson taken: its code runs once, as a student would run it, and the lesson looks on."""
 
 from __future__ import annotations
 
-import contextlib
+import builtins
 import io
-import linecache
 from collections.abc import Callable, Mapping
+from contextlib import redirect_stdout
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
 
+import statemachine
+
 from ..backends import backend_engine
-from ..calls import CallRecording, record, recorded_engines
-from ..interface import Model
+from ..calls import CallRecording, record, recorded_engines, statements
+from ..interface import Data, Model, make_data, step
 from ..page import Page
 from . import module
 from .records import Lesson, Session
 
-_NAME = "<lesson>"
+
+class Watch:
+    """What looks on while the code of a lesson runs; a lesson overrides what it needs."""
+
+    def before_step(self, model: Model, data: Data) -> None:
+        """A timestep is about to begin; one of several if the code asks for several."""
+
+    def after_step(self, model: Model, data: Data) -> None:
+        """A timestep is over."""
+
+    def after_line(self, source: str, names: Mapping[str, Any]) -> None:
+        """A statement of the code is over; `names` are the variables of the code."""
+
+
+class Play:
+    """The code of a lesson on one Model, to be run once.
+
+        with Play(code, model) as play:
+            play(watch)
+            play.worlds[0]  # the first Data that the code made; open until the end of the block
+
+    Attributes:
+        model: The Model that its `sm.load` returns.
+        worlds: Each Data that it made, in their order, with its Model.
+        names: Its variables.
+        printed: What it printed.
+    """
+
+    def __init__(self, code: str, model: Model) -> None:
+        self.model = model
+        self.worlds: list[tuple[Model, Data]] = []
+        self.names: dict[str, Any] = {}
+        self._code = code
+        self._out = io.StringIO()
+
+    def __enter__(self) -> Play:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        for _, data in self.worlds:
+            data.close()
+
+    @property
+    def printed(self) -> str:
+        """What the code printed."""
+        return self._out.getvalue()
+
+    def __call__(self, watch: Watch | None = None) -> Mapping[str, Any]:
+        """Run the code; its variables.
+
+        Args:
+            watch: Looks on. If it looks at steps, `sm.step(model, data, n)` is taken as n steps,
+                which end in the same bits.
+
+        Raises:
+            Exception: Whatever the code raised.
+        """
+        watch = watch or Watch()
+        facade = self._facade(watch)
+
+        def imported(name: str, *args: Any, **kwargs: Any) -> Any:
+            return facade if name == statemachine.__name__ else __import__(name, *args, **kwargs)
+
+        self.names |= {
+            "__name__": "__main__",
+            "__builtins__": {**vars(builtins), "__import__": imported},
+        }
+        with redirect_stdout(self._out):
+            for source, _, run in statements(self._code):
+                run(self.names)
+                watch.after_line(source, self.names)
+        return self.names
+
+    def _facade(self, watch: Watch) -> ModuleType:
+        """The package as the code imports it: its Model is given, its steps are looked at."""
+
+        def make(model: Model) -> Data:
+            data = make_data(model)
+            self.worlds.append((model, data))
+            return data
+
+        def watched(model: Model, data: Data, nstep: int = 1) -> None:
+            for _ in range(nstep):
+                watch.before_step(model, data)
+                step(model, data)
+                watch.after_step(model, data)
+
+        facade = _Facade(statemachine.__name__)
+        facade.load = lambda *_args, **_options: self.model
+        facade.make_data = make
+        looks = type(watch).before_step, type(watch).after_step
+        facade.step = step if looks == (Watch.before_step, Watch.after_step) else watched
+        return facade
+
+
+class _Facade(ModuleType):
+    """The package, some of its names replaced."""
+
+    load: Any
+    make_data: Any
+    step: Any
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(statemachine, name)
 
 
 @dataclass(frozen=True)
@@ -24,7 +130,7 @@ class Taken:
     """A lesson on one backend.
 
     Attributes:
-        result: What its module computed.
+        result: What its module found.
         code: As it was typed; printed: what it printed.
         calls: What the engine was made to do by it, if that was to be recorded and can be.
     """
@@ -45,7 +151,7 @@ def take(
     progress: Callable[[float], None] = lambda _fraction: None,
     calls: bool = False,
 ) -> Taken:
-    """Run a lesson and its code.
+    """Run the code of a lesson, and what else the lesson looks at.
 
     Args:
         lesson: An entry of the table of lessons.
@@ -55,17 +161,18 @@ def take(
         name: What `load` was given as the model, if not the lesson's.
         menagerie: What it was given as that.
         progress: Told the fraction that is done.
-        calls: Whether to record what the code makes the engine do, if its room can tell.
+        calls: Whether to run the code once more, recording what it makes the engine do, if the
+            engine's room can tell.
     """
     values = {option.key: option.default for option in lesson.options} | dict(options or {})
     station = module(lesson.name)
-    result = station.run(model, values, progress)
-    code = station.code(values, load_line(name or lesson.model, backend, menagerie))
+    code = station.code(model, values, load_line(name or lesson.model, backend, menagerie))
+    with Play(code, model) as play:
+        result = station.run(play, values, progress)
     engine = backend_engine(backend) or backend
     if not calls or engine not in recorded_engines():
-        return Taken(result, code, play(code))
-    recording = record(code, engine)
-    return Taken(result, code, recording.printed, recording)
+        return Taken(result, code, play.printed)
+    return Taken(result, code, play.printed, record(code, engine))
 
 
 def page_of_lesson(lesson: Lesson, taken: Mapping[str, Taken]) -> Page:
@@ -83,21 +190,6 @@ def load_line(model: str, backend: str, menagerie: str | None = None) -> str:
     """The call that loads a model, as one types it."""
     folder = f", menagerie={menagerie!r}" if menagerie else ""
     return f"sm.load({_quoted(model)}, backend={_quoted(backend)}{folder})"
-
-
-def play(code: str) -> str:
-    """Run code in a namespace of its own and return what it printed.
-
-    An error ends it, and is its last line, as Python shows it.
-    """
-    out = io.StringIO()
-    linecache.cache[_NAME] = (len(code), None, code.splitlines(keepends=True), _NAME)
-    with contextlib.redirect_stdout(out):
-        try:
-            exec(compile(code, _NAME, "exec"), {"__name__": "__main__"})
-        except Exception as error:  # the code of a lesson on whatever model there is
-            print(f"{type(error).__name__}: {error}")
-    return out.getvalue()
 
 
 def _quoted(text: str) -> str:

@@ -7,18 +7,20 @@ from typing import Any
 
 from ..comparison.text import capital, count, duration
 from ..experiments import speed
-from ..experiments.in_turns import FEWEST, Ratio
+from ..lessons.in_turns import FEWEST, Ratio
 from ..page import Page, Question, Table, Text
 from ._words import differences, page_of, sentence, typed
 from .records import Session
 
 
-def run(model: Any, options: Mapping[str, Any], progress: Any) -> speed.Speed:
+def run(play: Any, options: Mapping[str, Any], progress: Any) -> speed.Speed:
     """In bulk and step by step, in turns."""
+    model = play.model
+    play()
     return speed.run(model, steps=options["steps"], progress=progress)
 
 
-def code(options: Mapping[str, Any], load: str) -> str:
+def code(model: Any, options: Mapping[str, Any], load: str) -> str:
     """The same steps by the clock, both ways, once."""
     steps = options["steps"]
     return f"""\

@@ -11,12 +11,14 @@ from ._words import differences, page_of, typed
 from .records import Session
 
 
-def run(model: Any, options: Mapping[str, Any], progress: Any) -> state.Layout:
+def run(play: Any, options: Mapping[str, Any], progress: Any) -> state.Layout:
     """Read the layout."""
+    model = play.model
+    play()
     return state.run(model)
 
 
-def code(options: Mapping[str, Any], load: str) -> str:
+def code(model: Any, options: Mapping[str, Any], load: str) -> str:
     """Sizes, and the slots of each joint."""
     return f"""\
 import statemachine as sm

@@ -16,8 +16,10 @@ _BEFORE = "A simulation, a pause of the program, and the time on the simulator's
 _BRIEF, _WATCHED = 0.5, 4.0  # simulated seconds, without and with --realtime
 
 
-def run(model: Any, options: Mapping[str, Any], progress: Any) -> pace.Pace:
+def run(play: Any, options: Mapping[str, Any], progress: Any) -> pace.Pace:
     """Without waiting, and paced."""
+    model = play.model
+    play()
     return pace.run(model, seconds=_seconds(options), progress=progress)
 
 
@@ -29,7 +31,7 @@ def _seconds(options: Mapping[str, Any]) -> float:
     return options["seconds"]
 
 
-def code(options: Mapping[str, Any], load: str) -> str:
+def code(model: Any, options: Mapping[str, Any], load: str) -> str:
     """A loop that does not wait; with --realtime one that does."""
     if not options["realtime"]:
         return f"""\

@@ -12,12 +12,14 @@ from ._words import emulation, page_of, sentence, typed, where
 from .records import Session
 
 
-def run(model: Any, options: Mapping[str, Any], progress: Any) -> write.Write:
+def run(play: Any, options: Mapping[str, Any], progress: Any) -> write.Write:
     """One write, and who notices."""
+    model = play.model
+    play()
     return write.run(model, joint=options["joint"], value=options["value"])
 
 
-def code(options: Mapping[str, Any], load: str) -> str:
+def code(model: Any, options: Mapping[str, Any], load: str) -> str:
     """A name for the array, a copy of it, and a write."""
     return f"""\
 import statemachine as sm

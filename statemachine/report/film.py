@@ -10,10 +10,10 @@ from typing import Any
 from ..compare import Comparison, Series, series
 from ..comparison.text import reading
 from ..errors import BadInputError, MissingEngineError
-from ..experiments._common import Progress, silent
 from ..interface import Model
 from ..rendering import Renderer, Timing, frames, renderer_here, timing_of
 from ..rendering.pictures import check_size
+from ..scenarios.runs import Progress, silent
 from ..traces import Trace
 from .film_files import SUFFIXES, write_mp4, write_webp
 from .film_overlay import Overlay, Strip

@@ -93,7 +93,8 @@ def build() -> str:
         title = f"## {number}. {page.title}\n\n" if lesson.station else f"## {page.title}\n\n"
         cells.append(_cell(f"{lesson.name}-text", "markdown", title + _opening(page)))
         values = {option.key: option.default for option in lesson.options}
-        code = module(lesson.name).code(values, f'sm.load("{lesson.model}", backend=BACKEND)')
+        line = f'sm.load("{lesson.model}", backend=BACKEND)'
+        code = module(lesson.name).code(load(lesson.model), values, line)
         if code:
             cells.append(_cell(f"{lesson.name}-code", "code", code))
         cells.append(_cell(f"{lesson.name}-run", "code", f'station("{lesson.name}", BACKEND)'))

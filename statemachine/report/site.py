@@ -12,11 +12,11 @@ from ..compare.why import attribute
 from ..comparison.text import reading
 from ..conventions import phrasebook, probe
 from ..errors import MissingEngineError
-from ..experiments.scenarios import scenario
 from ..installed import available
 from ..lessons import LESSONS
 from ..lessons.session import page_of_lesson, take
 from ..page import Page, Picture, Traces, Verdict
+from ..scenarios import scenario
 from ..traces.whole import replace_file
 from . import compare as comparison
 from . import conventions, why

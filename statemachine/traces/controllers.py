@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError, StateMachineError
-from ..experiments.scenarios import Controller
 from ..interface import Data
+from ..scenarios import Controller
 
 
 def controller_from(spec: str) -> Controller:

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import TraceError
-from ..experiments._common import Provenance
 from ..interface import OPTIONS, JointType
 from ..interface.checks import HUGE
+from ..scenarios.provenance import Provenance
 
 SCHEMA = 1
 # Columns of numbers, one row for each moment; widths are numbers or counts of the header.

@@ -8,8 +8,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..errors import ModelFileError, StateMachineError
-from ..experiments._common import model_digest
 from ..models import resolve
+from ..scenarios.provenance import model_digest
 from .header import Header
 
 

@@ -13,9 +13,10 @@ from typing import Any, Literal
 import numpy as np
 
 from ..errors import BadInputError, DivergedError, EngineError, TraceError
-from ..experiments._common import Progress, part_of, provenance, silent, steps_in
-from ..experiments.scenarios import Controller, Scenario
 from ..interface import Array, Data, Model, State, make_data, reset, set_state, step
+from ..scenarios import Controller, Scenario
+from ..scenarios.provenance import provenance
+from ..scenarios.runs import Progress, part_of, silent, steps_in
 from .derived import derived
 from .energy import energies
 from .header import Header

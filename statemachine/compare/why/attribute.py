@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ...errors import BadInputError, unknown_name
-from ...experiments._common import Progress, silent
-from ...experiments.scenarios import Scenario
 from ...interface import Model
+from ...scenarios import Scenario
+from ...scenarios.runs import Progress, silent
 from .factors import FACTORS, OFF_ORDER, PARITY_ORDER, Factor
 from .gap import Deviation
 from .results import Attribution, FactorTrial, Way

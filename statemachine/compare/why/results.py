@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from ...experiments._common import Provenance
+from ...scenarios.provenance import Provenance
 from .gap import Deviation
 
 Way = Literal["parity", "off", "one side", "alike", "none"]

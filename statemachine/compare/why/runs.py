@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from ...errors import DivergedError, EngineError, UnsupportedError
-from ...experiments._common import Progress, moved_by_actuators, provenance, touching
-from ...experiments.scenarios import Scenario
 from ...interface import Data, Model
+from ...scenarios import Scenario
+from ...scenarios.provenance import provenance
+from ...scenarios.robot import moved_by_actuators, touching
+from ...scenarios.runs import Progress
 from ...traces import Trace, record
 from .factors import FACTORS
 from .gap import Curves, Deviation, Ruler

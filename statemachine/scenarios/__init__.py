@@ -13,9 +13,9 @@ import numpy as np
 
 from ..errors import BadInputError, unknown_name
 from ..interface import Array, Data, Model
-from ._common import TARGET
 
 Controller = Callable[[float, Data], Any]  # (time, data) -> ctrl, or None to leave it
+TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)  # a command to the arm [rad]
 # Swings the arm with the box in its jaws by 23 degrees.
 MOVING = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)
 

@@ -1,0 +1,76 @@
+"""What a result was computed with, so that it can be computed again."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from .. import __version__
+from ..interface import Model
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What a result was computed with, so that it can be computed again.
+
+    `model_sha256` is the digest of the model's file and of those it includes; `emulated` are
+    the promises of the contract that the backend keeps instead of its engine.
+    """
+
+    backend: str
+    versions: dict[str, str]
+    model_file: str
+    model_sha256: str
+    timestep: float
+    emulated: tuple[str, ...]
+    seed: int | None = None
+
+
+def provenance(model: Model, seed: int | None = None, **others: str) -> Provenance:
+    """The record of a run on `model`; `others` are further versions by name."""
+    versions = {
+        "statemachine": __version__,
+        model.backend: model.engine_version,
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+        **others,
+    }
+    # The folder and name, not the machine's path: a result is read elsewhere.
+    name = "/".join(model.path.parts[-2:]).encode(errors="replace").decode()
+    digest = model_digest(model.path)
+    emulated = tuple(
+        name
+        for name, behaviour in model.capabilities.behaviours.items()
+        if behaviour.support == "emulated"
+    )
+    return Provenance(model.backend, versions, name, digest, model.timestep, emulated, seed)
+
+
+def model_digest(path: Path) -> str:
+    """SHA-256 of a model's file and of those it includes."""
+    return hashlib.sha256(b"".join(file.read_bytes() for file in model_files(path))).hexdigest()
+
+
+def model_files(path: Path) -> Iterator[Path]:
+    """A model's file, then those it includes, theirs and so on, each once.
+
+    MuJoCo looks an included file up beside the one that was loaded.
+    """
+    waiting, seen = [path], set()
+    while waiting:
+        file = waiting.pop(0)
+        if file in seen or not file.is_file():
+            continue
+        seen.add(file)
+        yield file
+        try:
+            includes = ElementTree.parse(file).iter("include")
+        except ElementTree.ParseError:  # a binary model
+            continue
+        waiting += [path.parent / name for i in includes if (name := i.get("file"))]

@@ -1,0 +1,65 @@
+"""The parts of a robot, by what drives and carries them: joints, bodies, contacts."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+
+import numpy as np
+
+from ..comparison import ContactNames
+from ..errors import BadInputError
+from ..interface import Array, Contacts, JointType, Model
+
+
+def is_slide(model: Model, joint: str) -> bool:
+    """Whether a joint is a slide: its position is in metres."""
+    return int(model.jnt_type[model.joint_id(joint)]) == int(JointType.SLIDE)
+
+
+def scalar_joint(model: Model, name: str) -> tuple[int, int]:
+    """Addresses in qpos and qvel of a joint that must be a hinge or a slide."""
+    joint = model.joint_id(name)
+    if model.jnt_type[joint] not in (JointType.HINGE, JointType.SLIDE):
+        raise BadInputError(f"joint {name!r} is neither a hinge nor a slide")
+    return int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+
+
+def command(model: Model, values: Iterable[float], name: str = "ctrl") -> Array:
+    """A full ctrl (nu,) from values; the error says how many there should be."""
+    array = np.array(list(values), dtype=np.float64)
+    if array.shape != (model.nu,):
+        raise BadInputError(
+            f"{name} wants {model.nu} numbers, one for each actuator; got {array.size}"
+        )
+    return array
+
+
+def carried_by(model: Model, bodies: Iterable[int]) -> frozenset[int]:
+    """These bodies and all that hang on them."""
+    carried = set(bodies)
+    for body in range(1, model.nbody):  # parents come before children
+        if int(model.body_parentid[body]) in carried:
+            carried.add(body)
+    return frozenset(carried)
+
+
+def moved_by_actuators(model: Model) -> frozenset[int]:
+    """The robot's moving part: what the actuated joints carry."""
+    joints = [joint for joint in model.actuator_jntid.tolist() if joint >= 0]
+    return carried_by(model, (int(model.jnt_bodyid[joint]) for joint in joints))
+
+
+def touching(model: Model, contacts: Contacts, bodies: frozenset[int]) -> tuple[str, ...]:
+    """What of `bodies` touches what else, as "gripper on floor (fixed_tip)", each once."""
+    pairs = contacts.geom.tolist()
+    inside = [[int(model.geom_bodyid[geom]) in bodies for geom in pair] for pair in pairs]
+    found = [pair for pair, (one, two) in zip(pairs, inside, strict=True) if one != two]
+    names = ContactNames.of(model) if found else None
+    return tuple(dict.fromkeys(names.geoms(*pair) for pair in found)) if names else ()
+
+
+def body_pairs(model: Model, contacts: Contacts) -> Counter[str]:
+    """How many contacts each pair of bodies has, as {"gripper on box": 6}."""
+    names = ContactNames.of(model)
+    return Counter(names.pair(*geoms) for geoms in contacts.geom.tolist())

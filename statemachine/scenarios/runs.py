@@ -1,0 +1,38 @@
+"""How long a run is, and who is told how far it got."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..errors import BadInputError
+from ..interface import Model
+
+Progress = Callable[[float], None]  # told the fraction that is done
+
+
+def silent(_fraction: float) -> None:
+    """The Progress that shows nothing."""
+
+
+def part_of(progress: Progress, start: float, share: float) -> Progress:
+    """The Progress of a run that is a share of the whole."""
+    return lambda fraction: progress(start + share * fraction)
+
+
+# A run that would take hours is a slip of the keyboard.
+_STEPS_MOST = 10_000_000
+
+
+def steps_in(model: Model, seconds: float) -> int:
+    """Number of timesteps in a time, at least one."""
+    if not np.isfinite(seconds) or seconds <= 0:
+        raise BadInputError(f"seconds must be above 0; got {seconds}")
+    steps = max(1.0, seconds / model.timestep)
+    if steps * model.substeps > _STEPS_MOST:
+        raise BadInputError(
+            f"{seconds:g} s are {steps * model.substeps:.3g} steps of the engine, and a run has "
+            f"at most {_STEPS_MOST:,}"
+        )
+    return round(steps)
