@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import fcntl
+import io
 import os
 import pty
 import re
@@ -28,6 +30,7 @@ from statemachine.lessons.in_turns import Ratio
 from statemachine.lessons.records import Session
 from statemachine.lessons.session import Play, Taken, Watch, load_line, page_of_lesson, take
 from statemachine.page import Code, Page, Printed, Question, Text, Verdict
+from statemachine.report import progress as bar
 from statemachine.report import quiz
 from statemachine.scenarios import SCENARIOS
 from statemachine.traces.recorder import record_scenario
@@ -549,6 +552,24 @@ def test_a_long_question_is_wrapped() -> None:
     asked = seen[seen.index("Before you read on") : seen.index("Your prediction")]
     assert max(map(len, asked.splitlines())) <= 50
     assert len(asked.splitlines()) > 4
+
+
+def test_a_bar_of_progress_takes_nothing_of_what_is_printed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    monkeypatch.setattr(bar, "_PATIENCE", -1.0)
+    printed = io.StringIO()
+    with bar.progress("x") as report:
+        with contextlib.redirect_stdout(printed):
+            report(0.5)
+            print("hello")
+        report(1.0)
+    assert printed.getvalue() == "hello\n"
 
 
 def test_answers_that_are_none(monkeypatch: pytest.MonkeyPatch) -> None:
