@@ -10,7 +10,7 @@ import pytest
 
 from statemachine.errors import BadInputError
 from statemachine.page import Question
-from statemachine.report.predictions import Predictions
+from statemachine.report.predictions import RecordedReader
 
 from .conftest import Cli
 from .test_lessons import _at_a_terminal
@@ -19,20 +19,21 @@ ONE = Question("how many?", ("1", "2"), 1, "counted")
 NONE = Question("which?", ("x", "y"), None, "neither")
 
 
-def test_the_first_answer_counts_and_a_session_is_gone_on_with(tmp_path: Path) -> None:
+def test_the_first_answer_counts_and_a_session_is_gone_on_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     file = tmp_path / "mine.json"
-    typed = iter([None, 0, 1, 1])
-    predictions = Predictions(file, lambda _: next(typed))
-    predictions.lesson = "state"
+    typed = iter(["", "a", "b", "b"])
+    monkeypatch.setattr("builtins.input", lambda _: next(typed))
+    reader = RecordedReader(file, "state")
     assert json.loads(file.read_text())["of"] == 0
-    assert predictions(ONE) is None  # passed: no answer
+    assert reader.ask(ONE) is None  # passed: no answer
     assert json.loads(file.read_text())["of"] == 0
-    assert predictions(ONE) == 0
-    again = Predictions(file, lambda _: next(typed))
-    again.lesson = "state"
-    assert again(ONE) == 1  # now right, but the first counts
+    assert reader.ask(ONE) == 0
+    again = RecordedReader(file, "state")
+    assert again.ask(ONE) == 1  # now right, but the first counts
     again.lesson = "reset"
-    assert again(NONE) == 1
+    assert again.ask(NONE) == 1
     record = json.loads(file.read_text())
     assert (record["score"], record["of"]) == (0, 2)
     assert record["answers"] == [
@@ -50,7 +51,7 @@ def test_another_file_is_not_overwritten(tmp_path: Path, text: str) -> None:
     file = tmp_path / "mine.json"
     file.write_text(text)
     with pytest.raises(BadInputError, match="no record of predictions"):
-        Predictions(file, lambda _: None)
+        RecordedReader(file)
     assert file.read_text() == text
 
 

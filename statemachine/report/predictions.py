@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,34 +11,35 @@ from .. import __version__
 from ..errors import BadInputError
 from ..page import Question
 from ..traces.whole import replace_file
+from .quiz import Reader
 
 _KIND = "statemachine predictions"
 
 
-class Predictions:
-    """Answers to the questions of lessons, written to a file after each.
+class RecordedReader(Reader):
+    """A reader whose answers are written to a file, after each.
 
     The first answer to a question counts. A file of an earlier session is gone on with.
     """
 
-    def __init__(self, file: Path, ask: Callable[[Question], int | None]) -> None:
+    def __init__(self, file: Path, lesson: str = "") -> None:
         """Open a file, or begin one.
 
         Args:
             file: Where the answers are kept, as JSON.
-            ask: Puts a question to the reader; the number of the choice, or None.
+            lesson: Whose questions are asked first.
 
         Raises:
             BadInputError: The file is there and is no record of predictions.
         """
-        self._file, self._ask = file, ask
+        super().__init__(lesson)
+        self._file = file
         self._answers = _read(file) if file.exists() else {}
-        self.lesson = ""  # whose questions are asked now
         self._write()
 
-    def __call__(self, question: Question) -> int | None:
+    def ask(self, question: Question) -> int | None:
         """Ask, and keep the answer."""
-        choice = self._ask(question)
+        choice = super().ask(question)
         if choice is not None:
             key = f"{self.lesson}: {question.text}"
             right = question.right
