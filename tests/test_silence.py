@@ -178,8 +178,8 @@ assert status == 0, status
 
 def _python(code: str) -> subprocess.CompletedProcess[str]:
     started = time.monotonic()
-    child = subprocess.Popen(
-        [sys.executable, "-c", code],
+    child = subprocess.Popen(  # from 3.12 on Python itself warns of a fork beside threads
+        [sys.executable, "-W", "ignore::DeprecationWarning", "-c", code],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

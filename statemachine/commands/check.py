@@ -1,22 +1,32 @@
-"""`statemachine check`: a student's exercise, or a student's tests, judged by what they do."""
+"""`statemachine check`: exercises, or a student's tests, judged by what they do."""
 
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from . import _mutants
-from ._common import add_backend, add_json, show
+from ._common import SAYS_NO, add_backend, add_json, show
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Its options."""
     parser.description = (
         "Call each function of a student's file on several models, in a process of "
-        "its own with limits, and say what is wrong with what it does. Or, with --mutants: put "
-        "faults into the arm, and say which of them a student's tests catch."
+        "its own with limits, and say what is wrong with what it does. Several files, or the "
+        "folder of a class: a table. Or, with --mutants: put faults into the arm, and say which "
+        "of them a student's tests catch."
+    )
+    parser.epilog = (
+        "Exit code 1: a function does not do what it should; of a class: a file could not be "
+        "judged."
     )
     parser.add_argument(
-        "file", nargs="?", metavar="FILE", help="the student's file, like step_loop.py"
+        "files",
+        nargs="*",
+        metavar="FILE|FOLDER",
+        help="the student's file, like step_loop.py; or those of a class, each in the folder or in "
+        "a folder of its own there",
     )
     add_backend(parser, everyone=False)
     parser.add_argument(
@@ -27,6 +37,26 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="seconds that each function of FILE may compute (default 5); time in which the "
         "machine is busy with others does not count, up to 120 s on the clock, or four times S",
     )
+    parser.add_argument(
+        "--csv",
+        default=None,
+        metavar="TABLE",
+        help="of a class: write the table there after each file; typed again, it judges only "
+        "files that are new or changed",
+    )
+    parser.add_argument(
+        "--jobs",
+        type=int,
+        default=None,
+        metavar="N",
+        help="of a class: how many files are judged at once (default: one for two processors)",
+    )
+    parser.add_argument(
+        "--gradescope",
+        default=None,
+        metavar="RESULTS",
+        help="of one file: write the judgement as Gradescope's results.json, too",
+    )
     _mutants.add(parser)
     add_json(parser, "judgement")
     parser.set_defaults(run=run, parser=parser)
@@ -34,16 +64,63 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Judge, and show."""
-    if (options.file is None) == (options.mutants is None):
+    if (not options.files) == (options.mutants is None):
         options.parser.error("expected one of FILE and --mutants TESTFILE")
+    several = len(options.files) > 1 or any(Path(file).is_dir() for file in options.files)
+    if (options.mutants is not None or several) and options.gradescope:
+        options.parser.error("--gradescope goes with one FILE")
+    if not several and (options.csv or options.jobs is not None):
+        options.parser.error("--csv and --jobs go with several files, or a folder")
     if options.mutants is not None:
         return _mutants.run(options)
     if options.only:
         options.parser.error("--only goes with --mutants")
+    return _class(options) if several else _one(options)
+
+
+def _one(options: argparse.Namespace) -> int:
+    """One student's file."""
+    from ..errors import BadInputError
     from ..grading import exercise
     from ..report import grade as words
     from ..report.progress import progress
 
-    with progress("check") as report:
-        grade = exercise.run(options.file, options.backend, options.time_limit, report)
+    (file,) = options.files
+    try:
+        with progress("check") as report:
+            grade = exercise.run(file, options.backend, options.time_limit, report)
+    except BadInputError as error:
+        if options.gradescope:  # the student sees why
+            _gradescope(options.gradescope, None, str(error))
+        raise
+    if options.gradescope:
+        _gradescope(options.gradescope, grade, "")
     return show(words.page(grade), grade, options.json)
+
+
+def _gradescope(target: str, grade: object, refusal: str) -> None:
+    from ..report import gradescope
+    from ..traces.whole import replace_file
+
+    text = gradescope.results(grade, refusal).encode("utf-8", errors="replace")  # pyright: ignore
+    replace_file(Path(target), lambda out: out.write(text))
+
+
+def _class(options: argparse.Namespace) -> int:
+    """The files of a class."""
+    from ..grading import classroom
+    from ..report import classroom as words
+    from ..report.progress import progress
+
+    found = classroom.submissions(options.files)
+    with progress(f"{len(found)} files") as report:
+        entries = classroom.judge_all(
+            found,
+            options.backend,
+            time_limit=options.time_limit,
+            jobs=options.jobs,
+            table=Path(options.csv) if options.csv else None,
+            progress=report,
+        )
+    show(words.page(entries), entries, options.json)
+    return 0 if all(entry.judged for entry in entries) else SAYS_NO

@@ -36,6 +36,12 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="STATION",
         help="of the whole parser: where to begin, if not at the first",
     )
+    parser.add_argument(
+        "--stopped",
+        type=int,
+        metavar="CODE",
+        help="of the whole path: exit code if its reader types q (default: as if it ended there)",
+    )
     parser.set_defaults(run=run_path)
     named = parser.add_subparsers(metavar="name")
     for lesson in LESSONS.values():
@@ -142,7 +148,7 @@ def run(options: argparse.Namespace) -> int:
     from ..report.quiz import Stopped
 
     try:
-        return show(page, results, options.json, f"Next: {following}", _asking(options))
+        return show(page, results, options.json, f"Next: {following}", _reader(options))
     except Stopped:
         return 0
 
@@ -153,15 +159,15 @@ _AFTER = f"Check yourself: {PROGRAM} lesson questions. Then: python exercises/st
 def run_path(options: argparse.Namespace) -> int:
     """All stations, one after the other."""
     from ..report import terminal
-    from ..report.quiz import Stopped, go_on
+    from ..report.quiz import Stopped
 
-    ask, code, everything = _asking(options), 0, {}
+    reader, code, everything = _reader(options), 0, {}
     names = [lesson.name for lesson in STATIONS]
     first = names.index(options.start) if options.start else 0
     for number, lesson in enumerate(STATIONS[first:], start=first + 1):
         try:
-            if ask and number > first + 1:
-                go_on(f"station {number}: {lesson.question}")
+            if reader and number > first + 1:
+                reader.go_on(f"station {number}: {lesson.question}")
             values = {option.key: option.default for option in lesson.options}
             page, results = _compute(options, lesson, lesson.model, values)
             everything[lesson.name] = results
@@ -169,13 +175,13 @@ def run_path(options: argparse.Namespace) -> int:
             if not options.json:
                 title = f"{number} of {len(STATIONS)}: {page.title}"
                 last = number == len(STATIONS)
-                terminal.show(replace(page, title=title), _AFTER if last else "", ask)
+                terminal.show(replace(page, title=title), _AFTER if last else "", reader)
         except (Stopped, KeyboardInterrupt) as stop:
-            if ask:
+            if reader:
                 print(f"\nGo on later with: {PROGRAM} lesson --from {lesson.name}")
             if isinstance(stop, KeyboardInterrupt):
                 raise
-            return code
+            return code if options.stopped is None else options.stopped
     if options.json:
         from ..report.as_json import dumps
 
@@ -210,8 +216,8 @@ def _compute(
     return page, {name: {"result": t.result, "calls": t.calls} for name, t in taken.items()}
 
 
-def _asking(options: argparse.Namespace) -> Any:
-    """What puts a question to the reader; None where nobody would answer."""
-    from ..report.quiz import ask, can_ask
+def _reader(options: argparse.Namespace) -> Any:
+    """Who answers the questions; None where nobody would."""
+    from ..report.quiz import Reader, can_ask
 
-    return ask if can_ask() and not (options.json or options.no_questions) else None
+    return Reader() if can_ask() and not (options.json or options.no_questions) else None

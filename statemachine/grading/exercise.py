@@ -11,12 +11,14 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import shutil
 import signal
 import sys
 import tempfile
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -95,7 +97,7 @@ def run(
     progress: Callable[[float], None] = lambda _: None,
     wall_limit: float = WALL_LIMIT,
 ) -> Grade:
-    """Judge each function of a student's file.
+    """ExerciseJudge each function of a student's file.
 
     Args:
         file: A Python file; nothing of it runs in this process.
@@ -112,23 +114,106 @@ def run(
         MissingEngineError: Its engine is not installed here.
     """
     path = _python_file(Path(file))
-    if not 0 < time_limit <= 3600:
-        raise BadInputError(
-            f"the time limit must be above 0 s, and at most 3600; got {time_limit:g}"
+    with ExerciseJudge(backend, time_limit, wall_limit) as judge:
+        return judge.judge(path, progress)
+
+
+class ExerciseJudge:
+    """Judges files on one backend. What is right is worked out once, for all of them.
+
+        with ExerciseJudge("mujoco") as judge:
+            grades = [judge.judge(file) for file in files]
+
+    Several threads may judge at once; after `stop.set()` what they wait for ends.
+    """
+
+    def __init__(
+        self, backend: str, time_limit: float = TIME_LIMIT, wall_limit: float = WALL_LIMIT
+    ) -> None:
+        """Arguments as `run` has them."""
+        if not 0 < time_limit <= 3600:
+            raise BadInputError(
+                f"the time limit must be above 0 s, and at most 3600; got {time_limit:g}"
+            )
+        engine = backend_engine(backend)
+        self.backend = backend
+        self.versions = {"statemachine": __version__, "python": sys.version.split()[0]}
+        if engine:
+            self.versions[engine] = engine_version(engine)
+        self.limits = Limits(time_limit, max(wall_limit, _TIMES * time_limit))
+        self.stop = threading.Event()
+        self._cleanup = ExitStack()
+        self._lock = threading.Lock()
+        self._key: dict[str, tuple[list[ExerciseWorld], list[Any]]] = {}
+
+    def __enter__(self) -> ExerciseJudge:
+        self._cleanup.enter_context(unwinding())
+        name = self._cleanup.enter_context(
+            tempfile.TemporaryDirectory(prefix="statemachine-", ignore_cleanup_errors=True)
         )
-    engine = backend_engine(backend)
-    content = path.read_bytes()
-    limits = Limits(time_limit, max(wall_limit, _TIMES * time_limit))
-    with (
-        unwinding(),
-        tempfile.TemporaryDirectory(prefix="statemachine-", ignore_cleanup_errors=True) as folder,
-    ):
-        judgements = _all(path, backend, limits, Path(folder), progress)
-    versions = {"statemachine": __version__, "python": sys.version.split()[0]}
-    if engine:
-        versions[engine] = engine_version(engine)
-    digest = hashlib.sha256(content).hexdigest()
-    return Grade(path.name, digest, backend, versions, judgements, limits.cpu, limits.wall)
+        self._folder = Path(name)
+        return self
+
+    def __exit__(self, *exc: Any) -> bool | None:
+        self.stop.set()
+        return self._cleanup.__exit__(*exc)
+
+    def judge(
+        self, file: str | os.PathLike[str], progress: Callable[[float], None] = lambda _: None
+    ) -> Grade:
+        """ExerciseJudge each function of a student's file.
+
+        Args:
+            file: A Python file; nothing of it runs in this process.
+            progress: Told the fraction that is done.
+
+        Raises:
+            BadInputError: There is no such file, or it is no Python file.
+        """
+        path = _python_file(Path(file))
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        folder = Path(tempfile.mkdtemp(dir=self._folder))
+        judgements = self._all(path, folder, progress)
+        shutil.rmtree(folder, ignore_errors=True)
+        limits = self.limits
+        return Grade(
+            path.name, digest, self.backend, self.versions, judgements, limits.cpu, limits.wall
+        )
+
+    def _all(
+        self, path: Path, folder: Path, progress: Callable[[float], None]
+    ) -> tuple[Judgement, ...]:
+        """All functions at once, so that the slowest decides how long it takes."""
+        backend, limits, stop = self.backend, self.limits, threading.Event()
+        with ThreadPoolExecutor(len(JUDGES)) as pool:
+            try:
+                futures = {
+                    name: pool.submit(_recorded, path, name, backend, limits, folder / name, stop)
+                    for name in JUDGES
+                }
+                # Meanwhile what is right is worked out here, where no code of the student's runs.
+                key = self._answer_key()
+                waiting = set(futures.values())
+                while waiting:
+                    if self.stop.is_set():
+                        stop.set()
+                    waiting = wait(waiting, timeout=0.1).not_done
+                    progress(1 - len(waiting) / len(futures))
+                return tuple(
+                    _judgement(path, name, limits, *key[name], future.result())
+                    for name, future in futures.items()
+                )
+            finally:
+                stop.set()  # after an interrupt nothing goes on
+
+    def _answer_key(self) -> dict[str, tuple[list[ExerciseWorld], list[Any]]]:
+        """For each function what it is called on, and what is right there."""
+        with self._lock:
+            if not self._key:
+                scenes = Scenes(self.backend, Path(tempfile.mkdtemp(dir=self._folder)))
+                worlds = {name: judge_of(name).worlds(scenes) for name in JUDGES}
+                self._key = {name: (w, judge_of(name).right(w)) for name, w in worlds.items()}
+            return self._key
 
 
 def _python_file(path: Path) -> Path:
@@ -156,39 +241,6 @@ def _python_file(path: Path) -> Path:
             f"statemachine check --mutants {path.name}?"
         )
     return path
-
-
-def _all(
-    path: Path,
-    backend: str,
-    limits: Limits,
-    folder: Path,
-    progress: Callable[[float], None],
-) -> tuple[Judgement, ...]:
-    """All functions at once, so that the slowest decides how long it takes."""
-    stop = threading.Event()
-    with ThreadPoolExecutor(len(JUDGES)) as pool:
-        try:
-            futures = {
-                name: pool.submit(_recorded, path, name, backend, limits, folder / name, stop)
-                for name in JUDGES
-            }
-            # Meanwhile what is right is worked out here, where no code of the student's runs.
-            ours = folder / "ours"
-            ours.mkdir()
-            scenes = Scenes(backend, ours)
-            worlds = {name: judge_of(name).worlds(scenes) for name in JUDGES}
-            rights = {name: judge_of(name).right(worlds[name]) for name in JUDGES}
-            waiting = set(futures.values())
-            while waiting:
-                waiting = wait(waiting, timeout=0.1).not_done
-                progress(1 - len(waiting) / len(futures))
-            return tuple(
-                _judgement(path, name, limits, worlds[name], rights[name], future.result())
-                for name, future in futures.items()
-            )
-        finally:
-            stop.set()  # after an interrupt nothing goes on
 
 
 def _recorded(

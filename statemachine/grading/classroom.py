@@ -1,0 +1,312 @@
+"""The files of a class: which there are, all judged in parallel, a table that is resumed."""
+
+from __future__ import annotations
+
+import ast
+import csv
+import hashlib
+import io
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ..errors import BadInputError
+from ..traces.whole import replace_file
+from .exercise import TIME_LIMIT, ExerciseJudge, Grade, Judgement
+from .judges import JUDGES
+
+_HEAD = ("file", "right", "of", *JUDGES, "remarks", "same_as", "sha256", "made_with")
+_WORDS = {"right", "wrong", "not written", "not judged"}
+_LARGEST = 1_000_000  # bytes of a file that is looked into
+
+
+@dataclass(frozen=True)
+class Submission:
+    """A student's file: what it is called in the table, and where it is.
+
+    `path` is None where a student's folder has no file that could be judged, or several.
+    """
+
+    name: str
+    path: Path | None
+    refusal: str = ""
+
+
+@dataclass(frozen=True)
+class ClassEntry:
+    """What became of one submission.
+
+    Attributes:
+        name: As in the table.
+        sha256: The digest of its content; "" without a file.
+        functions: One after the other; empty where the file could not be judged.
+        refusal: Why it could not.
+        made_with: Backend, versions and limit that the verdict comes from.
+        same_as: The first submission whose code is the same, comments and layout aside.
+    """
+
+    name: str
+    sha256: str
+    functions: tuple[Judgement, ...]
+    refusal: str
+    made_with: str
+    same_as: str = ""
+
+    @property
+    def right(self) -> int:
+        """How many functions do what they should."""
+        return sum(judgement.passed for judgement in self.functions)
+
+    @property
+    def judged(self) -> bool:
+        """Whether there is a verdict on each function."""
+        return bool(self.functions) and all(each.judged for each in self.functions)
+
+
+def submissions(paths: Sequence[str | os.PathLike[str]]) -> list[Submission]:
+    """The submissions among files and folders.
+
+    In a folder each Python file is one, and each folder with one Python file that has at least
+    one of the functions of the exercise.
+
+    Raises:
+        BadInputError: A path is not there, or nothing is found at all.
+    """
+    found: dict[Path, Submission] = {}
+    for each in map(Path, paths):
+        if each.is_dir():
+            before = "" if len(paths) == 1 else f"{each.as_posix()}/"
+            for entry in sorted(each.iterdir()):
+                if not entry.name.startswith("."):
+                    for one in _in_entry(entry):
+                        found.setdefault(entry, replace(one, name=before + one.name))
+        elif each.is_file():
+            found.setdefault(each, Submission(each.as_posix(), each))
+        else:
+            raise BadInputError(f"there is no file or folder {each}")
+    if not found:
+        raise BadInputError(f"no Python files in {', '.join(map(str, paths))}")
+    return list(found.values())
+
+
+def _in_entry(entry: Path) -> list[Submission]:
+    if entry.is_file():
+        return [Submission(entry.name, entry)] if entry.suffix == ".py" else []
+    if not entry.is_dir() or entry.name == "__pycache__":
+        return []
+    files = [file for file in sorted(entry.rglob("*.py")) if _has_a_function(file)]
+    if len(files) == 1:
+        return [Submission(entry.name, files[0])]
+    text = "no Python file in it has one of the functions"
+    if files:
+        names = ", ".join(file.relative_to(entry).as_posix() for file in files[:3])
+        text = f"{len(files)} files in it have the functions: {names}"
+    return [Submission(entry.name, None, text)]
+
+
+def _has_a_function(file: Path) -> bool:
+    try:
+        with file.open("rb") as content:
+            start = content.read(_LARGEST)
+    except OSError:
+        return False
+    return any(f"def {name}".encode() in start for name in JUDGES)
+
+
+def judge_all(
+    found: Sequence[Submission],
+    backend: str,
+    *,
+    time_limit: float = TIME_LIMIT,
+    jobs: int | None = None,
+    table: Path | None = None,
+    progress: Callable[[float], None] = lambda _: None,
+) -> list[ClassEntry]:
+    """ExerciseJudge every submission, several at once.
+
+    Args:
+        found: What to judge.
+        backend: The engine to run them on.
+        time_limit: What each function may compute [s].
+        jobs: How many files are judged at once; each takes a process a function. By default one
+            for every two processors.
+        table: A CSV file that is written anew after each file. What it says already of the same
+            content, judged with the same versions and limit, is taken over and not judged again.
+        progress: Told the fraction that is done.
+
+    Raises:
+        BadInputError: `jobs` is less than 1, or `table` is there and no such table.
+        MissingEngineError: The backend's engine is not installed here.
+    """
+    jobs = max(1, (os.cpu_count() or 1) // 2) if jobs is None else jobs
+    if jobs < 1:
+        raise BadInputError(f"jobs must be at least 1; got {jobs}")
+    before = _read(table) if table is not None and table.exists() else {}
+    entries: dict[str, ClassEntry] = {}
+    with ExerciseJudge(backend, time_limit) as judge, ThreadPoolExecutor(jobs) as pool:
+        versions = " ".join(f"{name} {version}" for name, version in judge.versions.items())
+        made_with = f"{backend}, {versions}, {time_limit:g} s"
+        try:
+            waiting: dict[Future[ClassEntry], str] = {}
+            for each in found:
+                known = before.get((_digest(each.path), made_with))
+                if known is not None and known.judged:
+                    entries[each.name] = replace(known, name=each.name)
+                else:
+                    waiting[pool.submit(_entry, judge, each, made_with)] = each.name
+            while waiting:
+                for future in wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED).done:
+                    entries[waiting.pop(future)] = future.result()
+                    if table is not None:
+                        _write(table, _in_order(found, entries))
+                progress(1 - len(waiting) / len(found))
+        finally:
+            judge.stop.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+    done = _in_order(found, entries)
+    if table is not None:
+        _write(table, done)
+    return done
+
+
+def _entry(judge: ExerciseJudge, submission: Submission, made_with: str) -> ClassEntry:
+    digest = _digest(submission.path)
+    if submission.path is None:
+        return ClassEntry(submission.name, digest, (), submission.refusal, made_with)
+    try:
+        grade: Grade = judge.judge(submission.path)
+    except BadInputError as error:
+        return ClassEntry(submission.name, digest, (), str(error), made_with)
+    return ClassEntry(submission.name, grade.sha256, grade.functions, "", made_with)
+
+
+def _in_order(found: Sequence[Submission], entries: Mapping[str, ClassEntry]) -> list[ClassEntry]:
+    """The entries in the order of the submissions, each told which earlier one it equals."""
+    done = []
+    first: dict[str, str] = {}
+    for each in found:
+        if each.name not in entries:
+            continue
+        entry, same = entries[each.name], ""
+        if any(judgement.written for judgement in entry.functions):
+            code = _code(each.path)
+            same = first.setdefault(code, each.name) if code else ""
+        done.append(replace(entry, same_as="" if same == each.name else same))
+    return done
+
+
+def _digest(path: Path | None) -> str:
+    try:
+        return "" if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return ""
+
+
+def _code(path: Path | None) -> str:
+    """A digest of what a file does, without its comments, docstrings and layout; or ""."""
+    try:
+        tree = ast.parse(path.read_bytes()) if path is not None else None
+        if tree is None:
+            return ""
+        for node in ast.walk(tree):
+            body = getattr(node, "body", None)
+            if (
+                isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef))
+                and body
+                and isinstance(body[0], ast.Expr)
+                and isinstance(body[0].value, ast.Constant)
+            ):
+                node.body = body[1:] or [ast.Pass()]
+        return hashlib.sha256(ast.dump(tree).encode(errors="replace")).hexdigest()
+    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):
+        return ""
+
+
+# The table --------------------------------------------------------------------------------
+
+
+def as_csv(entries: Iterable[ClassEntry]) -> str:
+    """The table as text: a row a submission; remarks have a line each."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(_HEAD)
+    for entry in entries:
+        words = {each.function: verdict_word(each) for each in entry.functions}
+        remarks = [f"{each.function}: {text}" for each in entry.functions for text in each.remarks]
+        row = (
+            entry.name,
+            entry.right,
+            len(JUDGES),
+            *(words.get(name, "not judged") for name in JUDGES),
+            "\n".join([entry.refusal] if entry.refusal else remarks),
+            entry.same_as,
+            entry.sha256,
+            entry.made_with,
+        )
+        writer.writerow([_safe(cell) for cell in row])
+    return out.getvalue()
+
+
+def _safe(cell: object) -> object:
+    """No formula: a spreadsheet would run what a student wrote, or named the file."""
+    return f"'{cell}" if isinstance(cell, str) and cell[:1] in "=+-@\t\r" and cell else cell
+
+
+def verdict_word(judgement: Judgement) -> str:
+    """A judgement in a word of the table."""
+    if not judgement.judged:
+        return "not judged"
+    if not judgement.written:
+        return "not written"
+    return "right" if judgement.passed else "wrong"
+
+
+def _write(table: Path, entries: Iterable[ClassEntry]) -> None:
+    text = as_csv(entries).encode("utf-8", errors="replace")
+    replace_file(table, lambda out: out.write(text))
+
+
+def _read(table: Path) -> dict[tuple[str, str], ClassEntry]:
+    """What a table says, by digest and by what it was made with.
+
+    Raises:
+        BadInputError: It is no such table, so that nothing of it is overwritten.
+    """
+    try:
+        with table.open(newline="", encoding="utf-8") as text:
+            rows = list(csv.reader(text))
+    except (OSError, UnicodeError, csv.Error) as error:
+        raise BadInputError(f"{table.name} cannot be read: {error}") from None
+    if rows and tuple(rows[0]) != _HEAD:
+        raise BadInputError(
+            f"{table.name} is there and is no table of grades: name another file, or remove it"
+        )
+    found = {}
+    for row in rows[1:]:
+        cells = dict(zip(_HEAD, row, strict=False))
+        if len(row) != len(_HEAD) or any(cells[name] not in _WORDS for name in JUDGES):
+            continue  # judged again
+        entry = ClassEntry(cells["file"], cells["sha256"], _judgements(cells), "",
+                           cells["made_with"])  # fmt: skip
+        found[entry.sha256, entry.made_with] = entry
+    return found
+
+
+def _judgements(cells: Mapping[str, str]) -> tuple[Judgement, ...]:
+    remarks: dict[str, list[str]] = {name: [] for name in JUDGES}
+    for line in cells["remarks"].split("\n"):
+        name, _, text = line.removeprefix("'").partition(": ")
+        if name in remarks:
+            remarks[name].append(text)
+    return tuple(
+        Judgement(
+            name,
+            written=cells[name] != "not written",
+            passed=cells[name] == "right",
+            remarks=tuple(remarks[name]),
+            judged=cells[name] != "not judged",
+        )
+        for name in JUDGES
+    )

@@ -1,0 +1,211 @@
+"""A class's folder: what is a submission, the table, resuming, and what Gradescope reads."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from statemachine.errors import BadInputError
+from statemachine.grading import classroom
+from statemachine.grading.classroom import Submission, as_csv, judge_all, submissions
+from statemachine.grading.exercise import ExerciseJudge, Grade, Judgement
+from statemachine.grading.judges import JUDGES
+from statemachine.report import gradescope
+
+from .conftest import ROOT, Cli
+
+TEMPLATE = ROOT / "exercises" / "step_loop.py"
+SOLUTION = ROOT / "exercises" / "solutions" / "step_loop.py"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Files and folders as students hand them in."""
+    home = tmp_path / "class"
+    for name in ("ann", "bob", "cy", "dee", "__pycache__", ".git"):
+        (home / name).mkdir(parents=True)
+    (home / "ann" / "my_solution.py").write_text(SOLUTION.read_text())
+    (home / "ann" / "helper.py").write_text("X = 1\n")
+    (home / "bob" / "deep").mkdir()
+    (home / "bob" / "deep" / "step_loop.py").write_text(TEMPLATE.read_text())
+    (home / "cy" / "notes.txt").write_text("none\n")
+    for name in ("a.py", "b.py"):
+        (home / "dee" / name).write_text("def demo_gravity(model): ...\n")
+    (home / "__pycache__" / "x.py").write_text("def demo_gravity(model): ...\n")
+    (home / "eve.py").write_text("def demo_gravity(:\n")
+    (home / "fay.py").write_text("# the same\n" + SOLUTION.read_text().replace("\n\n\n", "\n\n"))
+    (home / "grades.txt").write_text("no Python\n")
+    return home
+
+
+@pytest.fixture
+def judged(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Files are judged by what is in them, in no time; the names of those that were."""
+    seen: list[str] = []
+
+    def judge(self: ExerciseJudge, file: Path, progress: Any = None) -> Grade:
+        seen.append(Path(file).name)
+        text = Path(file).read_text()
+        if "refuse" in text:
+            raise BadInputError("it is refused")
+        written, passed = "raise NotImplementedError" not in text, "return" in text
+        marks = tuple(
+            Judgement(name, written, written and passed, (f"because: of {name}", "and so on"))
+            for name in JUDGES
+        )
+        digest = classroom._digest(Path(file))
+        return Grade(Path(file).name, digest, self.backend, self.versions, marks)
+
+    monkeypatch.setattr(ExerciseJudge, "judge", judge)
+    return seen
+
+
+def test_what_is_a_submission(folder: Path) -> None:
+    found = {each.name: each for each in submissions([folder])}
+    assert list(found) == ["ann", "bob", "cy", "dee", "eve.py", "fay.py"]
+    assert found["ann"].path == folder / "ann" / "my_solution.py"
+    assert found["bob"].path == folder / "bob" / "deep" / "step_loop.py"
+    assert found["cy"].path is None
+    assert found["cy"].refusal == "no Python file in it has one of the functions"
+    assert found["dee"].refusal == "2 files in it have the functions: a.py, b.py"
+    files = [folder / "eve.py", folder / "fay.py", folder / "eve.py"]
+    assert [each.path for each in submissions(files)] == files[:2]
+    with pytest.raises(BadInputError, match="no file or folder"):
+        submissions([folder / "nobody"])
+    with pytest.raises(BadInputError, match="no Python files in"):
+        submissions([folder / "cy"])
+
+
+def test_two_folders_may_have_files_of_one_name(tmp_path: Path, judged: list[str]) -> None:
+    for name in ("monday", "tuesday"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "ann.py").write_text(f"return # {name}\n")
+    entries = judge_all(submissions([tmp_path / "monday", tmp_path / "tuesday"]), "mujoco")
+    assert len(entries) == 2
+    assert len({entry.name for entry in entries}) == 2
+    assert len(judged) == 2
+
+
+def test_the_same_code_is_told_and_unwritten_files_are_not(folder: Path, judged: list[str]) -> None:
+    (folder / "gus.py").write_text(TEMPLATE.read_text())
+    entries = {e.name: e for e in judge_all(submissions([folder]), "mujoco", jobs=2)}
+    assert {name: e.same_as for name, e in entries.items() if e.same_as} == {"fay.py": "ann"}
+    assert entries["ann"].judged
+    assert not entries["cy"].judged
+
+
+def test_a_table_is_resumed(folder: Path, judged: list[str], tmp_path: Path) -> None:
+    table = tmp_path / "grades.csv"
+    first = judge_all(submissions([folder]), "mujoco", table=table)
+    assert sorted(judged) == ["eve.py", "fay.py", "my_solution.py", "step_loop.py"]
+    text = table.read_text()
+    judged.clear()
+    again = judge_all(submissions([folder]), "mujoco", table=table)
+    assert judged == []
+    assert again == first
+    assert table.read_text() == text
+    # What is new or changed, or was judged otherwise, is judged.
+    (folder / "eve.py").write_text("return 1\n")
+    judge_all(submissions([folder]), "mujoco", table=table)
+    assert judged == ["eve.py"]
+    judge_all(submissions([folder]), "mujoco", table=table, time_limit=7.0)
+    assert len(judged) == 5
+    # A table that ended in the middle of a file is one with fewer rows.
+    rows = text.splitlines(keepends=True)
+    table.write_text("".join(rows[:2]))
+    judged.clear()
+    assert judge_all(submissions([folder]), "mujoco", table=table)
+    assert judged
+    table.write_text("name,mark\nann,1\n")
+    with pytest.raises(BadInputError, match="no table of grades"):
+        judge_all(submissions([folder]), "mujoco", table=table)
+    assert table.read_text() == "name,mark\nann,1\n"
+
+
+def test_the_table_is_safe_in_a_spreadsheet(tmp_path: Path, judged: list[str]) -> None:
+    evil = tmp_path / '=HYPERLINK("x").py'
+    evil.write_text("return 'refuse'\n")
+    entries = judge_all([Submission(evil.name, evil)], "mujoco")
+    (row,) = csv.DictReader(io.StringIO(as_csv(entries)))
+    assert row["file"] == f"'{evil.name}"
+    assert row["remarks"] == "it is refused"
+
+
+def test_jobs_must_be_some(folder: Path) -> None:
+    with pytest.raises(BadInputError, match="at least 1"):
+        judge_all(submissions([folder]), "mujoco", jobs=0)
+
+
+def test_what_gradescope_reads(judged: list[str]) -> None:
+    marks = (
+        Judgement("demo_gravity", True, True, ("good",)),
+        Judgement("demo_state", True, False, ("bad", "worse")),
+        Judgement("demo_forward", False, False, ("not written yet",)),
+        Judgement("demo_replay", True, False, ("busy",), judged=False),
+    )
+    grade = Grade("step_loop.py", "0", "mujoco", {"mujoco": "4"}, marks)
+    read = json.loads(gradescope.results(grade, points=2.5))
+    tests = {each["name"]: each for each in read["tests"]}
+    assert list(tests) == list(JUDGES)
+    assert [each["score"] for each in tests.values()] == [2.5, 0, 0, 0]
+    assert {each["max_score"] for each in tests.values()} == {2.5}
+    assert [each["status"] for each in tests.values()] == ["passed", "failed", "failed", "failed"]
+    assert tests["demo_state"]["output"] == "wrong\nbad\nworse"
+    assert tests["demo_replay"]["output"] == "not judged\nbusy"
+    refused = json.loads(gradescope.results(None, "there is no file"))
+    assert {each["output"] for each in refused["tests"]} == {"there is no file"}
+
+
+@pytest.mark.slow
+def test_a_folder_from_the_command_line(cli: Cli, folder: Path, tmp_path: Path) -> None:
+    for name in ("cy", "dee"):
+        for file in (folder / name).iterdir():
+            file.unlink()
+        (folder / name).rmdir()
+    (folder / "hal.py").write_text("def demo_gravity(model, seconds=4):\n    while True: pass\n")
+    table = tmp_path / "grades.csv"
+    command = ("check", str(folder), "--csv", str(table), "--time-limit", "2")
+    done = cli(*command)
+    assert done.returncode == 0, done.stderr
+    rows = {row["file"]: row for row in csv.DictReader(table.read_text().splitlines())}
+    assert [rows[name]["right"] for name in rows] == ["4", "0", "0", "4", "0"]
+    assert rows["bob"]["demo_gravity"] == "not written"
+    assert rows["fay.py"]["same_as"] == "ann"
+    text = " ".join(table.read_text().split())
+    assert "a loop that does not end?" in text
+    assert "invalid syntax" in text
+    assert "2 of 5 files have all functions right." in done.stdout
+    again = cli(*command, "--json")
+    passed = [sum(f["passed"] for f in e["functions"]) for e in json.loads(again.stdout)]
+    assert passed == [4, 0, 0, 4, 0]
+
+
+@pytest.mark.slow
+def test_one_file_for_gradescope(cli: Cli, tmp_path: Path) -> None:
+    results = tmp_path / "results.json"
+    done = cli("check", str(SOLUTION), "--gradescope", str(results))
+    assert done.returncode == 0, done.stderr
+    assert sum(each["score"] for each in json.loads(results.read_text())["tests"]) == 4
+    done = cli("check", str(tmp_path / "none.py"), "--gradescope", str(results))
+    assert done.returncode == 2
+    assert "there is no file none.py" in results.read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["exercises/step_loop.py", "--csv", "g.csv"], "several files, or a folder"),
+        (["exercises", "--gradescope", "r.json"], "goes with one FILE"),
+        (["--mutants", "exercises/test_arm.py", "--jobs", "2"], "several files, or a folder"),
+        ([], "expected one of FILE and --mutants"),
+    ],
+)
+def test_options_that_do_not_go_together(cli: Cli, arguments: list[str], says: str) -> None:
+    done = cli("check", *[str(ROOT / a) if a.startswith("exercises") else a for a in arguments])
+    assert done.returncode == 2
+    assert says in done.stderr
