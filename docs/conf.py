@@ -5,12 +5,14 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE.parent))
+sys.path[:0] = [str(HERE.parent), str(HERE)]
+
+import rooms  # noqa: E402
 
 import statemachine  # noqa: E402
 
 project = "statemachine"
-author = "the statemachine maintainers"
+author = "statemachine contributors"
 copyright = author
 release = version = statemachine.__version__
 extensions = ["myst_parser"]
@@ -29,6 +31,7 @@ def _make_pages(_app) -> None:
     make_path(HERE / "path", [name for name in backends if name] or None)
     make_reference(HERE / "reference")
     make_comparisons(HERE / "comparisons")
+    (HERE / "reference" / "rooms.md").write_text(rooms.table(), encoding="utf-8")
 
 
 def setup(app) -> None:
