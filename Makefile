@@ -15,25 +15,27 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13 python3.14; 
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null \
 	&& { echo $$p; break; }; done)
 
-.PHONY: help lesson test test-slow test-pythons test-newest check format hooks bench fuzz picture extras report urdf traces docs notebook clean
+.PHONY: help lesson test test-slow test-pythons test-newest check format hooks bench fuzz picture extras report urdf traces docs notebook student-kit autograder clean
 
 help:
 	@sed -n 's/^# make /  make /p' Makefile
 
 lesson: $(VENV)/run.stamp
-	@# In a terminal it asks and waits; q ends it at any question.
-	@$(BIN)/statemachine lesson
+	@# In a terminal it asks and waits; q ends it (9) at any prompt, and nothing follows.
 	@# Both engines; one that cannot be had here is named in one line and left out.
 	@# 3: the witness cannot be had here; it has said so in one line.
-	@$(BIN)/statemachine fingertip --backend all || [ $$? -eq 3 ]
-	@echo "Where to go next:"
-	@echo "  source $(BIN)/activate       makes statemachine a command of your shell"
-	@echo "  statemachine                    everything that there is"
-	@echo "  statemachine lesson gravity --backend all     on all engines, side by side"
-	@echo "  statemachine lesson questions   check yourself"
-	@echo "  python exercises/step_loop.py   then four functions for you to write"
-	@echo "  statemachine compare hold --html hold.html     where two engines part, and why"
-	@echo "  statemachine doctor             what this machine has, and what to do"
+	@$(BIN)/statemachine lesson --stopped 9; code=$$?; \
+	if [ $$code -eq 9 ]; then echo "after: source $(BIN)/activate"; exit 0; fi; \
+	[ $$code -eq 0 ] || exit $$code; \
+	$(BIN)/statemachine fingertip --backend all || [ $$? -eq 3 ] || exit 1; \
+	echo "Where to go next:"; \
+	echo "  source $(BIN)/activate       makes statemachine a command of your shell"; \
+	echo "  statemachine                    everything that there is"; \
+	echo "  statemachine lesson gravity --backend all     on all engines, side by side"; \
+	echo "  statemachine lesson questions   check yourself"; \
+	echo "  python exercises/step_loop.py   then four functions for you to write"; \
+	echo "  statemachine compare hold --html hold.html     where two engines part, and why"; \
+	echo "  statemachine doctor             what this machine has, and what to do"
 
 # worksteal: a process that has run its tests takes some of another's.
 PYTEST := python -m pytest -n auto --dist worksteal
@@ -118,6 +120,11 @@ docs: $(VENV)/test.stamp
 # make notebook     write notebooks/path.ipynb anew from the lessons
 notebook: $(VENV)/test.stamp
 	@$(BIN)/python notebooks/make_notebook.py
+
+# make student-kit  a zip for students, without solutions: dist/statemachine-student-kit.zip
+# make autograder   a zip for Gradescope: dist/statemachine-autograder.zip
+student-kit autograder: $(VENV)/run.stamp
+	@$(BIN)/python teaching/make_kits.py $@
 
 # make clean        remove what the others made
 clean:

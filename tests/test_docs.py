@@ -9,18 +9,21 @@ import sys
 from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import nbformat
 import pytest
 from nbclient import NotebookClient
 
+import statemachine as sm
 from statemachine.lessons import LESSONS
+from statemachine.lessons.session import page_of_lesson, take
 from statemachine.page import Page, Pipeline, Printed, Question, Slots, Table, Text, Traces
 from statemachine.report import markdown as md
 from statemachine.report import terminal
 from statemachine.report.figures import svg
-from statemachine.report.notebook import Shown, build, station
+from statemachine.report.notebook import Shown, _opening, build, station
 from statemachine.report.site import make_path
 
 from .conftest import ROOT, need_engine
@@ -79,16 +82,55 @@ class _Links(HTMLParser):
             self.alt.append(found.get("alt") or "")
 
 
+_FOLDED = re.compile(r"<details[ >].*?</details>", re.DOTALL)
+_SMALL: dict[str, dict[str, Any]] = {
+    "objects": {"worlds": 2},
+    "gravity": {"longer": 0.0},
+    "replay": {"steps": 50},
+    "speed": {"steps": 50},
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LESSONS)
+def test_no_page_of_the_path_shows_its_answers_open(name: str) -> None:
+    lesson = LESSONS[name]
+    taken = take(lesson, sm.load(lesson.model), "mujoco", _SMALL.get(name, {}))
+    page = page_of_lesson(lesson, {"mujoco": taken})
+    questions = [block for block in page.blocks if isinstance(block, Question)]
+    assert questions
+    text = md.markdown(page, lambda _: "picture")
+    folds = _FOLDED.findall(text)
+    assert len(folds) == len(questions)
+    shown = _FOLDED.sub("", text)
+    for question, fold in zip(questions, folds, strict=True):
+        assert md.answer(question) in fold
+        assert md.asked(question) in shown
+    before, _, after = shown.partition(md.asked(questions[0]))
+    for question in questions[1:]:
+        after = after.replace(md.asked(question), "")
+    assert not after.strip()
+    assert not re.search("[✓✗]", shown)
+    printed = {line for line in taken.printed.splitlines() if line.strip()}
+    assert not printed & set(before.splitlines())
+    # The notebook asks before the cell that answers.
+    asks = _opening(page)
+    for question in questions:
+        assert md.asked(question) in asks
+        assert question.because not in asks
+    assert not re.search("[✓✗]", asks)
+
+
 @pytest.mark.slow
 def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
     need_engine("pybullet")
     source = tmp_path / "docs"
     source.mkdir()
-    picture = Path("models", "so101", "so101.png")
-    (tmp_path / picture.parent).mkdir(parents=True)
-    (tmp_path / picture).write_bytes((ROOT / picture).read_bytes())
-    for name in ("conf.py", "index.md", "exercises.md"):
-        (source / name).write_text((ROOT / "docs" / name).read_text())
+    for name in ("models", "statemachine", "CONTRIBUTING.md"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    for path in (ROOT / "docs").iterdir():
+        if path.is_file():
+            (source / path.name).write_bytes(path.read_bytes())
     done = subprocess.run(
         [sys.executable, "-m", "sphinx", "-W", "-q", "-b", "html", source, tmp_path / "o"],
         capture_output=True,
@@ -109,6 +151,7 @@ def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
         assert all(links.alt)
         pictures += len(links.alt)
         assert "✗" not in text
+        assert "✓" not in _FOLDED.sub("", text), page
     assert pictures >= 5
     gravity = (tmp_path / "o" / "path" / "06-gravity.html").read_text()
     assert "53.89°" in gravity

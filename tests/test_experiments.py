@@ -13,9 +13,10 @@ import pytest
 
 import statemachine as sm
 from statemachine.errors import BadInputError
-from statemachine.experiments import fingertip, forward, replay, speed, state
-from statemachine.lessons import in_turns
+from statemachine.experiments import fingertip, forward, replay
+from statemachine.lessons import in_turns, session
 from statemachine.lessons._fall import Forces, milestones
+from statemachine.lessons.speed import Speed
 from statemachine.models import models_dir
 from statemachine.scenarios.provenance import provenance
 
@@ -102,24 +103,26 @@ def test_replay_compares_what_it_says() -> None:
 
 def test_speed_runs_every_step_it_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     counted: list[int] = []
-    monkeypatch.setattr(speed, "step", lambda _model, _data, n=1: counted.append(n))
-    found = speed.run(sm.load("so101"), steps=47)
-    assert sum(counted) == 3 * 47  # in bulk twice
-    assert counted.count(1) >= 47
+    monkeypatch.setattr(session, "step", lambda _model, _data, n=1: counted.append(n))
+    found = lesson_result("speed", sm.load("so101"), steps=47)
+    code, rounds = counted[:48], counted[48:]
+    assert code == [47] + [1] * 47
+    assert sum(rounds) == 3 * 47  # in bulk twice
+    assert rounds.count(1) >= 47
     assert found.simulated == pytest.approx(47 * 0.005)
 
 
-def _times(monkeypatch: pytest.MonkeyPatch, cost: Any) -> speed.Speed:
-    """The experiment by a clock that only `cost` of a call moves: (nstep, calls before) -> s."""
-    now, calls = [0.0], [0]
+def _times(monkeypatch: pytest.MonkeyPatch, cost: Any) -> Speed:
+    """The lesson by a clock that only `cost` moves: of a call of n steps, after so many."""
+    now, calls = [0.0], [-1 - 400]  # those of the code come before the rounds
 
     def step(_model: Any, _data: Any, n: int = 1) -> None:
         now[0] += cost(n, calls[0])
         calls[0] += 1
 
-    monkeypatch.setattr(speed, "step", step)
+    monkeypatch.setattr(session, "step", step)
     monkeypatch.setattr(in_turns.time, "perf_counter", lambda: now[0])
-    return speed.run(sm.load("so101"), steps=400)
+    return lesson_result("speed", sm.load("so101"), steps=400)
 
 
 def test_what_is_smaller_than_the_noise_is_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -168,7 +171,7 @@ def test_state_of_every_type_of_joint(tmp_path: Path) -> None:
         "<body><joint name='b' type='ball'/><geom size='1'/></body>"
         "<body><joint name='s' type='slide'/><geom size='1'/></body></body></worldbody></mujoco>"
     )
-    joints = {joint.name: joint for joint in state.run(sm.load(file)).joints}
+    joints = {joint.name: joint for joint in lesson_result("state", sm.load(file)).joints}
     assert (joints["b"].qpos_start, joints["b"].qpos_stop) == (7, 11)
     assert (joints["b"].qvel_start, joints["b"].qvel_stop) == (6, 9)
     assert joints["s"].type == "slide"

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import fcntl
+import io
 import os
 import pty
 import re
 import select
+import struct
 import subprocess
 import sys
+import termios
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -25,6 +30,7 @@ from statemachine.lessons.in_turns import Ratio
 from statemachine.lessons.records import Session
 from statemachine.lessons.session import Play, Taken, Watch, load_line, page_of_lesson, take
 from statemachine.page import Code, Page, Printed, Question, Text, Verdict
+from statemachine.report import progress as bar
 from statemachine.report import quiz
 from statemachine.scenarios import SCENARIOS
 from statemachine.traces.recorder import record_scenario
@@ -397,16 +403,27 @@ def test_options_may_stand_before_the_station(cli: Cli) -> None:
 # --- at a terminal
 
 
-def _at_a_terminal(*words: str, typed: list[tuple[str, str]], columns: int = 80) -> str:
-    """Run the command on a pseudo-terminal; type each answer when its prompt appears."""
+_MORE = "Enter for more"
+
+
+def _at_a_terminal(
+    *words: str, typed: list[tuple[str, str]], columns: int = 80, lines: int = 24, more: bool = True
+) -> str:
+    """Run the command on a pseudo-terminal; type each answer when its prompt appears.
+
+    With `more`, Enter is typed wherever it waits for the next screenful.
+    """
     ours, theirs = pty.openpty()
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": str(columns), "TERM": "xterm"}
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm"}
+    for name in ("COLUMNS", "LINES"):
+        environment.pop(name, None)
     process = subprocess.Popen(
         [sys.executable, "-m", "statemachine", *words],
         stdin=theirs, stdout=theirs, stderr=theirs, env=environment, close_fds=True,
     )  # fmt: skip
     os.close(theirs)
-    seen, waiting, deadline = "", list(typed), time.monotonic() + 60
+    seen, answered, waiting, deadline = "", 0, list(typed), time.monotonic() + 60
     try:
         while time.monotonic() < deadline:
             if select.select([ours], [], [], 0.2)[0]:
@@ -417,9 +434,13 @@ def _at_a_terminal(*words: str, typed: list[tuple[str, str]], columns: int = 80)
                 if not chunk:
                     break
                 seen += chunk.decode(errors="replace")
-            if waiting and waiting[0][0] in seen.rpartition("\n")[2]:
+            last = seen[answered:].rpartition("\n")[2]
+            if waiting and waiting[0][0] in last:
                 os.write(ours, waiting.pop(0)[1].encode())
-                seen += "\n"
+                answered = len(seen)
+            elif more and _MORE in last:
+                os.write(ours, b"\n")
+                answered = len(seen)
     finally:
         process.kill()
         process.wait()
@@ -465,6 +486,57 @@ def test_the_path_waits_for_its_reader() -> None:
     assert "13 12 6" not in seen
 
 
+def _screens(seen: str, columns: int) -> list[int]:
+    """Rows between one stop and the next; the prompt's own are counted."""
+    found = [0]
+    for raw in seen.split("\n"):
+        line = raw.rstrip("\r").rpartition("\r")[2]  # what a bar of progress left
+        found[-1] += max(-(-cell_len(line) // columns), 1)
+        if "Your prediction" in line or "(q to stop)" in line:
+            found.append(0)
+    return found
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
+@pytest.mark.parametrize(
+    ("lesson", "columns", "lines"),
+    [
+        ("state", 80, 24),
+        ("state", 40, 24),
+        ("state", 80, 9),
+        ("state", 40, 7),
+        ("state", 120, 30),
+        pytest.param("gravity", 80, 24, marks=pytest.mark.slow),
+        pytest.param("questions", 80, 24, marks=pytest.mark.slow),
+        pytest.param("questions", 40, 8, marks=pytest.mark.slow),
+    ],
+)
+def test_nothing_scrolls_away_unread(lesson: str, columns: int, lines: int) -> None:
+    typed = [("Your prediction", "a\n")] * (6 if lesson == "questions" else 1)
+    seen = _at_a_terminal("lesson", lesson, typed=typed, columns=columns, lines=lines)
+    assert max(_screens(seen, columns)) <= lines
+    assert re.search(r"you\s+said", seen)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
+def test_it_waits_at_the_verdict_on_a_prediction() -> None:
+    seen = _at_a_terminal("lesson", "state", typed=[("Your prediction", "a\n")], lines=200)
+    assert seen.count(_MORE) == 1  # all the rest has room
+    verdict, _, rest = seen.partition(_MORE)
+    assert "you said a; it is c" in verdict
+    assert "Next:" not in verdict
+    assert "Next:" in rest
+    assert _MORE not in _at_a_terminal("lesson", "state", "--no-questions", typed=[], lines=9)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
+def test_q_ends_a_station_between_two_screens() -> None:
+    typed = [("Your prediction", "a\n"), (_MORE, "q\n")]
+    assert "Next:" not in _at_a_terminal("lesson", "state", typed=typed, more=False)
+    seen = _at_a_terminal("lesson", "--from", "state", typed=typed, more=False)
+    assert "Go on later with: statemachine lesson --from state" in seen
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 def test_the_six_questions_are_counted() -> None:
     seen = _at_a_terminal("lesson", "questions", typed=[("Your prediction", "a\n")] * 6)
@@ -482,23 +554,41 @@ def test_a_long_question_is_wrapped() -> None:
     assert len(asked.splitlines()) > 4
 
 
+def test_a_bar_of_progress_takes_nothing_of_what_is_printed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    monkeypatch.setattr(bar, "_PATIENCE", -1.0)
+    printed = io.StringIO()
+    with bar.progress("x") as report:
+        with contextlib.redirect_stdout(printed):
+            report(0.5)
+            print("hello")
+        report(1.0)
+    assert printed.getvalue() == "hello\n"
+
+
 def test_answers_that_are_none(monkeypatch: pytest.MonkeyPatch) -> None:
     question = Question("?", ("x", "y"), 0, "")
     typed = iter(["3", "", "B) "])
     monkeypatch.setattr("builtins.input", lambda _: next(typed))
-    assert quiz.ask(question) is None
-    assert quiz.ask(question) == 1
+    assert quiz.Reader().ask(question) is None
+    assert quiz.Reader().ask(question) == 1
 
     def end(_: str) -> str:
         raise EOFError
 
     monkeypatch.setattr("builtins.input", end)
-    assert quiz.ask(question) is None
+    assert quiz.Reader().ask(question) is None
     with pytest.raises(quiz.Stopped):
-        quiz.go_on("more")
+        quiz.Reader().go_on()
     monkeypatch.setattr("builtins.input", lambda _: "q")
     with pytest.raises(quiz.Stopped):
-        quiz.ask(question)
+        quiz.Reader().ask(question)
 
 
 def test_a_station_that_says_no_is_the_exit_code_of_the_path(
@@ -520,6 +610,24 @@ def test_a_station_that_says_no_is_the_exit_code_of_the_path(
     assert main(["lesson", "--from", "gravity", "--json"]) == 0
     assert ran == [lesson.name for lesson in STATIONS[5:]]
     assert '"gravity": {\n    "mujoco": "gravity"' in capsys.readouterr().out
+
+
+def test_a_script_can_tell_that_its_reader_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    from statemachine.cli import main
+    from statemachine.commands import lesson as command
+
+    def stop(_: str) -> str:
+        raise quiz.Stopped
+
+    page = Page("t", "o", [Question("q", ("a", "b"), 0, "because")])
+    monkeypatch.setattr("builtins.input", stop)
+    monkeypatch.setattr(command, "_compute", lambda *_: (page, {}))
+    monkeypatch.setattr(quiz, "can_ask", lambda: True)
+    assert main(["lesson"]) == 0
+    assert main(["lesson", "--stopped", "9"]) == 9
+    assert main(["lesson", "--stopped", "9", "--no-questions"]) == 0
+    makefile = (ROOT / "Makefile").read_text()
+    assert "lesson --stopped 9;" in makefile
 
 
 def test_answers_are_told_where_nobody_is_asked(cli: Cli) -> None:

@@ -63,6 +63,22 @@ def _level(ticks: list[tuple[float, str]], values: Any) -> None:
     assert min(abs(values[~ZERO] - zero)) > 0.05 * np.ptp(values)
 
 
+def test_no_line_joins_zero_to_what_is_not() -> None:
+    axis = LogAxis.around(VALUES)
+    x, y = axis.line(TIME, np.append(VALUES[:-1], 0.0))  # one alone at both ends
+    gaps = np.flatnonzero(np.isnan(x))
+    assert gaps.tolist() == np.flatnonzero(np.isnan(y)).tolist()
+    for run in np.split(y, gaps):
+        assert len(set((run[np.isfinite(run)] == axis.zero).tolist())) <= 1
+    assert set(x[np.isfinite(x)]) == set(TIME)
+    curves = {"a": (TIME.tolist(), VALUES.tolist())}
+    (path,) = re.findall(
+        r'<path d="([^"]+)" clip-path[^>]*stroke: #1f5fa8',
+        svg(Traces("", "time", "difference", curves, log=True)),
+    )
+    assert path.count("M") == 4
+
+
 def test_in_the_pictures_of_the_documentation() -> None:
     curves = {"a": (TIME.tolist(), VALUES.tolist()), "b": (TIME.tolist(), [0.0] * len(TIME))}
     text = svg(Traces("", "time", "difference", curves, log=True))

@@ -99,7 +99,7 @@ def on_each_backend(
     return results
 
 
-def show(page: Any, result: Any, as_json: bool, footer: str = "", ask: Any = None) -> int:
+def show(page: Any, result: Any, as_json: bool, footer: str = "", reader: Any = None) -> int:
     """Print a page, or what it was made from as JSON; the exit code."""
     if as_json:
         from ..report.as_json import dumps
@@ -108,5 +108,5 @@ def show(page: Any, result: Any, as_json: bool, footer: str = "", ask: Any = Non
     else:
         from ..report import terminal
 
-        terminal.show(page, footer, ask)
+        terminal.show(page, footer, reader)
     return 0 if page.holds else SAYS_NO

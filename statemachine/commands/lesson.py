@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError
@@ -36,6 +37,12 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="STATION",
         help="of the whole parser: where to begin, if not at the first",
     )
+    parser.add_argument(
+        "--stopped",
+        type=int,
+        metavar="CODE",
+        help="of the whole path: exit code if its reader types q (default: as if it ended there)",
+    )
     parser.set_defaults(run=run_path)
     named = parser.add_subparsers(metavar="name")
     for lesson in LESSONS.values():
@@ -64,6 +71,12 @@ def _add_shared(parser: argparse.ArgumentParser, default: Any = None) -> None:
         action="store_true",
         default=default or False,
         help="do not ask for predictions, do not wait",
+    )
+    parser.add_argument(
+        "--record",
+        default=default,
+        metavar="FILE",
+        help="keep your predictions in this file, with a score, to hand in",
     )
 
 
@@ -135,6 +148,7 @@ def run(options: argparse.Namespace) -> int:
             f"{PROGRAM} lesson --from {options.start}, or {PROGRAM} lesson {lesson.name}"
         )
     values = {option.key: getattr(options, option.key) for option in lesson.options}
+    reader = _reader(options, lesson)
     page, results = _compute(options, lesson, options.model, values)
     names = list(LESSONS)
     later = names[names.index(lesson.name) + 1 :]
@@ -142,7 +156,7 @@ def run(options: argparse.Namespace) -> int:
     from ..report.quiz import Stopped
 
     try:
-        return show(page, results, options.json, f"Next: {following}", _asking(options))
+        return show(page, results, options.json, f"Next: {following}", reader)
     except Stopped:
         return 0
 
@@ -153,15 +167,17 @@ _AFTER = f"Check yourself: {PROGRAM} lesson questions. Then: python exercises/st
 def run_path(options: argparse.Namespace) -> int:
     """All stations, one after the other."""
     from ..report import terminal
-    from ..report.quiz import Stopped, go_on
+    from ..report.quiz import Stopped
 
-    ask, code, everything = _asking(options), 0, {}
+    reader, code, everything = _reader(options, STATIONS[0]), 0, {}
     names = [lesson.name for lesson in STATIONS]
     first = names.index(options.start) if options.start else 0
     for number, lesson in enumerate(STATIONS[first:], start=first + 1):
         try:
-            if ask and number > first + 1:
-                go_on(f"station {number}: {lesson.question}")
+            if reader and number > first + 1:
+                reader.go_on(f"station {number}: {lesson.question}")
+            if reader:
+                reader.lesson = lesson.name
             values = {option.key: option.default for option in lesson.options}
             page, results = _compute(options, lesson, lesson.model, values)
             everything[lesson.name] = results
@@ -169,13 +185,13 @@ def run_path(options: argparse.Namespace) -> int:
             if not options.json:
                 title = f"{number} of {len(STATIONS)}: {page.title}"
                 last = number == len(STATIONS)
-                terminal.show(replace(page, title=title), _AFTER if last else "", ask)
+                terminal.show(replace(page, title=title), _AFTER if last else "", reader)
         except (Stopped, KeyboardInterrupt) as stop:
-            if ask:
+            if reader:
                 print(f"\nGo on later with: {PROGRAM} lesson --from {lesson.name}")
             if isinstance(stop, KeyboardInterrupt):
                 raise
-            return code
+            return code if options.stopped is None else options.stopped
     if options.json:
         from ..report.as_json import dumps
 
@@ -210,8 +226,15 @@ def _compute(
     return page, {name: {"result": t.result, "calls": t.calls} for name, t in taken.items()}
 
 
-def _asking(options: argparse.Namespace) -> Any:
-    """What puts a question to the reader; None where nobody would answer."""
-    from ..report.quiz import ask, can_ask
+def _reader(options: argparse.Namespace, lesson: Lesson) -> Any:
+    """Who answers the questions of a lesson; None where nobody would."""
+    from ..report.quiz import Reader, can_ask
 
-    return ask if can_ask() and not (options.json or options.no_questions) else None
+    asked = can_ask() and not (options.json or options.no_questions)
+    if options.record is None:
+        return Reader(lesson.name) if asked else None
+    if not asked:
+        raise BadInputError("--record keeps what you predict: it needs a terminal that asks")
+    from ..report.predictions import RecordedReader
+
+    return RecordedReader(Path(options.record), lesson.name)

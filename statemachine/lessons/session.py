@@ -106,23 +106,16 @@ class Play:
                 step(model, data)
                 watch.after_step(model, data)
 
-        facade = _Facade(statemachine.__name__)
-        facade.load = lambda *_args, **_options: self.model
-        facade.make_data = make
         looks = type(watch).before_step, type(watch).after_step
-        facade.step = step if looks == (Watch.before_step, Watch.after_step) else watched
+        one_call = looks == (Watch.before_step, Watch.after_step)
+        facade = ModuleType(statemachine.__name__)
+        vars(facade).update(vars(statemachine))
+        vars(facade).update(
+            load=lambda *_args, **_options: self.model,
+            make_data=make,
+            step=step if one_call else watched,
+        )
         return facade
-
-
-class _Facade(ModuleType):
-    """The package, some of its names replaced."""
-
-    load: Any
-    make_data: Any
-    step: Any
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(statemachine, name)
 
 
 @dataclass(frozen=True)

@@ -2,52 +2,141 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
+from ..backends import load as load_model
 from ..comparison.text import capital, count, duration
-from ..experiments import speed
-from ..lessons.in_turns import FEWEST, Ratio
+from ..engines import part
+from ..interface import Data, Model
+from ..interface.checks import as_count
 from ..page import Page, Question, Table, Text
+from ..scenarios.provenance import Provenance, provenance
+from ..scenarios.runs import Progress
 from ._words import differences, page_of, sentence, typed
+from .in_turns import FEWEST, Ratio, in_turns
 from .records import Session
+from .session import Play
+
+_ROUNDS = 20
+_MOST = 20_000  # steps of a round; between rounds the progress moves and Ctrl-C is heard
+_BULK, _AGAIN, _LOOP, _OWN = "in bulk", "in bulk again", "step by step", "as it comes"
 
 
-def run(play: Any, options: Mapping[str, Any], progress: Any) -> speed.Speed:
-    """In bulk and step by step, in turns."""
-    model = play.model
-    play()
-    return speed.run(model, steps=options["steps"], progress=progress)
-
-
-def code(model: Any, options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """The same steps by the clock, both ways, once."""
-    steps = options["steps"]
+    steps = as_count(options["steps"], "steps")
     return f"""\
 import time
 import statemachine as sm
 
 model = {load}
 
-def wall(calls, nstep):
+def start(model):
     data = sm.make_data(model)
     if model.keyframes:
         sm.reset(model, data, keyframe=0)
+    return data
+
+def wall(model, data, calls, nstep):
     began = time.perf_counter()
     for _ in range(calls):
         sm.step(model, data, nstep)
     return time.perf_counter() - began
 
 for name, seconds in (
-    ("in bulk", wall(calls=1, nstep={steps})),
-    ("step by step", wall(calls={steps}, nstep=1)),
+    ("in bulk", wall(model, start(model), calls=1, nstep={steps})),
+    ("step by step", wall(model, start(model), calls={steps}, nstep=1)),
 ):
     factor = {steps} * model.timestep / seconds
     print(f"{{name}}: {{seconds:.3f}} s, {{factor:.0f}} times real time")
 """
 
 
-def page(results: Mapping[str, speed.Speed], session: Session) -> Page:
+@dataclass(frozen=True)
+class Speed:
+    """Wall-clock times of the same simulated time, its rounds taken in turns.
+
+    Attributes:
+        nstep: Steps of each run; simulated: their simulated time [s].
+        bulk: Wall time of `step(model, data, n)`, once a round [s].
+        one_by_one: Wall time of as many single calls from a Python loop [s].
+        as_it_comes: Wall time in bulk of the engine without the emulated servo, as its own
+            users drive it [s]; None where nothing is emulated.
+        loop: Cost of single calls over that of one call, round by round.
+        null: Cost of one call over that of the same call once more: the noise.
+        bulk_rounds: Wall time of each round in bulk [s].
+    """
+
+    nstep: int
+    simulated: float
+    bulk: float
+    one_by_one: float
+    as_it_comes: float | None
+    loop: Ratio
+    null: Ratio
+    bulk_rounds: tuple[float, ...]
+    provenance: Provenance
+
+    @property
+    def bulk_factor(self) -> float:
+        """Simulated over wall time, in bulk."""
+        return self.simulated / self.bulk
+
+    @property
+    def one_by_one_factor(self) -> float:
+        """Simulated over wall time, step by step."""
+        return self.simulated / self.one_by_one
+
+    @property
+    def told_apart(self) -> bool:
+        """Whether single calls and one call differ by more than the noise."""
+        return self.loop.differs_from(self.null)
+
+
+def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Speed:
+    """Measure the same steps again with the code's own functions, in rounds, the ways in turns."""
+    model, total = play.model, options["steps"]
+    names = play()
+    size = max(1, min(total // _ROUNDS, _MOST))
+    rounds = [size] * (total // size) + [total % size] * bool(total % size)
+    models = {_BULK: model, _AGAIN: model, _LOOP: model}
+    if part(model.backend, "as_it_comes"):
+        as_it_comes = load_model(model.path, backend=model.backend, defaults="engine")
+        models[_OWN] = as_it_comes.replace(gravity=model.gravity, timestep=model.timestep)
+    ways = {
+        name: _way(names["wall"], each, names["start"](each), rounds, bulk=name != _LOOP)
+        for name, each in models.items()
+    }
+    walls = in_turns(ways, len(rounds), progress)
+    return Speed(
+        nstep=total,
+        simulated=total * model.timestep,
+        bulk=sum(walls[_BULK]),
+        one_by_one=sum(walls[_LOOP]),
+        as_it_comes=sum(walls[_OWN]) if _OWN in walls else None,
+        loop=Ratio.of(_LOOP, walls[_LOOP], walls[_BULK]),
+        null=Ratio.of(_AGAIN, walls[_AGAIN], walls[_BULK]),
+        bulk_rounds=tuple(walls[_BULK]),
+        provenance=provenance(model),
+    )
+
+
+def _way(
+    wall: Callable[..., float], model: Model, data: Data, rounds: Sequence[int], bulk: bool
+) -> Callable[[], None]:
+    """What takes a Data through the rounds, one at each call: together they are one run."""
+    remaining = iter(rounds)
+
+    def advance() -> None:
+        size = next(remaining)
+        wall(model, data, *((1, size) if bulk else (size, 1)))
+
+    return advance
+
+
+def page(results: Mapping[str, Speed], session: Session) -> Page:
     """Times and factors; they are this machine's, now."""
     first = next(iter(results.values()))
     blocks: list[Any] = [
@@ -99,7 +188,7 @@ def page(results: Mapping[str, speed.Speed], session: Session) -> Page:
     return page_of("The speed budget", results, blocks)
 
 
-def _question(first: speed.Speed) -> Question:
+def _question(first: Speed) -> Question:
     slower = first.told_apart and first.loop.median > 1
     return Question(
         "how much longer does a Python loop with one call a step take than one call for all steps?",
@@ -109,7 +198,7 @@ def _question(first: speed.Speed) -> Question:
     )
 
 
-def _told(result: speed.Speed) -> str:
+def _told(result: Speed) -> str:
     """Whether the two ways can be told apart, in a sentence."""
     if result.told_apart:
         text = f"step by step takes {result.loop.median:.2f} times as long as in bulk"
@@ -127,7 +216,7 @@ def _spread(ratio: Ratio) -> str:
     return f"{ratio.median:.2f}  ({ratio.low:.2f} to {ratio.high:.2f})"
 
 
-def _against(one: speed.Speed, two: speed.Speed) -> str:
+def _against(one: Speed, two: Speed) -> str:
     """How much longer a step takes on another engine; the engines were measured one by one."""
     ratio = Ratio.of("", two.bulk_rounds, one.bulk_rounds)
     if not (ratio.differs_from(one.null) and ratio.differs_from(two.null)):
@@ -135,7 +224,7 @@ def _against(one: speed.Speed, two: speed.Speed) -> str:
     return f"{ratio.median:.1f} ×  ({ratio.low:.1f} to {ratio.high:.1f})"
 
 
-def _own(result: speed.Speed) -> str:
+def _own(result: Speed) -> str:
     if result.as_it_comes is None:
         return "the same"
     return _cell(result.as_it_comes, result.simulated / result.as_it_comes)

@@ -54,7 +54,8 @@ def _traces(axes: Any, picture: Traces) -> None:
         engine, thing = parts[name]
         style = ("-", "--", ":", "-.")[engines.index(engine) % 4]
         colour = _COLOURS[things.index(thing) % len(_COLOURS)]
-        axes.plot(x, log.places(np.asarray(y)) if log else y, style, color=colour, label=name)
+        along, up = log.line(np.asarray(x), np.asarray(y)) if log else (x, y)
+        axes.plot(along, up, style, color=colour, label=name)
     if log is not None:
         axes.set_ylim(log.bottom, log.high)
         ticks, labels = zip(*log.ticks(_POWERS), strict=True)

@@ -68,6 +68,17 @@ class LogAxis:
             found = np.clip(np.log10(values), self.low, self.high)
         return found if self.zero is None else np.where(values == 0, self.zero, found)
 
+    def line(self, across: Array, values: Array) -> tuple[Array, Array]:
+        """Points of a line through values (n,); no number where it would join zero to another.
+
+        Between those two lie all powers of ten, and the line was at none of them.
+        """
+        runs = np.split(np.arange(len(values)), np.flatnonzero(np.diff(values == 0)) + 1)
+        # A value alone becomes a line of no length, which is drawn as a dot.
+        ends = [np.append(run if len(run) > 1 else np.repeat(run, 2), len(values)) for run in runs]
+        rows = np.concatenate(ends)
+        return np.append(across, np.nan)[rows], np.append(self.places(values), np.nan)[rows]
+
     def ticks(self, most: int) -> list[tuple[float, str]]:
         """Places and labels upwards: zero, and at most so many powers of ten, evenly spaced."""
         powers = list(range(math.floor(self.high + 1e-9), math.ceil(self.low - 1e-9) - 1, -1))

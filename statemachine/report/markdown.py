@@ -25,7 +25,10 @@ def markdown(page: Page, picture: Callable[[Picture], str], level: int = 1) -> s
 
 
 def body(page: Page, picture: Callable[[Picture], str]) -> Iterator[str]:
-    """The page under its heading, block by block."""
+    """The page under its heading, block by block.
+
+    What follows a question is folded away, up to the next one: it would give the answer away.
+    """
     yield f"*{_escaped(page.origin)}*"
     blocks = list(page.blocks)
     while blocks:
@@ -33,10 +36,13 @@ def body(page: Page, picture: Callable[[Picture], str]) -> Iterator[str]:
         if not isinstance(block, Question):
             yield block_as_markdown(block, picture)
             continue
-        hidden: list[Block] = []  # what would give the answer away
-        while blocks and isinstance(blocks[0], Verdict if block.always else Printed):
-            hidden.append(blocks.pop(0))
-        yield _question(block, [block_as_markdown(each, picture) for each in hidden])
+        says, inside = Verdict if block.always else Printed, []
+        while blocks and isinstance(blocks[0], says):
+            inside.append(block_as_markdown(blocks.pop(0), picture))
+        inside.append(answer(block))
+        while blocks and not isinstance(blocks[0], Question):
+            inside.append(block_as_markdown(blocks.pop(0), picture))
+        yield f"{asked(block)}\n\n{_folded(inside)}"
 
 
 def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
@@ -52,7 +58,7 @@ def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
                 for names, text in together(by_engine)
             )
         case Question():
-            return _question(block, [])
+            return f"{asked(block)}\n\n{_folded([answer(block)])}"
         case Table():
             return _table(block)
         case Verdict(text, holds):
@@ -78,11 +84,9 @@ def answer(block: Question) -> str:
     return f"{letter}{_escaped(right)}. {_escaped(block.because)}"
 
 
-def _question(block: Question, hidden: list[str]) -> str:
-    inside = "\n\n".join([*hidden, answer(block)])
-    return (
-        f"{asked(block)}\n\n<details><summary>What the run says</summary>\n\n{inside}\n\n</details>"
-    )
+def _folded(inside: list[str]) -> str:
+    text = "\n\n".join(filter(None, inside))
+    return f"<details><summary>What the run says</summary>\n\n{text}\n\n</details>"
 
 
 def _table(block: Table) -> str:

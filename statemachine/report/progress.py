@@ -30,6 +30,7 @@ def progress(what: str) -> Iterator[Callable[[float], None]]:
         Remaining(),
         console=Console(stderr=True),
         transient=True,
+        redirect_stdout=False,  # while it starts, a lesson may take what its code prints
     )
     task = bar.add_task(what, total=1.0)
     began = time.monotonic()

@@ -1,14 +1,17 @@
-"""A question put to a reader who sits at a terminal."""
+"""A reader who sits at a terminal: shown a screenful at a time, and asked questions."""
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
 import textwrap
+from collections.abc import Iterator
 
 from ..page import LETTERS, Question
 
 _WIDTH_MOST = 100
+_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 
 
 class Stopped(Exception):  # noqa: N818  (nothing is wrong)
@@ -20,56 +23,99 @@ def can_ask() -> bool:
     return sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
 
 
-def ask(question: Question) -> int | None:
-    """The number of the choice; None if the reader passes (Enter, Ctrl-D).
+class Reader:
+    """Somebody at a terminal; nothing scrolls out of the window before they have seen it."""
 
-    Raises:
-        Stopped: The reader typed q.
-    """
-    letters = LETTERS[: len(question.choices)]
-    print()
-    _print(question.text if question.always else f"Before you read on: {question.text}")
-    for letter, choice in zip(letters, question.choices, strict=True):
-        _print(f"{letter}) {choice}", indent=2)
-    while True:
-        typed = _typed(f"Your prediction ({letters[0]}-{letters[-1]}, Enter to pass, q to stop): ")
-        if not typed:
-            return None
-        if typed in letters and len(typed) == 1:
-            return letters.index(typed)
-        print(f"Please type one of {', '.join(letters)}.")
+    def __init__(self, lesson: str = "") -> None:
+        self.lesson = lesson  # whose questions are asked now
+        self._rows = 0  # shown since they last typed something
+
+    def read(self, text: str) -> None:
+        """Show text; wait first if the window has no room for it under what is new there.
+
+        Text that no window of this height has room for is shown in parts.
+
+        Raises:
+            Stopped: The reader typed q, or Ctrl-D, when it waited.
+        """
+        lines = text.splitlines(keepends=True)
+        if self._rows and self._rows + sum(map(_rows, lines)) > _room():
+            self.go_on()
+        for line in lines:
+            if self._rows and self._rows + _rows(line) > _room():
+                self.go_on()
+            self._rows += _rows(line)
+            sys.stdout.write(line)
+        sys.stdout.flush()
+
+    def ask(self, question: Question) -> int | None:
+        """The number of the choice; None if the reader passes (Enter, Ctrl-D).
+
+        Raises:
+            Stopped: The reader typed q.
+        """
+        self.read("\n" + "".join(f"{line}\n" for line in _asked(question)))
+        letters = LETTERS[: len(question.choices)]
+        while True:
+            typed = self._typed(
+                f"Your prediction ({letters[0]}-{letters[-1]}, Enter to pass, q to stop): "
+            )
+            if not typed:
+                return None
+            if typed in letters and len(typed) == 1:
+                return letters.index(typed)
+            print(f"Please type one of {', '.join(letters)}.")
+
+    def go_on(self, what: str = "more") -> None:
+        """Wait until the reader wants to see `what`.
+
+        Raises:
+            Stopped: The reader typed q, or Ctrl-D.
+        """
+        while self._typed(f"Enter for {what} (q to stop) ", end="q"):
+            pass
+
+    def _typed(self, prompt: str, end: str = "") -> str:
+        """What the reader types, in small letters; `end` if there is nothing more to come."""
+        try:
+            typed = input(prompt).strip().lower().rstrip(")")
+        except EOFError:
+            print()
+            typed = end
+        if typed in ("q", "quit", "exit"):
+            raise Stopped
+        self._rows = 0
+        return typed
 
 
-def go_on(what: str) -> None:
-    """Wait until the reader wants to see `what`.
-
-    Raises:
-        Stopped: The reader typed q, or Ctrl-D.
-    """
-    if _typed(f"Enter for {what} (q to stop) ", end="q"):
-        go_on(what)
+def _room() -> int:
+    """Rows of the window above a prompt, which takes two where it is narrow."""
+    window = shutil.get_terminal_size()
+    return max(window.lines - (1 if window.columns >= 80 else 2), 2)
 
 
-def _typed(prompt: str, end: str = "") -> str:
-    """What the reader types, in small letters; `end` if there is nothing more to come."""
-    try:
-        typed = input(prompt).strip().lower().rstrip(")")
-    except EOFError:
-        print()
-        typed = end
-    if typed in ("q", "quit", "exit"):
-        raise Stopped
-    return typed
+def _rows(line: str) -> int:
+    """How many rows of the window a line takes."""
+    from rich.cells import cell_len
+
+    columns = max(shutil.get_terminal_size().columns, 1)
+    return max(-(-cell_len(_COLOUR.sub("", line.rstrip("\n"))) // columns), 1)
 
 
-def _print(text: str, indent: int = 0) -> None:
+def _asked(question: Question) -> Iterator[str]:
+    """A question and its choices in lines of the window's width."""
+    text = question.text if question.always else f"Before you read on: {question.text}"
+    yield from _wrapped(text)
+    for letter, choice in zip(LETTERS, question.choices, strict=False):
+        yield from _wrapped(f"{letter}) {choice}", indent=2)
+
+
+def _wrapped(text: str, indent: int = 0) -> list[str]:
     width = min(shutil.get_terminal_size().columns, _WIDTH_MOST)
     first = " " * indent
-    print(
-        textwrap.fill(
-            text,
-            max(width, 20),
-            initial_indent=first,
-            subsequent_indent=first and first + "   ",
-        )
+    return textwrap.wrap(
+        text,
+        max(width, 20),
+        initial_indent=first,
+        subsequent_indent=first and first + "   ",
     )

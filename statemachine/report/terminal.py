@@ -12,6 +12,8 @@ from ..page import LETTERS, Block, Code, Page, Printed, Question, Table, Text, V
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from .quiz import Reader
+
 # Spellings for where there is no Unicode; what is not here becomes a question mark.
 ASCII = str.maketrans(
     {
@@ -41,37 +43,41 @@ _WIDTH_PIPED = 80
 _WIDTH_MOST = 100
 
 
-def show(page: Page, footer: str = "", ask: Callable[[Question], int | None] | None = None) -> None:
+def show(page: Page, footer: str = "", reader: Reader | None = None) -> None:
     """Print a page on standard output, and a last line under it.
 
     Args:
         page: The page.
         footer: The last line.
-        ask: Puts a question to the reader and returns the number of the choice; the rest of
-            the page waits for it. Without, questions are left out.
+        reader: Somebody who answers its questions, and is shown a screenful at a time; the
+            rest of the page waits for each answer. Without, questions are left out.
     """
-    _write([], heading=page)
+    tell = reader.read if reader else sys.stdout.write
+    _write(tell, [], heading=page)
     said: tuple[Question, int] | None = None
     answered: list[bool] = []
-    for block in page.blocks:
+    for k, block in enumerate(page.blocks):
         if isinstance(block, Question):
-            choice = ask(block) if ask else None
+            choice = reader.ask(block) if reader else None
             said = None if choice is None else (block, choice)
             answered += [choice == block.right] if said else []
-            if ask is None and block.always:
+            if reader is None and block.always:
                 right = "none of the above" if block.right is None else block.choices[block.right]
-                _write([Text(block.text), Text(f"Answer: {right}. {block.because}")])
+                _write(tell, [Text(block.text), Text(f"Answer: {right}. {block.because}")])
             continue
-        _write([block])
-        if said:  # first what the run says, then who was right
-            _write([_judged(*said)])
+        _write(tell, [block])
+        if reader and said:  # first what the run says, then who was right
+            _write(tell, [_judged(*said)])
             said = None
+            if k + 1 < len(page.blocks) and not isinstance(page.blocks[k + 1], Question):
+                reader.go_on()
     if len(answered) > 1:
-        _write([Text(f"You had {sum(answered)} of {len(answered)} right.")])
+        _write(tell, [Text(f"You had {sum(answered)} of {len(answered)} right.")])
     if footer:
-        _write([], footer=footer)
+        _write(tell, [], footer=footer)
     else:
-        print(flush=True)
+        tell("\n")
+    sys.stdout.flush()
 
 
 def spelled(error: UnicodeError) -> tuple[str, int]:
@@ -93,7 +99,12 @@ def _judged(question: Question, choice: int) -> Verdict:
     return Verdict(f"you said {LETTERS[choice]}; it is {right}. {question.because}", False)
 
 
-def _write(blocks: Sequence[Block], heading: Page | None = None, footer: str = "") -> None:
+def _write(
+    tell: Callable[[str], object],
+    blocks: Sequence[Block],
+    heading: Page | None = None,
+    footer: str = "",
+) -> None:
     from rich.console import Console
 
     console = Console(highlight=False, emoji=False)
@@ -106,7 +117,7 @@ def _write(blocks: Sequence[Block], heading: Page | None = None, footer: str = "
     text = captured.get()
     if piped and text:  # cells are padded with blanks that only a terminal needs
         text = "\n".join(line.rstrip() for line in text.splitlines()) + "\n"
-    sys.stdout.write(text)
+    tell(text)
     sys.stdout.flush()
 
 
