@@ -9,10 +9,21 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+import tests.exercises.forward
+import tests.exercises.gravity
+import tests.exercises.replay
+import tests.exercises.state  # noqa: F401  (they fill WRONG)
+from statemachine.conventions.phrasebook import CONCEPTS
+from statemachine.grading.mutants.faults import FAULTS
+from statemachine.lessons import LESSONS
+from statemachine.report.cheat_sheet import OURS, REMEMBER
+
 from .conftest import ROOT
+from .exercises import WRONG
 
 sys.path.insert(0, str(ROOT / "teaching"))
 import make_kits  # pyright: ignore[reportMissingImports]
@@ -98,6 +109,32 @@ def _zip(folder: Path, built: Path) -> Path:
         for name in ("setup.sh", "run_autograder"):
             assert kit.getinfo(name).external_attr >> 16 & 0o111
     return target
+
+
+def test_the_mistakes_of_the_teachers_page_are_those_that_are_caught() -> None:
+    text = (ROOT / "docs" / "teaching.md").read_text()
+    rows = re.findall(r'^\| [^|]+ \| "([^"|]+)" \| `([^`|]+)` \|$', text, re.M)
+    assert len(rows) >= 10
+    for said, fault in rows:
+        assert any(said in attempt.message for attempt in WRONG), said
+        assert fault in FAULTS
+
+
+def test_what_to_remember_is_of_the_stations() -> None:
+    assert tuple(OURS) == CONCEPTS
+    assert {lesson for lesson, _ in REMEMBER} <= set(LESSONS)
+
+
+def test_our_column_of_the_cheat_sheet_runs(backend: str) -> None:
+    program = "\n".join(OURS.values()).replace(
+        '"so101/scene"', f'"so101/scene", backend="{backend}"'
+    )
+    names: dict[str, Any] = {}
+    exec(program, names)
+    assert len(names["worlds"]) == 3
+    assert names["d"].time == 0  # back where it was saved
+    for data in (names["d"], *names["worlds"]):
+        data.close()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a shell's syntax")
