@@ -11,6 +11,13 @@ from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
+class Heading:
+    """A heading within a page."""
+
+    text: str
+
+
+@dataclass(frozen=True)
 class Text:
     """A paragraph."""
 
@@ -127,7 +134,7 @@ class Verdict:
 
 
 Picture = Traces | Slots | Pipeline
-Block = Text | Code | Printed | Question | Table | Verdict | Traces | Slots | Pipeline
+Block = Heading | Text | Code | Printed | Question | Table | Verdict | Traces | Slots | Pipeline
 
 
 @dataclass(frozen=True)

@@ -168,8 +168,7 @@ def run_path(options: argparse.Namespace) -> int:
         try:
             if reader and number > first + 1:
                 reader.go_on(f"station {number}: {lesson.question}")
-            values = {option.key: option.default for option in lesson.options}
-            page, results = _compute(options, lesson, lesson.model, values)
+            page, results = _compute(options, lesson, lesson.model, {})
             everything[lesson.name] = results
             code = code if page.holds else SAYS_NO
             if not options.json:
@@ -195,6 +194,8 @@ def _compute(
     """The page of a station, and the results that it was made from, by backend."""
     from ..lessons.session import page_of_lesson, take
 
+    if options.json:
+        values |= lesson.whole
     taken = on_each_backend(
         options,
         lesson.name,

@@ -49,7 +49,7 @@ def make_path(
                 if backends:
                     raise
                 continue
-            taken[backend] = take(lesson, model, backend)
+            taken[backend] = take(lesson, model, backend, lesson.whole)
         page = page_of_lesson(lesson, taken)
         name, typed = f"{number:02}-{lesson.name}", f"statemachine lesson {lesson.name}"
         written.append(_write(folder, name, page, lesson.question, typed))

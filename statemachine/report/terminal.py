@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from ..page import LETTERS, Block, Code, Page, Printed, Question, Table, Text, Verdict
+from ..page import LETTERS, Block, Code, Heading, Page, Printed, Question, Table, Text, Verdict
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -137,6 +137,9 @@ def _print(console: Console, blocks: Sequence[Block], heading: Page | None, foot
         console.print(f"[dim]{escape(heading.origin)}[/]")
     for block in blocks:
         match block:
+            case Heading(text):
+                console.print()
+                console.print(f"[bold]{escape(text)}[/]")
             case Text(text):
                 console.print()
                 console.print(escape(text))
