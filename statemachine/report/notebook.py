@@ -16,11 +16,13 @@ from ..backends import load
 from ..errors import MissingEngineError, unknown_name
 from ..installed import DEFAULT
 from ..lessons import LESSONS, module
+from ..lessons.pictures import with_picture
 from ..lessons.records import Lesson
 from ..lessons.session import page_of_lesson, take
-from ..page import Code, Page, Picture, Printed, Question, Text
+from ..page import Code, Page, Picture, Printed, Question, RobotPicture, Text
 from .figures import svg
 from .markdown import answer, asked, block_as_markdown
+from .robot_pictures import webp
 
 _START = """\
 from statemachine.report.notebook import station
@@ -82,7 +84,8 @@ def station(name: str, backend: str = DEFAULT, **options: Any) -> Shown:
     for key in options:
         if key not in known:
             raise unknown_name("option", key, known)
-    return Shown(_page(lesson, backend, options))
+    page = _page(lesson, backend, options)
+    return Shown(page if options else with_picture(page, name))
 
 
 def build() -> str:
@@ -131,12 +134,14 @@ def _opening(page: Page) -> str:
 
 
 def _inline(picture: Picture) -> str:
-    """A picture as a data address; none without matplotlib."""
+    """A picture as a data address; none without what draws it."""
+    robot = isinstance(picture, RobotPicture)
     try:
-        encoded = base64.b64encode(svg(picture).encode()).decode()
+        content = webp(picture) if robot else svg(picture).encode()
     except MissingEngineError:
         return ""
-    return f"data:image/svg+xml;base64,{encoded}"
+    encoded = base64.b64encode(content).decode()
+    return f"data:image/{'webp' if robot else 'svg+xml'};base64,{encoded}"
 
 
 def _cell(name: str, kind: str, source: str) -> dict[str, Any]:
