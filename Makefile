@@ -15,7 +15,7 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13 python3.14; 
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null \
 	&& { echo $$p; break; }; done)
 
-.PHONY: help lesson test test-slow test-pythons test-newest check format hooks bench fuzz picture extras report urdf traces docs notebook clean
+.PHONY: help lesson test test-slow test-pythons test-newest check format hooks bench fuzz picture extras report urdf traces docs notebook student-kit autograder clean
 
 help:
 	@sed -n 's/^# make /  make /p' Makefile
@@ -120,6 +120,11 @@ docs: $(VENV)/test.stamp
 # make notebook     write notebooks/path.ipynb anew from the lessons
 notebook: $(VENV)/test.stamp
 	@$(BIN)/python notebooks/make_notebook.py
+
+# make student-kit  a zip for students, without solutions: dist/statemachine-student-kit.zip
+# make autograder   a zip for Gradescope: dist/statemachine-autograder.zip
+student-kit autograder: $(VENV)/run.stamp
+	@$(BIN)/python teaching/make_kits.py $@
 
 # make clean        remove what the others made
 clean:

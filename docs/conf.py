@@ -17,6 +17,8 @@ extensions = ["myst_parser"]
 myst_enable_extensions = ["colon_fence"]
 html_theme = "furo"
 html_title = f"statemachine {version}"
+html_static_path = ["_static"]
+html_css_files = ["cheat-sheet.css"]
 html_show_sourcelink = html_copy_source = False  # the sources are generated
 smartquotes = False  # --realtime is no dash
 exclude_patterns = ["_build"]

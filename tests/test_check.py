@@ -38,7 +38,7 @@ for _module in ("gravity", "state", "forward", "replay"):
     importlib.import_module(f"tests.exercises.{_module}")
 
 STUDENT = ROOT / "exercises" / "step_loop.py"
-SOLUTION = ROOT / "exercises" / "solutions" / "step_loop.py"
+SOLUTION = ROOT / "teaching" / "solutions" / "step_loop.py"
 
 
 def _name(attempt: Attempt) -> str:

@@ -20,7 +20,7 @@ from statemachine.report import gradescope
 from .conftest import ROOT, Cli
 
 TEMPLATE = ROOT / "exercises" / "step_loop.py"
-SOLUTION = ROOT / "exercises" / "solutions" / "step_loop.py"
+SOLUTION = ROOT / "teaching" / "solutions" / "step_loop.py"
 
 
 @pytest.fixture
@@ -194,13 +194,16 @@ def test_one_file_for_gradescope(cli: Cli, tmp_path: Path) -> None:
     done = cli("check", str(tmp_path / "none.py"), "--gradescope", str(results))
     assert done.returncode == 2
     assert "there is no file none.py" in results.read_text()
+    done = cli("check", str(tmp_path), "--gradescope", str(results))
+    assert done.returncode == 2
+    assert "no Python file in it has one of the functions" in results.read_text()
 
 
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
         (["exercises/step_loop.py", "--csv", "g.csv"], "several files, or a folder"),
-        (["exercises", "--gradescope", "r.json"], "goes with one FILE"),
+        (["exercises/a.py", "exercises/b.py", "--gradescope", "r.json"], "goes with one FILE"),
         (["--mutants", "exercises/test_arm.py", "--jobs", "2"], "several files, or a folder"),
         ([], "expected one of FILE and --mutants"),
     ],

@@ -13,7 +13,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.errors import BadInputError
-from statemachine.experiments import fingertip, forward, replay, state
+from statemachine.experiments import fingertip, forward, replay
 from statemachine.lessons import in_turns, session
 from statemachine.lessons._fall import Forces, milestones
 from statemachine.lessons.speed import Speed
@@ -171,7 +171,7 @@ def test_state_of_every_type_of_joint(tmp_path: Path) -> None:
         "<body><joint name='b' type='ball'/><geom size='1'/></body>"
         "<body><joint name='s' type='slide'/><geom size='1'/></body></body></worldbody></mujoco>"
     )
-    joints = {joint.name: joint for joint in state.run(sm.load(file)).joints}
+    joints = {joint.name: joint for joint in lesson_result("state", sm.load(file)).joints}
     assert (joints["b"].qpos_start, joints["b"].qpos_stop) == (7, 11)
     assert (joints["b"].qvel_start, joints["b"].qvel_stop) == (6, 9)
     assert joints["s"].type == "slide"

@@ -26,7 +26,7 @@ from statemachine.report import mutants as report
 from .conftest import ROOT, Cli
 
 EXERCISE = ROOT / "exercises" / "test_arm.py"
-SOLUTION = ROOT / "exercises" / "solutions" / "test_arm.py"
+SOLUTION = ROOT / "teaching" / "solutions" / "test_arm.py"
 # The test of the solution that was written against each fault.
 WRITTEN_AGAINST = {
     "xyzw": "test_a_quarter_turn_as_a_quaternion",

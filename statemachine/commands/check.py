@@ -55,7 +55,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--gradescope",
         default=None,
         metavar="RESULTS",
-        help="of one file: write the judgement as Gradescope's results.json, too",
+        help="of one file, or a folder with one: write Gradescope's results.json, too",
     )
     _mutants.add(parser)
     add_json(parser, "judgement")
@@ -66,9 +66,10 @@ def run(options: argparse.Namespace) -> int:
     """Judge, and show."""
     if (not options.files) == (options.mutants is None):
         options.parser.error("expected one of FILE and --mutants TESTFILE")
-    several = len(options.files) > 1 or any(Path(file).is_dir() for file in options.files)
+    folder = any(Path(file).is_dir() for file in options.files)
+    several = len(options.files) > 1 or (folder and not options.gradescope)
     if (options.mutants is not None or several) and options.gradescope:
-        options.parser.error("--gradescope goes with one FILE")
+        options.parser.error("--gradescope goes with one FILE, or one FOLDER")
     if not several and (options.csv or options.jobs is not None):
         options.parser.error("--csv and --jobs go with several files, or a folder")
     if options.mutants is not None:
@@ -81,12 +82,14 @@ def run(options: argparse.Namespace) -> int:
 def _one(options: argparse.Namespace) -> int:
     """One student's file."""
     from ..errors import BadInputError
-    from ..grading import exercise
+    from ..grading import classroom, exercise
     from ..report import grade as words
     from ..report.progress import progress
 
     (file,) = options.files
     try:
+        if Path(file).is_dir():
+            file = classroom.submission_in(Path(file))
         with progress("check") as report:
             grade = exercise.run(file, options.backend, options.time_limit, report)
     except BadInputError as error:

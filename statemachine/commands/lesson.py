@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError
@@ -70,6 +71,12 @@ def _add_shared(parser: argparse.ArgumentParser, default: Any = None) -> None:
         action="store_true",
         default=default or False,
         help="do not ask for predictions, do not wait",
+    )
+    parser.add_argument(
+        "--record",
+        default=default,
+        metavar="FILE",
+        help="keep your predictions in this file, with a score, to hand in",
     )
 
 
@@ -141,6 +148,7 @@ def run(options: argparse.Namespace) -> int:
             f"{PROGRAM} lesson --from {options.start}, or {PROGRAM} lesson {lesson.name}"
         )
     values = {option.key: getattr(options, option.key) for option in lesson.options}
+    reader = _reader(options, lesson)
     page, results = _compute(options, lesson, options.model, values)
     names = list(LESSONS)
     later = names[names.index(lesson.name) + 1 :]
@@ -148,7 +156,7 @@ def run(options: argparse.Namespace) -> int:
     from ..report.quiz import Stopped
 
     try:
-        return show(page, results, options.json, f"Next: {following}", _reader(options))
+        return show(page, results, options.json, f"Next: {following}", reader)
     except Stopped:
         return 0
 
@@ -161,13 +169,15 @@ def run_path(options: argparse.Namespace) -> int:
     from ..report import terminal
     from ..report.quiz import Stopped
 
-    reader, code, everything = _reader(options), 0, {}
+    reader, code, everything = _reader(options, STATIONS[0]), 0, {}
     names = [lesson.name for lesson in STATIONS]
     first = names.index(options.start) if options.start else 0
     for number, lesson in enumerate(STATIONS[first:], start=first + 1):
         try:
             if reader and number > first + 1:
                 reader.go_on(f"station {number}: {lesson.question}")
+            if reader:
+                reader.lesson = lesson.name
             values = {option.key: option.default for option in lesson.options}
             page, results = _compute(options, lesson, lesson.model, values)
             everything[lesson.name] = results
@@ -219,8 +229,15 @@ def _compute(
     return page, {name: {"result": t.result, "calls": t.calls} for name, t in taken.items()}
 
 
-def _reader(options: argparse.Namespace) -> Any:
-    """Who answers the questions; None where nobody would."""
+def _reader(options: argparse.Namespace, lesson: Lesson) -> Any:
+    """Who answers the questions of a lesson; None where nobody would."""
     from ..report.quiz import Reader, can_ask
 
-    return Reader() if can_ask() and not (options.json or options.no_questions) else None
+    asked = can_ask() and not (options.json or options.no_questions)
+    if options.record is None:
+        return Reader(lesson.name) if asked else None
+    if not asked:
+        raise BadInputError("--record keeps what you predict: it needs a terminal that asks")
+    from ..report.predictions import RecordedReader
+
+    return RecordedReader(Path(options.record), lesson.name)

@@ -91,6 +91,18 @@ def submissions(paths: Sequence[str | os.PathLike[str]]) -> list[Submission]:
     return list(found.values())
 
 
+def submission_in(folder: Path) -> Path:
+    """The one file in a student's folder that has functions of the exercise.
+
+    Raises:
+        BadInputError: There is none, or more than one.
+    """
+    (found,) = _in_entry(folder)
+    if found.path is None:
+        raise BadInputError(found.refusal)
+    return found.path
+
+
 def _in_entry(entry: Path) -> list[Submission]:
     if entry.is_file():
         return [Submission(entry.name, entry)] if entry.suffix == ".py" else []

@@ -41,7 +41,8 @@ _STARTS = 0.02  # rad/s² or m/s²; a joint beyond it is about to move
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """The same seconds with the servos on and off; ctrl is never written."""
-    scalar_joint(model, options["joint"])
+    scalar_joint(model, options["joint"])  # says what is wrong with it
+    steps_in(model, options["seconds"])  # and this
     off = ", ".join(f"{name}={value}" for name, value in SCENARIOS["gravity"].options.items())
     loop, nstep = spans(model, milestones(options["seconds"]), options["seconds"])
     return f"""\

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..comparison.text import count, degrees, duration, millimetres
-from ..experiments import forward, objects, pace, replay, state
+from ..experiments import forward, pace, replay
 from ..interface import Model
 from ..page import Page, Question, Text, Verdict
 from ..scenarios.provenance import Provenance, provenance
 from ..scenarios.runs import Progress, part_of
-from . import LESSONS, gravity
+from . import LESSONS, gravity, objects, state
 from ._words import page_of, where
 from .records import Session
 from .session import Play, take

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
-from ..experiments import state
+from ..engines import part
+from ..engines.parts import AsItComes, Term
+from ..interface import JointType, Model, make_data, reset
 from ..page import Page, Question, Slots, Table, Text
+from ..scenarios.provenance import Provenance, provenance
+from ..scenarios.runs import Progress
 from ._words import differences, page_of, typed
 from .records import Session
+from .session import Play
 
 
-def run(play: Any, options: Mapping[str, Any], progress: Any) -> state.Layout:
-    """Read the layout."""
-    model = play.model
-    play()
-    return state.run(model)
-
-
-def code(model: Any, options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """Sizes, and the slots of each joint."""
     return f"""\
 import statemachine as sm
@@ -30,7 +29,81 @@ for j, name in enumerate(model.joint_names):
 """
 
 
-def page(results: Mapping[str, state.Layout], session: Session) -> Page:
+@dataclass(frozen=True)
+class Joint:
+    """One joint's slots: qpos[qpos_start:qpos_stop] and qvel[qvel_start:qvel_stop]."""
+
+    name: str
+    type: str
+    qpos_start: int
+    qpos_stop: int
+    qvel_start: int
+    qvel_stop: int
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Sizes and addresses of a model's state.
+
+    Attributes:
+        keyframe_time: `data.time` after a reset to keyframe 0; None without one.
+        keyframe: Its name.
+        fresh_time: `data.time` of a fresh Data.
+        terms: What the engine itself calls all this, where that differs.
+    """
+
+    nq: int
+    nv: int
+    nu: int
+    nbody: int
+    joints: tuple[Joint, ...]
+    fresh_time: float
+    keyframe: str | None
+    keyframe_time: float | None
+    terms: tuple[Term, ...]
+    provenance: Provenance
+
+
+def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Layout:
+    """Read the layout off the Model, and the time off a Data at keyframe 0."""
+    play()
+    model = play.model
+    joints = []
+    for name, kind, place, dof in zip(
+        model.joint_names, model.jnt_type, model.jnt_qposadr, model.jnt_dofadr, strict=True
+    ):
+        known = JointType(int(kind))
+        joints.append(
+            Joint(
+                name=name,
+                type=known.name.lower(),
+                qpos_start=int(place),
+                qpos_stop=int(place) + known.nq,
+                qvel_start=int(dof),
+                qvel_stop=int(dof) + known.nv,
+            )
+        )
+    own: AsItComes | None = part(model.backend, "as_it_comes")
+    with make_data(model) as data:
+        fresh, name, time = data.time, None, None
+        if model.keyframes:
+            reset(model, data, keyframe=0)
+            name, time = model.keyframes[0].name, data.time
+    return Layout(
+        nq=model.nq,
+        nv=model.nv,
+        nu=model.nu,
+        nbody=model.nbody,
+        joints=tuple(joints),
+        fresh_time=fresh,
+        keyframe=name,
+        keyframe_time=time,
+        terms=own.terms(model) if own else (),
+        provenance=provenance(model),
+    )
+
+
+def page(results: Mapping[str, Layout], session: Session) -> Page:
     """Sizes, slots, the keyframe's time."""
     first = next(iter(results.values()))
     blocks: list[Any] = [
@@ -112,9 +185,7 @@ def page(results: Mapping[str, state.Layout], session: Session) -> Page:
     return page_of("Positions and velocities do not line up", results, blocks)
 
 
-def _alike(
-    results: Mapping[str, state.Layout], of: Callable[[state.Layout], Any]
-) -> list[tuple[str, state.Layout]]:
+def _alike(results: Mapping[str, Layout], of: Callable[[Layout], Any]) -> list[tuple[str, Layout]]:
     """Engines that say the same are shown once: the prefix "a, b: " and one's result."""
     groups: dict[Any, list[str]] = {}
     for name, layout in results.items():
@@ -125,12 +196,12 @@ def _alike(
     ]
 
 
-def _layouts(one: state.Layout, two: state.Layout) -> str:
+def _layouts(one: Layout, two: Layout) -> str:
     sizes = [(each.nq, each.nv, each.nu, each.nbody, each.joints) for each in (one, two)]
     return "none" if sizes[0] == sizes[1] else "they differ: see above"
 
 
-def _question(first: state.Layout) -> Question:
+def _question(first: Layout) -> Question:
     return Question(
         f"qpos has nq = {first.nq} numbers. How many has qvel?",
         (f"{first.nq}: one velocity for each position", f"{first.nu}, as ctrl has", f"{first.nv}"),

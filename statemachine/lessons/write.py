@@ -3,38 +3,175 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ..comparison.text import count, position
-from ..experiments import write
+from ..errors import StateMachineError
+from ..interface import (
+    DERIVED,
+    INPUTS,
+    Data,
+    Model,
+    forward,
+    get_state,
+    make_data,
+    reset,
+    set_state,
+    step,
+)
+from ..interface.checks import as_scalar
 from ..page import Page, Question, Table, Text, Verdict
+from ..scenarios.provenance import Provenance, provenance
+from ..scenarios.robot import is_slide, scalar_joint
+from ..scenarios.runs import Progress
+from ._bytes import read_derived
 from ._words import emulation, page_of, sentence, typed, where
 from .records import Session
+from .session import Play, Watch
 
 
-def run(play: Any, options: Mapping[str, Any], progress: Any) -> write.Write:
-    """One write, and who notices."""
-    model = play.model
-    play()
-    return write.run(model, joint=options["joint"], value=options["value"])
-
-
-def code(model: Any, options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """A name for the array, a copy of it, and a write."""
+    scalar_joint(model, options["joint"])  # says what is wrong with it
+    value = as_scalar(options["value"], "value")
     return f"""\
 import statemachine as sm
 
 model = {load}
 data = sm.make_data(model)
+sm.forward(model, data)  # works out where things are
 slot = model.jnt_qposadr[model.joint_id({options["joint"]!r})]
 view = data.qpos
 copy = data.qpos.copy()
-view[slot] = {options["value"]:g}
+view[slot] = {value}
 print(data.qpos[slot], copy[slot], view is data.qpos)
 """
 
 
-def page(results: Mapping[str, write.Write], session: Session) -> Page:
+@dataclass(frozen=True)
+class Write:
+    """What a write does, and what it does not.
+
+    Attributes:
+        joint, place, value: qpos[place] of the joint was written [rad; of a slide, m].
+        slide: Whether the joint is one.
+        view, copy: What a name for the array, and a copy made before, say afterwards.
+        kept: Inputs that were the same array after each of `calls`.
+        calls: What was called between.
+        in_engine: The entry as the engine's own memory shows it right after the write;
+            None where the engine keeps its state elsewhere.
+        changed: Derived arrays that the write changed.
+        assigned: What the view says after `data.qpos = other`.
+        refused: What was refused, and with which words.
+        felt: How much the first step after the write differs from one without it, in
+            the velocity of that joint [rad/s or m/s].
+        found: How many contacts it found; otherwise: how many the one without it found.
+    """
+
+    joint: str
+    slide: bool
+    place: int
+    value: float
+    view: float
+    copy: float
+    kept: tuple[str, ...]
+    calls: tuple[str, ...]
+    in_engine: float | None
+    changed: tuple[str, ...]
+    assigned: float
+    refused: tuple[tuple[str, str], ...]
+    felt: float
+    found: int
+    otherwise: int
+    provenance: Provenance
+
+
+def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Write:
+    """Look who notices the write; then go on with the Data that was written."""
+    model, joint = play.model, options["joint"]
+    place, dof = scalar_joint(model, joint)
+    looks = _Looks()
+    names = play(looks)
+    data, copy = names["data"], names["copy"]
+    before, after, *_ = looks.derived
+    view, in_engine = float(data.qpos[place]), _in_engine(data, place)
+    step(model, data)
+    found = len(data.contacts)
+    with make_data(model) as other:
+        step(model, other)
+        felt, otherwise = float(data.qvel[dof] - other.qvel[dof]), len(other.contacts)
+    arrays = {name: getattr(data, name) for name in INPUTS}
+    state = get_state(model, data)
+    calls = {
+        "step": lambda: step(model, data),
+        "forward": lambda: forward(model, data),
+        "reset": lambda: reset(model, data),
+        "set_state": lambda: set_state(model, data, state),
+    }
+    same = set(INPUTS)
+    for call in calls.values():
+        call()
+        same &= {name for name in INPUTS if getattr(data, name) is arrays[name]}
+    data.qpos = copy
+    return Write(
+        joint=joint,
+        slide=is_slide(model, joint),
+        place=place,
+        value=options["value"],
+        view=view,
+        copy=float(copy[place]),
+        kept=tuple(name for name in INPUTS if name in same),
+        calls=tuple(calls),
+        in_engine=in_engine,
+        changed=tuple(name for name in before if before[name] != after[name]),
+        assigned=float(names["view"][place]),
+        refused=_refused(data),
+        felt=felt,
+        found=found,
+        otherwise=otherwise,
+        provenance=provenance(model),
+    )
+
+
+class _Looks(Watch):
+    """The derived arrays after each line from the copy on: that, the write, the print."""
+
+    def __init__(self) -> None:
+        self.derived: list[dict[str, bytes]] = []
+
+    def after_line(self, source: str, names: Mapping[str, Any]) -> None:
+        if "copy" in names:
+            self.derived.append(read_derived(names["data"]))
+
+
+def _in_engine(data: Data, place: int) -> float | None:
+    """The entry in the engine's own memory, if that is where qpos lives."""
+    raw = getattr(data.raw, "qpos", None)
+    if not isinstance(raw, np.ndarray) or not np.shares_memory(raw, data.qpos):
+        return None
+    return float(raw[place])
+
+
+def _refused(data: Data) -> tuple[tuple[str, str], ...]:
+    """Assignments that are refused before anything changes, and with which words."""
+    attempts = {
+        "data.qpos = [0.8]": ("qpos", [0.8]),
+        "data.xpos = …": (DERIVED[0], getattr(data, DERIVED[0]).copy()),
+        "data.qpso = …": ("qpso", data.qpos.copy()),
+    }
+    refused = []
+    for text, (name, value) in attempts.items():
+        try:
+            setattr(data, name, value)
+        except StateMachineError as error:
+            refused.append((text, str(error)))
+    return tuple(refused)
+
+
+def page(results: Mapping[str, Write], session: Session) -> Page:
     """The same memory, what it changes, what is refused."""
     first = next(iter(results.values()))
     blocks: list[Any] = [
@@ -108,5 +245,5 @@ def page(results: Mapping[str, write.Write], session: Session) -> Page:
     return page_of("Writing into the state", results, blocks)
 
 
-def _changed(result: write.Write) -> str:
+def _changed(result: Write) -> str:
     return ", ".join(result.changed) or "no derived array"

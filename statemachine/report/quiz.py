@@ -26,7 +26,8 @@ def can_ask() -> bool:
 class Reader:
     """Somebody at a terminal; nothing scrolls out of the window before they have seen it."""
 
-    def __init__(self) -> None:
+    def __init__(self, lesson: str = "") -> None:
+        self.lesson = lesson  # whose questions are asked now
         self._rows = 0  # shown since they last typed something
 
     def read(self, text: str) -> None:

@@ -21,6 +21,7 @@ from ..scenarios import scenario
 from ..traces.whole import replace_file
 from . import compare as comparison
 from . import conventions, why
+from .cheat_sheet import cheat_sheet
 from .figures import svg
 from .markdown import block_as_markdown, markdown
 from .robot_pictures import webp
@@ -73,6 +74,7 @@ def make_reference(folder: Path, say: Callable[[str], None] = print) -> list[Pat
     pages = {
         "conventions": markdown(asked, lambda _: ""),
         "calls": _phrases(conventions.calls_page(table), table),
+        "cheat-sheet": cheat_sheet(table),
     }
     for name, text in pages.items():
         _save(folder / f"{name}.md", text.encode())

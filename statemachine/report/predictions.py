@@ -1,0 +1,85 @@
+"""What a reader predicted, kept in a file to hand in: `statemachine lesson --record FILE`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..errors import BadInputError
+from ..page import Question
+from ..traces.whole import replace_file
+from .quiz import Reader
+
+_KIND = "statemachine predictions"
+
+
+class RecordedReader(Reader):
+    """A reader whose answers are written to a file, after each.
+
+    The first answer to a question counts. A file of an earlier session is gone on with.
+    """
+
+    def __init__(self, file: Path, lesson: str = "") -> None:
+        """Open a file, or begin one.
+
+        Args:
+            file: Where the answers are kept, as JSON.
+            lesson: Whose questions are asked first.
+
+        Raises:
+            BadInputError: The file is there and is no record of predictions.
+        """
+        super().__init__(lesson)
+        self._file = file
+        self._answers = _read(file) if file.exists() else {}
+        self._write()
+
+    def ask(self, question: Question) -> int | None:
+        """Ask, and keep the answer."""
+        choice = super().ask(question)
+        if choice is not None:
+            key = f"{self.lesson}: {question.text}"
+            right = question.right
+            self._answers.setdefault(
+                key,
+                {
+                    "lesson": self.lesson,
+                    "question": question.text,
+                    "predicted": question.choices[choice],
+                    "found": None if right is None else question.choices[right],
+                    "right": choice == right,
+                },
+            )
+            self._write()
+        return choice
+
+    def _write(self) -> None:
+        answers = list(self._answers.values())
+        record = {
+            "kind": _KIND,
+            "statemachine": __version__,
+            "python": sys.version.split()[0],
+            "score": sum(bool(answer["right"]) for answer in answers),
+            "of": len(answers),
+            "answers": answers,
+        }
+        text = json.dumps(record, indent=1, ensure_ascii=False) + "\n"
+        replace_file(self._file, lambda out: out.write(text.encode("utf-8", errors="replace")))
+
+
+def _read(file: Path) -> dict[str, dict[str, Any]]:
+    try:
+        record = json.loads(file.read_text(encoding="utf-8"))
+        if record["kind"] != _KIND:
+            raise ValueError("another kind of file")
+        answers = {f"{each['lesson']}: {each['question']}": each for each in record["answers"]}
+        if not all(isinstance(each["right"], bool) for each in answers.values()):
+            raise ValueError("an answer is neither right nor wrong")
+    except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
+        raise BadInputError(
+            f"{file.name} is there and is no record of predictions ({error}): name another file"
+        ) from None
+    return answers

@@ -1,0 +1,73 @@
+"""Predictions kept in a file to hand in."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from statemachine.errors import BadInputError
+from statemachine.page import Question
+from statemachine.report.predictions import RecordedReader
+
+from .conftest import Cli
+from .test_lessons import _at_a_terminal
+
+ONE = Question("how many?", ("1", "2"), 1, "counted")
+NONE = Question("which?", ("x", "y"), None, "neither")
+
+
+def test_the_first_answer_counts_and_a_session_is_gone_on_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "mine.json"
+    typed = iter(["", "a", "b", "b"])
+    monkeypatch.setattr("builtins.input", lambda _: next(typed))
+    reader = RecordedReader(file, "state")
+    assert json.loads(file.read_text())["of"] == 0
+    assert reader.ask(ONE) is None  # passed: no answer
+    assert json.loads(file.read_text())["of"] == 0
+    assert reader.ask(ONE) == 0
+    again = RecordedReader(file, "state")
+    assert again.ask(ONE) == 1  # now right, but the first counts
+    again.lesson = "reset"
+    assert again.ask(NONE) == 1
+    record = json.loads(file.read_text())
+    assert (record["score"], record["of"]) == (0, 2)
+    assert record["answers"] == [
+        {"lesson": "state", "question": "how many?", "predicted": "1", "found": "2",
+         "right": False},
+        {"lesson": "reset", "question": "which?", "predicted": "y", "found": None,
+         "right": False},
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", '{"kind": "x"}', '{"kind": "statemachine predictions", "answers": [1]}']
+)
+def test_another_file_is_not_overwritten(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "mine.json"
+    file.write_text(text)
+    with pytest.raises(BadInputError, match="no record of predictions"):
+        RecordedReader(file)
+    assert file.read_text() == text
+
+
+def test_nobody_there_to_answer(cli: Cli, tmp_path: Path) -> None:
+    done = cli("lesson", "state", "--record", str(tmp_path / "mine.json"))
+    assert done.returncode == 2
+    assert "needs a terminal that asks" in done.stderr
+    assert not (tmp_path / "mine.json").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
+def test_a_station_at_a_terminal_is_recorded(tmp_path: Path) -> None:
+    file = tmp_path / "mine.json"
+    typed = [("Your prediction", "c\n")]
+    seen = _at_a_terminal("lesson", "state", "--record", str(file), typed=typed)
+    assert "as you said" in seen
+    record = json.loads(file.read_text())
+    assert (record["score"], record["of"]) == (1, 1)
+    assert record["answers"][0]["predicted"] == "12"

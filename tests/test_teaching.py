@@ -1,0 +1,143 @@
+"""What a teacher hands out and sets up: the kits, and the autograder as Gradescope runs it."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import tests.exercises.forward
+import tests.exercises.gravity
+import tests.exercises.replay
+import tests.exercises.state  # noqa: F401  (they fill WRONG)
+from statemachine.conventions.phrasebook import CONCEPTS
+from statemachine.grading.mutants.faults import FAULTS
+from statemachine.lessons import LESSONS
+from statemachine.report.cheat_sheet import OURS, REMEMBER
+
+from .conftest import ROOT
+from .exercises import WRONG
+
+sys.path.insert(0, str(ROOT / "teaching"))
+import make_kits  # pyright: ignore[reportMissingImports]
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_kits.wheel(tmp_path_factory.mktemp("wheel"))
+
+
+@pytest.mark.slow
+def test_the_students_kit_has_no_solution(built: Path, tmp_path: Path) -> None:
+    target = tmp_path / "kit.zip"
+    make_kits.write(target, make_kits.student_kit(built))
+    with zipfile.ZipFile(target) as kit:
+        assert sorted(kit.namelist()) == sorted(
+            [
+                "README.md",
+                "constraints.txt",
+                "path.ipynb",
+                "step_loop.py",
+                "test_arm.py",
+                built.name,
+            ]
+        )
+        whole = b"".join(kit.read(name) for name in kit.namelist())
+        assert kit.read("step_loop.py").count(b"raise NotImplementedError(") == 4
+        assert built.name in kit.read("README.md").decode()
+    with zipfile.ZipFile(built) as wheel:
+        whole += b"".join(wheel.read(name) for name in wheel.namelist())
+    for file in ("step_loop.py", "test_arm.py"):
+        text = (ROOT / "teaching" / "solutions" / file).read_text()
+        functions = re.findall(r"^def (?:demo|test)_.*?(?=^def |\Z)", text, re.M | re.S)
+        assert len(functions) >= 4
+        for function in functions:
+            assert function.encode() not in whole
+    again = tmp_path / "again.zip"
+    make_kits.write(again, make_kits.student_kit(built))
+    assert again.read_bytes() == target.read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="Gradescope runs Linux")
+def test_the_autograder_grades_a_submission(built: Path, tmp_path: Path) -> None:
+    home = tmp_path / "autograder"
+    (home / "submission").mkdir(parents=True)
+    with zipfile.ZipFile(_zip(tmp_path, built)) as kit:
+        kit.extractall(home / "source")
+    for name in ("setup.sh", "run_autograder"):
+        (home / "source" / name).chmod(0o755)
+    # setup.sh without a package index: the dependencies are those of this environment.
+    environment = {**os.environ, "AUTOGRADER": str(home)}
+    (home / "env" / "bin").mkdir(parents=True)
+    command = home / "env" / "bin" / "statemachine"
+    command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m statemachine "$@"\n')
+    command.chmod(0o755)
+    solution = (ROOT / "teaching" / "solutions" / "step_loop.py").read_text()
+    for text, score, words in (
+        (solution, 4, "right"),
+        ("def demo_gravity(:\n", 0, "invalid syntax"),
+        (None, 0, "no Python file in it has one of the functions"),
+    ):
+        file = home / "submission" / "step_loop.py"
+        file.unlink(missing_ok=True)
+        if text is not None:
+            file.write_text(text)
+        done = subprocess.run(
+            [str(home / "source" / "run_autograder")],
+            env={**environment, "PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        results = json.loads((home / "results" / "results.json").read_text())
+        assert sum(test["score"] for test in results["tests"]) == score
+        assert words in json.dumps(results, ensure_ascii=False)
+
+
+def _zip(folder: Path, built: Path) -> Path:
+    target = folder / "autograder.zip"
+    make_kits.write(target, make_kits.autograder(built))
+    with zipfile.ZipFile(target) as kit:
+        for name in ("setup.sh", "run_autograder"):
+            assert kit.getinfo(name).external_attr >> 16 & 0o111
+    return target
+
+
+def test_the_mistakes_of_the_teachers_page_are_those_that_are_caught() -> None:
+    text = (ROOT / "docs" / "teaching.md").read_text()
+    rows = re.findall(r'^\| [^|]+ \| "([^"|]+)" \| `([^`|]+)` \|$', text, re.M)
+    assert len(rows) >= 10
+    for said, fault in rows:
+        assert any(said in attempt.message for attempt in WRONG), said
+        assert fault in FAULTS
+
+
+def test_what_to_remember_is_of_the_stations() -> None:
+    assert tuple(OURS) == CONCEPTS
+    assert {lesson for lesson, _ in REMEMBER} <= set(LESSONS)
+
+
+def test_our_column_of_the_cheat_sheet_runs(backend: str) -> None:
+    program = "\n".join(OURS.values()).replace(
+        '"so101/scene"', f'"so101/scene", backend="{backend}"'
+    )
+    names: dict[str, Any] = {}
+    exec(program, names)
+    assert len(names["worlds"]) == 3
+    assert names["d"].time == 0  # back where it was saved
+    for data in (names["d"], *names["worlds"]):
+        data.close()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a shell's syntax")
+@pytest.mark.parametrize("name", ["setup.sh", "run_autograder"])
+def test_the_scripts_are_shell(name: str) -> None:
+    subprocess.run(["bash", "-n", str(ROOT / "teaching" / "gradescope" / name)], check=True)
