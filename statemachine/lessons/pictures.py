@@ -175,7 +175,7 @@ PICTURES: Mapping[str, RobotPicture] = {
         "One arm, stretched out. No violet is to be seen: while nobody called step, nothing moved.",
         "statemachine view --model so101/scene --paused",
         _ARM,
-        lambda: (_still(_ARM, steps=100),) * 2,
+        lambda: (_still(_ARM, steps=100), _still(_ARM, steps=100)),
     ),
     "speed": RobotPicture(
         "What is advanced here: six joints, a box, and the contacts between them.",
