@@ -5,12 +5,14 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE.parent))
+sys.path[:0] = [str(HERE.parent), str(HERE)]
+
+import rooms  # noqa: E402
 
 import statemachine  # noqa: E402
 
 project = "statemachine"
-author = "the statemachine maintainers"
+author = "statemachine contributors"
 copyright = author
 release = version = statemachine.__version__
 extensions = ["myst_parser"]
@@ -24,6 +26,10 @@ smartquotes = False  # --realtime is no dash
 exclude_patterns = ["_build"]
 
 
+# Files beside this folder that are pages, too.
+PAGES = {"../CONTRIBUTING.md": "contributing", "../models/so101/README.md": "so101"}
+
+
 def _make_pages(_app) -> None:
     from statemachine.report.site import make_comparisons, make_path, make_reference
 
@@ -31,8 +37,21 @@ def _make_pages(_app) -> None:
     make_path(HERE / "path", [name for name in backends if name] or None)
     make_reference(HERE / "reference")
     make_comparisons(HERE / "comparisons")
+    pages = {"rooms": rooms.table()}
+    for path, name in PAGES.items():
+        text = (HERE / path).read_text(encoding="utf-8")
+        pages[name] = text.replace("](docs/", "](../")
+    for name, text in pages.items():
+        (HERE / "reference" / f"{name}.md").write_text(text, encoding="utf-8")
+
+
+def _link(_app, _name: str, source: list[str]) -> None:
+    """A link to such a file leads to its page."""
+    for path, name in PAGES.items():
+        source[0] = source[0].replace(f"]({path})", f"](reference/{name}.md)")
 
 
 def setup(app) -> None:
     """Make the generated pages before the others are read."""
     app.connect("builder-inited", _make_pages)
+    app.connect("source-read", _link)

@@ -1,4 +1,4 @@
-"""Every command, code block and number of the README holds."""
+"""Every command, code block and number of the README and of the guides holds."""
 
 from __future__ import annotations
 
@@ -7,23 +7,49 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 
+from statemachine.conventions import QUESTIONS
+from statemachine.grading.judges import JUDGES
+from statemachine.grading.mutants.faults import FAULTS
+from statemachine.lessons import STATIONS
+from statemachine.lessons.questions import _ASKED
+
 from .conftest import ROOT, Cli, need_engine
 
-README = (ROOT / "README.md").read_text()
-PAGES = [README, *(path.read_text() for path in sorted((ROOT / "docs").glob("*.md")))]
+PAGES = {
+    path.relative_to(ROOT).as_posix(): path.read_text("utf-8")
+    for path in (*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md")))
+}
+README = PAGES["README.md"]
+
+
+def blocks(page: str, language: str) -> list[str]:
+    """The fenced blocks of a page in one language."""
+    return re.findall(rf"^```{language}\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+
+
 COMMANDS = list(
     dict.fromkeys(
         line.split("#")[0].strip()
-        for page in PAGES
-        for block in re.findall(r"```console\n(.*?)```", page, re.DOTALL)
+        for page in PAGES.values()
+        for block in blocks(page, "console")
         for line in block.splitlines()
         if line.startswith(("statemachine", "python exercises"))
     )
 )
+# What a page shows: the command is the last that its introduction names.
+SHOWN = [
+    pytest.param(shlex.split(command)[1:], part[1].rstrip("\n"), id=f"{name}: {command}")
+    for name, page in PAGES.items()
+    for part in re.finditer(r"^```text\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    for command in re.findall(r"`(statemachine [^`]*)`", page[: part.start()])[-1:]
+]
+MADE = ("path/", "reference/", "comparisons/")  # by `make docs`
+PYTHON = {name: "".join(blocks(page, "python")) for name, page in PAGES.items()}
 # Of exercises that are still to be written.
 SAYS_NO = (
     "statemachine check exercises/step_loop.py",
@@ -35,8 +61,13 @@ DIFFERS = re.compile(r"statemachine compare (hold(?!.*--why)|--models)")
 
 
 def test_there_are_commands() -> None:
-    assert len(COMMANDS) >= 25
+    assert len(COMMANDS) >= 40
     assert set(SAYS_NO) <= set(COMMANDS)
+    assert len(SHOWN) == sum(len(blocks(page, "text")) for page in PAGES.values()) >= 5
+
+
+def test_the_readme_is_short() -> None:
+    assert len(README.split()) <= 900
 
 
 @pytest.mark.slow
@@ -82,10 +113,8 @@ def test_command(cli: Cli, command: str, request: pytest.FixtureRequest, tmp_pat
 
 
 def _make_traces(cli: Cli, folder: Path, words: list[str]) -> None:
-    """The files that a command of the README takes as there."""
-    (folder / "my_controller.py").write_text(
-        "def controller(time, data):\n    return [0.1, -0.3, 0.5, 0.2, 0.0, 0.3]\n"
-    )
+    """The files that a command takes as there."""
+    (folder / "my_controller.py").write_text(blocks(PAGES["docs/traces.md"], "python")[0])
     for name, line in (
         ("waves.npz", "trace record waves --seed 3 -o waves.npz"),
         ("played.npz", "trace play waves.npz --backend pybullet -o played.npz"),
@@ -94,40 +123,87 @@ def _make_traces(cli: Cli, folder: Path, words: list[str]) -> None:
             assert cli(*line.split()).returncode == 0
 
 
-def test_python_block(tmp_path: Path) -> None:
-    code, more = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
-    code += more
+def _output(code: str, folder: Path) -> str:
     done = subprocess.run(
         [sys.executable, "-c", code],
         capture_output=True,
         text=True,
-        cwd=tmp_path,
+        cwd=folder,
         env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin"},
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("9.0")  # 6 s of the keyframe and 600 steps
-    tip = [float(word) for word in re.findall(r"-?\d\.\d+", done.stdout)[1:]]
+    return done.stdout
+
+
+def test_python_block(tmp_path: Path) -> None:
+    out = _output(PYTHON["README.md"], tmp_path)
+    assert out.startswith("9.0")  # 6 s of the keyframe and 600 steps
+    tip = [float(word) for word in re.findall(r"-?\d\.\d+", out)[1:]]
     assert f"[{' '.join(f'{value:.4f}' for value in tip[:3])}]" in README
-    assert "Derived values of scene_box on mujoco" in done.stdout
-    assert "1 of 1 reads were stale" in done.stdout
+
+
+# Of each guide with code: what its code prints.
+PRINTS = {
+    "docs/freshness.md": ("Derived values of scene_box on mujoco", "1 of 1 reads were stale"),
+    "docs/interface.md": ("no joint named 'elbow'; known: ", "0.001\n", "options of replace: "),
+    "docs/platforms.md": ("armature: emulated", "position servo: emulated"),
+    "docs/traces.md": ("101 (101, 6)",),
+}
+
+
+@pytest.mark.parametrize("page", [name for name in PYTHON if PYTHON[name] and name != "README.md"])
+def test_the_code_of_a_guide_runs(page: str, tmp_path: Path) -> None:
+    if 'backend="pybullet"' in PYTHON[page]:
+        need_engine("pybullet")
+    out = _output(PYTHON[page], tmp_path)
+    for text in PRINTS[page]:
+        assert text in out
+    if page == "docs/interface.md":  # the message is there, too
+        assert out.splitlines()[0] in " ".join(PAGES[page].split())
 
 
 @pytest.mark.slow
-def test_the_output_that_is_shown(cli: Cli) -> None:
-    alone, both, part, causes = re.findall(r"```text\n(.*?)```", README, re.DOTALL)
-    assert alone in cli("lesson", "gravity").stdout
-    need_engine("pybullet")
-    assert both in cli("lesson", "gravity", "--backend", "all").stdout
-    assert part in cli("compare", "hold").stdout
-    assert causes in cli("compare", "hold", "--defaults", "engine", "--why").stdout
-    assert "one on top of the other: contact > 99.9 %." in cli("compare", "hold", "--why").stdout
+@pytest.mark.parametrize(("words", "shown"), SHOWN)
+def test_the_output_that_is_shown(cli: Cli, words: list[str], shown: str) -> None:
+    if "compare" in words or "all" in words:
+        need_engine("pybullet")
+    assert shown in cli(*words).stdout
+
+
+def test_what_is_counted() -> None:
+    names = "one two three four five six seven eight nine ten eleven twelve thirteen fourteen"
+    word = dict(enumerate(names.split(), start=1))
+    counted = {
+        "README.md": (
+            f"{word[len(STATIONS)]} stations",
+            f"{word[len(_ASKED)]} questions",
+            f"{word[len(JUDGES)]} functions",
+        ),
+        "docs/lessons.md": (f"{word[len(STATIONS)]} stations", f"{word[len(_ASKED)]} questions"),
+        "docs/exercises.md": (
+            f"{word[len(JUDGES)]} functions",
+            f"fault is put into the arm, one at a time, {word[len(FAULTS)]} in all",
+        ),
+        "docs/audit.md": (f"{word[len(QUESTIONS)]} questions",),
+    }
+    for page, phrases in counted.items():
+        for phrase in phrases:
+            assert phrase in " ".join(PAGES[page].split()), page
+
+
+def test_what_is_to_be_installed_exists() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    extras = {name for page in PAGES.values() for name in re.findall(r'"\.\[(\w+)\]"', page)}
+    assert {"mutants", "test", "notebook"} <= extras <= set(project["optional-dependencies"])
 
 
 def test_files_that_are_linked_exist() -> None:
-    for file in (ROOT / "README.md", ROOT / "models" / "so101" / "README.md"):
-        for target in re.findall(r"\]\((?!https?:)([^)#]+)\)", file.read_text()):
-            assert (file.parent / target).exists(), target
+    for name in (*PAGES, "models/so101/README.md"):
+        file = ROOT / name
+        for target in re.findall(r"\]\((?!https?:)([^)#]+)\)", file.read_text("utf-8")):
+            if not target.startswith(MADE):
+                assert (file.parent / target).exists(), f"{name}: {target}"
 
 
 def test_numbers_of_the_models_readme() -> None:

@@ -1,0 +1,71 @@
+"""The map of the project is true: its rooms, its floors, and the places that it names."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+
+from .conftest import ROOT
+
+PACKAGE = ROOT / "statemachine"
+MAP = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+# Floor, room, what it is for.
+ROOMS = re.findall(r"^\| (\d+) \| `([\w./]+)` \| (.+?) \|$", MAP, re.MULTILINE)
+
+
+def test_every_room_is_in_the_table_with_its_purpose() -> None:
+    rooms = {
+        f"{path.name}/" if path.is_dir() else path.name
+        for path in PACKAGE.iterdir()
+        if path.suffix == ".py" or (path / "__init__.py").exists()
+    } - {"__init__.py"}
+    assert {room for _, room, _ in ROOMS} == rooms
+    assert len(ROOMS) == len(rooms)
+    assert all(len(purpose.split()) >= 3 or "`" in purpose for _, _, purpose in ROOMS)
+
+
+def test_the_floors_are_those_that_imports_keep() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+    layers = project["tool"]["importlinter"]["contracts"][0]["layers"]
+    floors = {
+        name.strip(): number
+        for number, layer in enumerate(layers, start=1)
+        for name in layer.split("|")
+    }
+    told = {room.removesuffix(".py").rstrip("/"): int(floor) for floor, room, _ in ROOMS}
+    assert told == floors
+    assert list(told.values()) == sorted(told.values())
+
+
+def test_every_place_that_is_named_exists() -> None:
+    places = re.findall(r"`((?:statemachine|tests)\w*(?:/\w+)*\.py)(?::(\w+))?`", MAP)
+    assert len(places) >= 20
+    for path, name in places:
+        assert (ROOT / path).is_file(), path
+        tree = ast.parse((ROOT / path).read_text("utf-8"))
+        defined = {
+            node.name
+            for node in tree.body
+            if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
+        }
+        assert not name or name in defined, f"{path}: {name}"
+
+
+def test_the_glossary_tells_a_word_once() -> None:
+    _, _, glossary = MAP.partition("## Glossary")
+    words = re.findall(r"^\| ([^|]+?) \| [^|]+ \|$", glossary, re.MULTILINE)[1:]
+    assert len(words) == len(set(words)) >= 40
+    field = "Model Data state derived stale ctrl servo keyframe scenario side gap tolerance verdict"
+    for word in [*field.split(), "touch", "witness", "capability", "emulated", "native", "trace"]:
+        assert word in words
+
+
+def test_the_lines_of_the_rooms_are_counted() -> None:
+    command = [sys.executable, ROOT / "docs" / "rooms.py"]
+    page = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    counted = dict(re.findall(r"\| `([\w./]+)` \| [\d,]+ \| ([\d,]+) \|", page))
+    assert {room for _, room, _ in ROOMS} == set(counted) - {"__init__.py"}
+    assert int(counted["errors.py"]) == len((PACKAGE / "errors.py").read_text().splitlines())
