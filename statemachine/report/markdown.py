@@ -5,7 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
-from ..page import LETTERS, Block, Code, Page, Picture, Printed, Question, Table, Text, Verdict
+from ..page import (
+    LETTERS,
+    Block,
+    Code,
+    Page,
+    Picture,
+    Printed,
+    Question,
+    RobotPicture,
+    Table,
+    Text,
+    Verdict,
+)
 from .terminal import together
 
 # What Markdown would take for its own; underscores within words it leaves alone.
@@ -63,6 +75,10 @@ def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
             return _table(block)
         case Verdict(text, holds):
             return f"{'✓' if holds else '✗'} {_escaped(text)}"
+        case RobotPicture():
+            where = picture(block)
+            shown = f"![{_escaped(block.words)}]({where})" if where else _escaped(block.words)
+            return f"{shown}\n\n*{_escaped(block.title)}* Live: `{block.view}`"
         case _:
             where = picture(block)
             return f"![{_escaped(block.title)}]({where})" if where else ""
