@@ -93,6 +93,16 @@ def ignored(raw: mujoco.MjModel) -> list[str]:
     ):
         if there:
             found.append(f"{what} has no effect")
+    if not raw.opt.disableflags & NO_CONTACT:
+        touching = (raw.geom_contype | raw.geom_conaffinity).astype(bool)
+        margins = raw.geom_margin * touching
+        if margins.any():
+            largest = int(margins.argmax())
+            found.append(
+                f"contacts begin at a distance of 0, not at the margin of "
+                f"{int(np.count_nonzero(margins))} geoms (the largest: "
+                f"{1e3 * margins[largest]:.3g} mm, {_name(raw, 'geom', largest)})"
+            )
     return found
 
 
@@ -108,8 +118,6 @@ def _joints(raw: mujoco.MjModel) -> Found:
                     yield f"{what} of a free joint", f"joint {name} has it"
             if raw.jnt_stiffness[j]:
                 yield "stiffness of a free joint", f"joint {name} has it"
-        elif raw.qpos0[raw.jnt_qposadr[j]]:
-            yield "joint ref", f"the zero of joint {name} is not that of the file's pose"
         for what, values in (
             ("nonlinear spring", raw.jnt_stiffnesspoly[j]),
             ("nonlinear damping", raw.dof_dampingpoly[dof]),
@@ -149,8 +157,6 @@ def _geoms(raw: mujoco.MjModel) -> Found:
             yield "shape of a geom", f"geom {name} is a {mujoco.mjtGeom(kind).name[7:].lower()}"
         elif kind == PLANE and raw.geom_bodyid[g]:
             yield "plane on a body", f"geom {name} is not the world's own"
-        if raw.geom_margin[g]:
-            yield "contact margin", f"geom {name} has one"
 
 
 def _meshes(raw: mujoco.MjModel, path: Path) -> Found:

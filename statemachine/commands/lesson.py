@@ -202,6 +202,7 @@ def _compute(
     options: argparse.Namespace, lesson: Lesson, model: str, values: dict[str, Any]
 ) -> tuple[Any, dict[str, Any]]:
     """The page of a station, and the results that it was made from, by backend."""
+    from ..lessons.pictures import with_picture
     from ..lessons.session import page_of_lesson, take
 
     if options.json:
@@ -215,6 +216,8 @@ def _compute(
         ),
     )
     page = page_of_lesson(lesson, taken)
+    if model == lesson.model and values == {each.key: each.default for each in lesson.options}:
+        page = with_picture(page, lesson.name)
     if not options.calls:
         return page, {name: each.result for name, each in taken.items()}
     from ..report import calls

@@ -14,6 +14,7 @@ from ..page import (
     Picture,
     Printed,
     Question,
+    RobotPicture,
     Table,
     Text,
     Verdict,
@@ -90,6 +91,10 @@ def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
             return _table(block)
         case Verdict(text, holds):
             return f"{'✓' if holds else '✗'} {_escaped(text)}"
+        case RobotPicture():
+            where = picture(block)
+            shown = f"![{_escaped(block.words)}]({where})" if where else _escaped(block.words)
+            return f"{shown}\n\n*{_escaped(block.title)}* Live: `{block.view}`"
         case _:
             where = picture(block)
             return f"![{_escaped(block.title)}]({where})" if where else ""
