@@ -18,6 +18,7 @@ import pytest
 from nbclient import NotebookClient
 
 import statemachine as sm
+from statemachine.errors import BadInputError
 from statemachine.lessons import LESSONS
 from statemachine.lessons.session import page_of_lesson, take
 from statemachine.page import Page, Pipeline, Printed, Question, Slots, Table, Text, Traces
@@ -192,7 +193,7 @@ def test_the_notebook_has_the_whole_path_and_no_outputs() -> None:
     nbformat.validate(notebook)
     assert not any(cell.get("outputs") for cell in notebook.cells)
     text = "\n".join(_sources())
-    places = [text.index(f'station("{name}", BACKEND)') for name in LESSONS]
+    places = [text.index(f'station("{name}", BACKEND, prediction)') for name in LESSONS]
     assert places == sorted(places)
 
 
@@ -240,3 +241,22 @@ def test_a_question_that_went_wrong_in_a_notebook() -> None:
 def test_documentation_on_an_engine_that_is_missing(tmp_path: Path) -> None:
     with pytest.raises(KeyError, match="mujcoo"):
         make_path(tmp_path, ["mujcoo"], say=lambda _: None)
+
+
+def test_a_prediction_in_the_notebook_is_judged() -> None:
+    right = station("state", prediction="c")._repr_markdown_()
+    assert "✓ as you said" in right
+    assert "✗ you said a; it is c" in station("state", prediction=" A ")._repr_markdown_()
+    assert "You made no prediction. The run says: c) 12" in station("state")._repr_markdown_()
+    for wrong in ("d", "cc", "1", "?"):
+        with pytest.raises(BadInputError, match="a prediction is a letter"):
+            station("state", prediction=wrong)
+
+
+def test_the_notebook_asks_before_the_code_that_answers() -> None:
+    cells = [cell["id"] for cell in json.loads(_NOTEBOOK.read_text(encoding="utf-8"))["cells"]]
+    assert cells[1:3] == ["install", "setup"]
+    for lesson in LESSONS:
+        asked = cells.index(f"{lesson}-prediction")
+        assert cells[asked - 1] == f"{lesson}-text"
+        assert asked < cells.index(f"{lesson}-run")

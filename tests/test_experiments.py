@@ -13,7 +13,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.errors import BadInputError
-from statemachine.experiments import fingertip, forward, replay
+from statemachine.experiments import fingertip, forward
 from statemachine.lessons import in_turns, session
 from statemachine.lessons._fall import Forces, milestones
 from statemachine.lessons.speed import Speed
@@ -82,7 +82,7 @@ def test_hold_that_ends_at_the_first_touch_says_so() -> None:
 
 def test_replay_compares_what_it_says() -> None:
     model = sm.load("so101/scene_box")
-    found = replay.run(model, steps=30, break_with="late-ctrl")
+    found = lesson_result("replay", model, steps=30, **{"break": "late-ctrl"})
     with sm.make_data(model) as one, sm.make_data(model) as two:
         for data in (one, two):
             sm.reset(model, data, keyframe=0)
@@ -98,7 +98,7 @@ def test_replay_compares_what_it_says() -> None:
             assert found.apart[k + 1] == np.linalg.norm(gap[6:9], axis=-1)  # without BLAS
         assert one.time == pytest.approx(0.15)
     assert found.identical is False
-    assert replay.run(model, steps=5).close is True
+    assert lesson_result("replay", model, steps=5).close is True
 
 
 def test_speed_runs_every_step_it_counts(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -373,7 +373,7 @@ def test_real_time_is_the_loops_affair(cli: Cli) -> None:
     began = time.monotonic()
     done = cli("lesson", "time", "--realtime", "--seconds", "0.8")
     assert done.returncode == 0, done.stderr
-    assert time.monotonic() - began >= 1.6  # the code and the measurement
+    assert time.monotonic() - began >= 0.8
     assert "s simulated in" in done.stdout
     assert "the waiting is yours" in done.stdout
     assert "0.8 s of simulated time" in done.stdout

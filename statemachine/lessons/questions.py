@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..comparison.text import count, degrees, duration, millimetres
-from ..experiments import forward, pace, replay
+from ..experiments import forward
 from ..interface import Model
 from ..page import Page, Question, Text, Verdict
 from ..scenarios.provenance import Provenance, provenance
 from ..scenarios.runs import Progress, part_of
-from . import LESSONS, gravity, objects, state
+from . import LESSONS, gravity, objects, replay, state, time
 from ._words import page_of, where
 from .records import Session
 from .session import Play, take
@@ -39,7 +39,7 @@ class Answers:
     replay: replay.Replay
     gravity: gravity.Gravity
     objects: objects.Objects
-    pace: pace.Pace
+    pace: time.Pace
     provenance: Provenance
 
 

@@ -3,38 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..comparison import largest
 from ..comparison.text import count, degrees, millimetres, vector
-from ..experiments import replay
+from ..engines import part
+from ..engines.parts import AsItComes, WayBack
+from ..errors import BadInputError, UnsupportedError, unknown_name
+from ..interface import Array, Ints, JointType, Model, get_state
+from ..interface.checks import as_count
 from ..page import Page, Question, Table, Text, Verdict
-from ._broken import BROKEN, course, growth, in_short, traces
+from ..scenarios.provenance import Provenance, provenance
+from ..scenarios.robot import command
+from ..scenarios.runs import Progress, part_of
+from ._broken import BREAKS, BROKEN, Broken, Paths, course, growth, in_short, traces
+from ._ways import of_its_own, through_us, ways_back
 from ._words import differences, page_of, sentence, typed, where
 from .records import Session
+from .session import Play
 
 
-def run(play: Any, options: Mapping[str, Any], progress: Any) -> replay.Replay:
-    """Two runs."""
-    model = play.model
-    play()
-    return replay.run(
-        model,
-        steps=options["steps"],
-        ctrl=options["ctrl"],
-        break_with=options["break"],
-        progress=progress,
-    )
+def code(model: Model, options: Mapping[str, Any], load: str) -> str:
+    """Two runs from the keyframe, compared.
 
-
-def code(model: Any, options: Mapping[str, Any], load: str) -> str:
-    """Two runs from the keyframe, compared."""
+    With a way to break them, the second run differs: "extra-step" takes one step more before
+    the count begins, "late-ctrl" writes the command one step late.
+    """
+    if options["break"] is not None and options["break"] not in BREAKS:
+        raise unknown_name("way to break a replay", options["break"], BREAKS)
+    if not model.keyframes:
+        raise BadInputError(f"{model.path.name} has no keyframe to start from: try so101/scene_box")
+    steps = as_count(options["steps"], "steps")
     write, said = "data.ctrl[:2] += np.array((0.4, -0.2))[: model.nu]", "  # pan and lift"
-    if options["ctrl"]:
-        write, said = f"data.ctrl[:] = {[float(x) for x in options['ctrl']]}", ""
-    steps = options["steps"]
+    if options["ctrl"] is not None:
+        write, said = f"data.ctrl[:] = {command(model, options['ctrl']).tolist()}", ""
     body = {
         None: [write + said, f"sm.step(model, data, {steps})"],
         "extra-step": [write + said, f"sm.step(model, data, {steps} + broken)"],
@@ -65,7 +70,124 @@ print(np.array_equal(one, two), abs(one - two).max())
 """
 
 
-def page(results: Mapping[str, replay.Replay], session: Session) -> Page:
+@dataclass(frozen=True)
+class Finer:
+    """The same movement with half the timestep, twice.
+
+    Attributes:
+        timestep: Of these runs [s].
+        identical: Whether the two of them end in the same bits.
+        difference: Largest |qpos difference| of their end to that of the usual timestep.
+    """
+
+    timestep: float
+    identical: bool
+    difference: float
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """Two runs, step by step.
+
+    Attributes:
+        ctrl: (nu,) the command of both runs.
+        identical: Whether the last qpos are equal, `np.array_equal`.
+        close: Whether `np.allclose` calls them equal.
+        difference: (n+1,) largest |qpos difference| after each step.
+        apart: (n+1,) distance [m] between the free body's positions in the two
+            runs; None without a free body.
+        qpos: (nq,) at the end of the first run.
+        hinges: Where in qpos the hinges are.
+        free: Where in qpos a free body's position is; None without one.
+        travel: Largest movement of a hinge in the first run [rad].
+        contacts: (n,) contacts that each step of the first run found.
+        pairs: For each pair of bodies, in how many steps it touched.
+        keyframe: Name of the keyframe; its time was set to zero.
+        breaks: Second runs that were made to differ, if this one was not.
+        finer: The same with half the timestep; None where the backend cannot set it.
+        state: What a State of this engine holds.
+        ways: Ways to go back through this interface, tried.
+        own_ways: The engine's own ways, tried on the raw engine where that differs.
+    """
+
+    ctrl: Array
+    broken_by: str | None
+    identical: bool
+    close: bool
+    difference: Array
+    apart: Array | None
+    qpos: Array
+    hinges: tuple[int, ...]
+    free: tuple[int, int, int] | None
+    travel: float
+    contacts: Ints
+    pairs: dict[str, int]
+    keyframe: str
+    breaks: tuple[Broken, ...]
+    finer: Finer | None
+    state: tuple[str, ...]
+    ways: tuple[WayBack, ...]
+    own_ways: tuple[WayBack, ...]
+    provenance: Provenance
+
+
+def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Replay:
+    """Watch both runs; then play the code that breaks them, and theirs with half the timestep."""
+    model, nstep, way = play.model, options["steps"], options["break"]
+    shares = [part_of(progress, k / 3, 1 / 3) for k in range(3)]
+    paths = Paths(nstep, progress if way else shares[0])
+    play(paths)
+    first, second = paths.both()
+    broken, finer = [], None
+    if way is None:
+        for each, share in zip(BREAKS, shares[1:], strict=True):
+            watch = Paths(nstep, share)
+            with Play(code(model, {**options, "break": each}, "sm.load()"), model) as other:
+                other(watch)
+            broken.append(Broken.of(each, *watch.both()))
+        finer = _finer(model, options, first[-1])
+    gap = first - second
+    free = model.jnt_qposadr[model.jnt_type == int(JointType.FREE)].tolist()
+    hinges = model.jnt_qposadr[model.jnt_type == int(JointType.HINGE)]
+    _, data = play.worlds[0]
+    own: AsItComes | None = part(model.backend, "as_it_comes")
+    return Replay(
+        ctrl=data.ctrl.copy(),
+        broken_by=way,
+        identical=bool(np.array_equal(first[-1], second[-1])),
+        close=bool(np.allclose(first[-1], second[-1])),
+        difference=np.abs(gap).max(axis=1),
+        apart=np.linalg.norm(gap[:, free[0] : free[0] + 3], axis=1) if free else None,
+        qpos=first[-1],
+        hinges=tuple(hinges.tolist()),
+        free=(free[0], free[0] + 1, free[0] + 2) if free else None,
+        travel=float(np.ptp(first[:, hinges], axis=0).max(initial=0.0)),
+        contacts=np.array(paths.contacts, dtype=np.int64),
+        pairs=dict(paths.pairs),
+        keyframe=model.keyframes[0].name,
+        breaks=tuple(broken),
+        finer=finer,
+        state=tuple(name for name, size in get_state(model, data).layout if size),
+        ways=ways_back(model, data.ctrl),
+        own_ways=own.ways_back(model) if own else (),
+        provenance=provenance(model),
+    )
+
+
+def _finer(model: Model, options: Mapping[str, Any], end: Array) -> Finer | None:
+    """Determinism is not truth: half the timestep replays as exactly, and ends elsewhere."""
+    try:
+        finer = model.replace(timestep=model.timestep / 2)
+    except UnsupportedError:
+        return None
+    twice = {**options, "steps": 2 * options["steps"]}
+    with Play(code(finer, twice, "sm.load()"), finer) as play:
+        ends = play()
+    apart = float(np.abs(ends["one"] - end).max())
+    return Finer(finer.timestep, bool(np.array_equal(ends["one"], ends["two"])), apart)
+
+
+def page(results: Mapping[str, Replay], session: Session) -> Page:
     """Equal or not, and what touched on the way."""
     first = next(iter(results.values()))
     nstep = len(first.contacts)
@@ -83,12 +205,13 @@ def page(results: Mapping[str, replay.Replay], session: Session) -> Page:
     blocks.append(_outcome(results))
     blocks.append(_contacts(results))
     if first.broken_by:
-        blocks.append(growth(results, nstep))
-        blocks.append(traces(results))
+        gaps = {name: result.difference for name, result in results.items()}
+        blocks.append(growth(gaps, {name: result.apart for name, result in results.items()}))
+        blocks.append(traces(gaps))
     for name, result in results.items():
         blocks.append(_finding(where(results, name), result))
     if not first.broken_by:
-        blocks.append(_ways(results))
+        blocks.append(through_us({name: result.ways for name, result in results.items()}))
         for name, result in results.items():
             blocks.append(
                 sentence(
@@ -99,7 +222,7 @@ def page(results: Mapping[str, replay.Replay], session: Session) -> Page:
                 )
             )
         for name, result in results.items():
-            blocks += _own_ways(name, result)
+            blocks += of_its_own(name, result.own_ways)
         if all(result.identical for result in results.values()):
             blocks.append(
                 Text(
@@ -108,7 +231,7 @@ def page(results: Mapping[str, replay.Replay], session: Session) -> Page:
                     "something has changed, and not by chance."
                 )
             )
-        blocks += in_short(results)
+        blocks += in_short({name: result.breaks for name, result in results.items()})
         for name, result in results.items():
             blocks += _truth(where(results, name), result)
     blocks += differences(
@@ -122,7 +245,7 @@ def page(results: Mapping[str, replay.Replay], session: Session) -> Page:
     return page_of("The same start, the same commands", results, blocks)
 
 
-def _question(first: replay.Replay) -> Question:
+def _question(first: Replay) -> Question:
     if first.broken_by:
         return Question(
             "one step differs. What becomes of the difference by the end?",
@@ -138,7 +261,7 @@ def _question(first: replay.Replay) -> Question:
     )
 
 
-def _truth(prefix: str, result: replay.Replay) -> list[Any]:
+def _truth(prefix: str, result: Replay) -> list[Any]:
     """Determinism is not truth."""
     finer = result.finer
     if finer is None or not finer.identical or finer.difference == 0:
@@ -153,54 +276,22 @@ def _truth(prefix: str, result: replay.Replay) -> list[Any]:
     ]
 
 
-def _ways(results: Mapping[str, replay.Replay]) -> Table:
-    names = [way.name for way in next(iter(results.values())).ways]
-    return Table(
-        ("", *results),
-        [
-            (name, *(_exactly(r.ways[k].difference) for r in results.values()))
-            for k, name in enumerate(names)
-        ],
-        title="Ways back, tried, with 100 steps before and after: what follows is …",
-    )
-
-
-def _own_ways(name: str, result: replay.Replay) -> list[Table | Text]:
-    if not result.own_ways:
-        return []
-    return [
-        Table(
-            (f"{name} itself", "what follows is …"),
-            [(way.name, _exactly(way.difference)) for way in result.own_ways],
-            title=f"The ways back that {name}'s own users have, tried on it alone",
-        ),
-        Text(
-            "The same bits in one trial are no promise: what was not exact here is not exact; "
-            "what was may differ elsewhere."
-        ),
-    ]
-
-
-def _exactly(difference: float) -> str:
-    return "the same, bit by bit" if difference == 0 else f"off by {difference:.1e}"
-
-
-def _joints_apart(one: replay.Replay, two: replay.Replay) -> str:
+def _joints_apart(one: Replay, two: Replay) -> str:
     gap = np.abs(one.qpos - two.qpos)[list(one.hinges)]
     return degrees(float(gap.max()), 3) if len(gap) else "there are none"
 
 
-def _bodies_apart(one: replay.Replay, two: replay.Replay) -> str:
+def _bodies_apart(one: Replay, two: Replay) -> str:
     if one.free is None:
         return "there is none"
     return millimetres(float(np.linalg.norm(one.qpos[list(one.free)] - two.qpos[list(one.free)])))
 
 
-def _contacts_apart(one: replay.Replay, two: replay.Replay) -> str:
+def _contacts_apart(one: Replay, two: Replay) -> str:
     return f"{two.contacts.mean():.1f} instead of {one.contacts.mean():.1f}"
 
 
-def _outcome(results: Mapping[str, replay.Replay]) -> Table:
+def _outcome(results: Mapping[str, Replay]) -> Table:
     return Table(
         ("", *results),
         [
@@ -216,12 +307,12 @@ def _outcome(results: Mapping[str, replay.Replay]) -> Table:
     )
 
 
-def _alone(results: Mapping[str, replay.Replay]) -> list[replay.Replay]:
+def _alone(results: Mapping[str, Replay]) -> list[Replay]:
     """The only result, or none where there are several."""
     return list(results.values()) if len(results) == 1 else []
 
 
-def _contacts(results: Mapping[str, replay.Replay]) -> Table:
+def _contacts(results: Mapping[str, Replay]) -> Table:
     rows = [
         (
             "contacts a step",
@@ -244,7 +335,7 @@ def _contacts(results: Mapping[str, replay.Replay]) -> Table:
     return Table(("", *results), rows, title="What touched, in the first run")
 
 
-def _finding(prefix: str, result: replay.Replay) -> Text | Verdict:
+def _finding(prefix: str, result: Replay) -> Text | Verdict:
     steps = count(len(result.contacts), "step")
     if result.identical and not result.broken_by:
         return Verdict(

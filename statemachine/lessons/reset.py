@@ -2,31 +2,38 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ..comparison.text import count, millimetres
-from ..experiments import reset
+from ..interface import INPUTS, Data, JointType, Model, forward, make_data, reset, step
 from ..page import Page, Question, Table, Text, Verdict
+from ..scenarios.provenance import Provenance, provenance
+from ..scenarios.robot import body_pairs, carried_by, moved_by_actuators
+from ..scenarios.runs import Progress
+from ._bytes import read_derived, read_stored
 from ._words import differences, emulation, page_of, sentence, typed, where
 from .records import Session
+from .session import Play, Watch
+
+_STEPS = 100  # before the reset, and after it
+_WATCHED = 600  # steps under the keyframe's own ctrl
 
 
-def run(play: Any, options: Mapping[str, Any], progress: Any) -> reset.Reset:
-    """A reset, and each keyframe."""
-    model = play.model
-    play()
-    return reset.run(model, progress=progress)
-
-
-def code(model: Any, options: Mapping[str, Any], load: str) -> str:
-    """Step, reset, and reset to a keyframe."""
+def code(model: Model, options: Mapping[str, Any], load: str) -> str:
+    """Change everything, reset, and reset to a keyframe."""
     return f"""\
 import statemachine as sm
 
 model = {load}
 data = sm.make_data(model)
-sm.step(model, data, 100)
+data.qvel += 0.1
+data.ctrl += 0.1
+sm.step(model, data, {_STEPS})
 sm.reset(model, data)
 print(data.time, data.qpos[:3])
 for frame in model.keyframes[:1]:
@@ -35,11 +42,168 @@ for frame in model.keyframes[:1]:
 """
 
 
-def page(results: Mapping[str, reset.Reset], session: Session) -> Page:
+@dataclass(frozen=True)
+class KeyframeScene:
+    """What a keyframe shows, and what becomes of it under its own ctrl.
+
+    Attributes:
+        name, time: Of the keyframe [s].
+        exact: Inputs and time that the reset took over bit for bit.
+        body: The free body that it is about; None without one.
+        contacts: How many contacts each pair of bodies has at the keyframe.
+        on_robot, on_world: How many of the body's are with the robot, with the world.
+        nstep: Steps taken then, under the keyframe's ctrl.
+        both: In how many of them the robot touched the body; world: the world did.
+        rise: How much the body's origin rose in them [m].
+    """
+
+    name: str
+    time: float
+    exact: tuple[str, ...]
+    body: str | None
+    contacts: dict[str, int]
+    on_robot: int
+    on_world: int
+    nstep: int
+    robot_steps: int
+    world_steps: int
+    rise: float
+
+    @property
+    def held(self) -> bool:
+        """Whether the robot alone holds the body, from the first step to the last."""
+        return (
+            self.on_robot > 0
+            and self.on_world == 0
+            and self.robot_steps == self.nstep
+            and self.world_steps == 0
+        )
+
+
+@dataclass(frozen=True)
+class Reset:
+    """What a reset takes back.
+
+    Attributes:
+        restored: Inputs and time that are, after a reset, bit for bit those of a fresh
+            Data, although all of them had been changed.
+        empty: Whether every derived array is zero then, until `forward`.
+        same_future: Whether the next `steps` are bit for bit those of a fresh Data.
+        scenes: The keyframes.
+    """
+
+    restored: tuple[str, ...]
+    empty: bool
+    same_future: bool
+    steps: int
+    scenes: tuple[KeyframeScene, ...]
+    provenance: Provenance
+
+
+def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Reset:
+    """Look at the Data after each line; go on with it from each keyframe, and after a reset."""
+    model = play.model
+    lines = _Lines()
+    play(lines)
+    start, blank = lines.after["data = sm.make_data(model)"]
+    changed, _ = lines.after[f"sm.step(model, data, {_STEPS})"]
+    again, derived = lines.after["sm.reset(model, data)"]
+    _, data = play.worlds[0]
+    scenes = []
+    for key in range(len(model.keyframes)):
+        if key > 0:  # the code went to the first
+            reset(model, data, keyframe=key)
+        scenes.append(_scene(model, data, key))
+        progress((key + 1) / len(model.keyframes))
+    if scenes:
+        reset(model, data)
+    with make_data(model) as fresh:
+        step(model, data, _STEPS)
+        step(model, fresh, _STEPS)
+        same = read_stored(data) == read_stored(fresh)
+    return Reset(
+        restored=tuple(  # an array without entries could not be changed
+            name
+            for name, bits in start.items()
+            if again[name] == bits and (changed[name] != bits or not bits)
+        ),
+        empty=derived == blank and not any(map(any, blank.values())),
+        same_future=same,
+        steps=_STEPS,
+        scenes=tuple(scenes),
+        provenance=provenance(model),
+    )
+
+
+class _Lines(Watch):
+    """The bytes of the Data after each line, stored and derived."""
+
+    def __init__(self) -> None:
+        self.after: dict[str, tuple[dict[str, bytes], dict[str, bytes]]] = {}
+
+    def after_line(self, source: str, names: Mapping[str, Any]) -> None:
+        if "data" in names:
+            self.after[source] = read_stored(names["data"]), read_derived(names["data"])
+
+
+def _scene(model: Model, data: Data, key: int) -> KeyframeScene:
+    """What a Data that was just reset to a keyframe shows, and what becomes of it."""
+    frame = model.keyframes[key]
+    free = np.flatnonzero(model.jnt_type == int(JointType.FREE))
+    body = int(model.jnt_bodyid[free[0]]) if len(free) else None
+    height = int(model.jnt_qposadr[free[0]]) + 2 if len(free) else None
+    wanted = {name: getattr(frame, name).tobytes() for name in INPUTS}
+    wanted["time"] = np.array(frame.time).tobytes()
+    now = read_stored(data)
+    began = 0.0 if height is None else float(data.qpos[height])
+    forward(model, data)
+    contacts = body_pairs(model, data.contacts)
+    on_robot, on_world = _who(model, data, body)
+    steps: Counter[str] = Counter()
+    for _ in range(_WATCHED):
+        step(model, data)
+        robot, world = _who(model, data, body)
+        steps["robot"] += robot > 0
+        steps["world"] += world > 0
+    ended = 0.0 if height is None else float(data.qpos[height])
+    return KeyframeScene(
+        name=frame.name,
+        time=frame.time,
+        exact=tuple(name for name in wanted if now[name] == wanted[name]),
+        body=None if body is None else model.body_names[body],
+        contacts=dict(contacts),
+        on_robot=on_robot,
+        on_world=on_world,
+        nstep=_WATCHED,
+        robot_steps=steps["robot"],
+        world_steps=steps["world"],
+        rise=ended - began,
+    )
+
+
+def _who(model: Model, data: Data, body: int | None) -> tuple[int, int]:
+    """How many contacts a body has with the robot, and with what does not move."""
+    if body is None:
+        return 0, 0
+    robot = moved_by_actuators(model)
+    static = frozenset(range(model.nbody)) - carried_by(model, set(model.jnt_bodyid.tolist()))
+    on_robot = on_world = 0
+    for pair in data.contacts.geom.tolist():
+        bodies = {int(model.geom_bodyid[geom]) for geom in pair}
+        if body in bodies:
+            on_robot += bool(bodies & robot)
+            on_world += bool(bodies & static)
+    return on_robot, on_world
+
+
+def page(results: Mapping[str, Reset], session: Session) -> Page:
     """What a reset takes back, and what the keyframes show."""
     first = next(iter(results.values()))
     blocks: list[Any] = [
-        Text("Half a second is simulated, then taken back; then a state is taken from the file."),
+        Text(
+            "Velocity and command are changed and half a second is simulated; then all is taken "
+            "back, and a state is taken from the file."
+        ),
         *typed(session, _question(first)),
         Text(
             "reset puts a Data back to the model's default state: positions, velocities, "
@@ -75,7 +239,7 @@ def page(results: Mapping[str, reset.Reset], session: Session) -> Page:
     return page_of("Back to a known state", results, blocks)
 
 
-def _question(first: reset.Reset) -> Question | None:
+def _question(first: Reset) -> Question | None:
     if not first.scenes:
         return None
     frame = first.scenes[0]
@@ -89,9 +253,7 @@ def _question(first: reset.Reset) -> Question | None:
     )
 
 
-def _contacts(
-    number: int, first: reset.KeyframeScene, scenes: Mapping[str, reset.KeyframeScene]
-) -> Table:
+def _contacts(number: int, first: KeyframeScene, scenes: Mapping[str, KeyframeScene]) -> Table:
     pairs = dict.fromkeys(pair for scene in scenes.values() for pair in scene.contacts)
     rows = [
         (pair, *(count(scene.contacts.get(pair, 0), "contact") for scene in scenes.values()))
@@ -104,9 +266,7 @@ def _contacts(
     )
 
 
-def _finding(
-    results: Mapping[str, reset.Reset], name: str, number: int, file: str
-) -> Text | Verdict:
+def _finding(results: Mapping[str, Reset], name: str, number: int, file: str) -> Text | Verdict:
     """What a keyframe is, by what touches what, then and in the steps that follow."""
     scene = results[name].scenes[number]
     if scene.body is None:
@@ -138,7 +298,7 @@ def _finding(
 
 
 def _rise(number: int) -> Any:
-    def say(one: reset.Reset, two: reset.Reset) -> str:
+    def say(one: Reset, two: Reset) -> str:
         rises = millimetres(two.scenes[number].rise, 3), millimetres(one.scenes[number].rise, 3)
         return f"{rises[0]} instead of {rises[1]}"
 

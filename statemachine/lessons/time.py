@@ -2,49 +2,57 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from ..comparison.text import count, duration
 from ..errors import BadInputError
-from ..experiments import pace
+from ..interface import Data, Model
 from ..page import Page, Question, Table, Text, Verdict
+from ..scenarios.provenance import Provenance, provenance
+from ..scenarios.runs import Progress, steps_in
 from ._words import page_of, typed, where
 from .records import Session
+from .session import Play, Watch
 
 _BEFORE = "A simulation, a pause of the program, and the time on the simulator's own clock."
 _BRIEF, _WATCHED = 0.5, 4.0  # simulated seconds, without and with --realtime
 
 
-def run(play: Any, options: Mapping[str, Any], progress: Any) -> pace.Pace:
-    """Without waiting, and paced."""
-    model = play.model
-    play()
-    return pace.run(model, seconds=_seconds(options), progress=progress)
-
-
-def _seconds(options: Mapping[str, Any]) -> float:
-    if options["seconds"] is None:
-        return _WATCHED if options["realtime"] else _BRIEF
-    if not options["realtime"]:
-        raise BadInputError("--seconds goes with --realtime")
-    return options["seconds"]
-
-
-def code(model: Any, options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """A loop that does not wait; with --realtime one that does."""
-    if not options["realtime"]:
-        return f"""\
+    total = _steps(model, options)
+    return _paced(total, load) if options["realtime"] else _free(total, load)
+
+
+def _steps(model: Model, options: Mapping[str, Any]) -> int:
+    seconds = options["seconds"]
+    if seconds is not None and not options["realtime"]:
+        raise BadInputError("--seconds goes with --realtime")
+    if seconds is None:
+        seconds = _WATCHED if options["realtime"] else _BRIEF
+    return steps_in(model, seconds)
+
+
+def _free(steps: int, load: str) -> str:
+    return f"""\
 import time
 import statemachine as sm
 
 model = {load}
 data = sm.make_data(model)
-sm.step(model, data, 100)
+sm.step(model, data, {steps})
 print(data.time)
 time.sleep(0.2)  # the world goes on; the simulation does not
 print(data.time)
 """
+
+
+def _paced(steps: int, load: str) -> str:
     return f"""\
 import time
 import statemachine as sm
@@ -52,7 +60,7 @@ import statemachine as sm
 model = {load}
 data = sm.make_data(model)
 began = time.perf_counter()
-for _ in range(round({_seconds(options):g} / model.timestep)):
+for _ in range({steps}):
     sm.step(model, data)
     ahead = data.time - (time.perf_counter() - began)
     time.sleep(max(0, ahead))  # the waiting is yours
@@ -61,7 +69,128 @@ print(f"{{data.time:.3f}} s simulated in {{wall:.3f}} s")
 """
 
 
-def page(results: Mapping[str, pace.Pace], session: Session) -> Page:
+@dataclass(frozen=True)
+class Pace:
+    """The same steps, as fast as they come, and paced by a clock.
+
+    Attributes:
+        nstep: Steps of each run; simulated: their simulated time [s].
+        free: Wall time of the run that does not wait [s].
+        paced: Wall time of the run that waits [s].
+        waited: How much of it was waiting [s].
+        latest: How far behind the clock a step was at worst, after its waiting [s].
+        identical: Whether both runs end in the same bits.
+        nap: For how long nothing was called [s]; passed: how far `data.time` and the
+            state moved in it (0 and False).
+        end: `data.time` at the end of a run [s].
+        exact: Whether `data.time` is the running sum of the timestep, bit for bit.
+    """
+
+    nstep: int
+    simulated: float
+    free: float
+    paced: float
+    waited: float
+    latest: float
+    identical: bool
+    nap: float
+    passed: float
+    moved: bool
+    end: float
+    exact: bool
+    provenance: Provenance
+
+    @property
+    def factor(self) -> float:
+        """Simulated over wall time of the run that does not wait."""
+        return self.simulated / self.free
+
+    @property
+    def paced_factor(self) -> float:
+        """Simulated over wall time of the run that waits."""
+        return self.simulated / self.paced
+
+
+def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Pace:
+    """Watch the loop that is typed, and the other of the two on another Data."""
+    model, total = play.model, _steps(play.model, options)
+    also = (_free if options["realtime"] else _paced)(total, "sm.load()")
+    with Play(also, model) as second:
+        free, paced = (second, play) if options["realtime"] else (play, second)
+        nap, waiting = _Nap(), _Waiting(paced.names, total, progress)
+        play(waiting if play is paced else nap)
+        second(nap if play is paced else waiting)
+        (_, data), (_, other) = free.worlds[0], paced.worlds[0]
+        return Pace(
+            nstep=total,
+            simulated=total * model.timestep,
+            free=nap.stepping,
+            paced=paced.names["wall"],
+            waited=waiting.waited,
+            latest=waiting.latest,
+            identical=bool(np.array_equal(data.qpos, other.qpos)) and data.time == other.time,
+            nap=nap.length,
+            passed=nap.passed,
+            moved=nap.moved,
+            end=data.time,
+            exact=other.time == waiting.added,
+            provenance=provenance(model),
+        )
+
+
+class _Nap(Watch):
+    """What the steps of the code that does not wait take, and what happens while it sleeps."""
+
+    stepping = length = passed = 0.0
+    moved = False
+
+    def __init__(self) -> None:
+        self._line_over, self._before = 0.0, (0.0, b"")
+
+    def after_line(self, source: str, names: Mapping[str, Any]) -> None:
+        took = time.perf_counter() - self._line_over
+        if "data" in names:
+            data: Data = names["data"]
+            now = data.time, data.qpos.tobytes()
+            if source.startswith("sm.step"):
+                self.stepping = took
+            elif source.startswith("time.sleep"):
+                self.length, self.passed = took, now[0] - self._before[0]
+                self.moved = now[1] != self._before[1]
+            self._before = now
+        self._line_over = time.perf_counter()
+
+
+class _Waiting(Watch):
+    """How long the loop that waits does so, and how late its steps are."""
+
+    def __init__(self, names: Mapping[str, Any], total: int, progress: Progress) -> None:
+        self.waited = self.latest = self.added = 0.0
+        self._names, self._total, self._progress = names, total, progress
+        self._steps = 0
+
+    def before_step(self, model: Model, data: Data) -> None:
+        if self._steps:
+            self._look(data)
+
+    def after_step(self, model: Model, data: Data) -> None:
+        self.added += model.timestep
+        if self._steps % 20 == 0:
+            self._progress(self._steps / self._total)
+        self._steps += 1
+
+    def after_line(self, source: str, names: Mapping[str, Any]) -> None:
+        if source.startswith("for"):
+            self._look(names["data"])
+
+    def _look(self, data: Data) -> None:
+        """The waiting after a step is over."""
+        late = time.perf_counter() - self._names["began"] - data.time
+        self.latest = max(self.latest, late)
+        self.waited += max(0.0, self._names["ahead"])
+
+
+def page(results: Mapping[str, Pace], session: Session) -> Page:
     """Nothing waits unless the loop does, and waiting changes nothing."""
     first = next(iter(results.values()))
     blocks: list[Any] = [
@@ -112,7 +241,7 @@ def page(results: Mapping[str, pace.Pace], session: Session) -> Page:
     return page_of("Time is a number", results, blocks)
 
 
-def _table(results: Mapping[str, pace.Pace]) -> Table:
+def _table(results: Mapping[str, Pace]) -> Table:
     first, each = next(iter(results.values())), results.values()
     span = f"{first.simulated:g} s of simulated time, {count(first.nstep, 'step')}"
     return Table(

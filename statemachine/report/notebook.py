@@ -9,19 +9,30 @@ from __future__ import annotations
 
 import base64
 import json
-from itertools import takewhile
+from itertools import takewhile, zip_longest
 from typing import Any
 
 from ..backends import load
-from ..errors import MissingEngineError, unknown_name
+from ..errors import BadInputError, MissingEngineError, unknown_name
 from ..installed import DEFAULT
 from ..lessons import LESSONS, module
 from ..lessons.records import Lesson
 from ..lessons.session import page_of_lesson, take
-from ..page import Code, Page, Picture, Printed, Question, Text
+from ..page import LETTERS, Code, Page, Picture, Printed, Question, Text
 from .figures import svg
 from .markdown import answer, asked, block_as_markdown
+from .terminal import judged
 
+_INSTALL = """\
+# Where the package is not installed, as on Colab: from a wheel that you uploaded beside this
+# notebook, or else from the package index.
+import glob, importlib.util, subprocess, sys
+
+if importlib.util.find_spec("statemachine") is None:
+    wheel = sorted(glob.glob("statemachine_sim-*.whl")) or ["statemachine-sim"]
+    pip = [sys.executable, "-m", "pip", "install", "-q"]
+    subprocess.run([*pip, wheel[-1], "matplotlib"], check=True)
+"""
 _START = """\
 from statemachine.report.notebook import station
 
@@ -30,10 +41,9 @@ BACKEND = "mujoco"  # or "pybullet": the only word that changes
 _INTRODUCTION = """\
 # A physics simulator is a state machine that you advance
 
-Ten stations. Each has a few sentences, code to run and to change, and a question: **make your
-prediction before you run the cell.** The cell after it measures the same on your engine, now.
-
-It needs the package: `pip install -c constraints.txt -e '.[notebook]'` in the project's folder.
+Ten stations. Each has a few sentences, a question, and code to run and to change. **Write your
+prediction between the quotes before you run the code.** The cell after it measures the same on
+your engine, now, and says whether you were right.
 """
 _END = """\
 ## Your turn
@@ -46,15 +56,22 @@ _END = """\
 class Shown:
     """A page in a notebook, without the code that a cell above it has run."""
 
-    def __init__(self, page: Page) -> None:
+    def __init__(self, page: Page, prediction: str = "") -> None:
         self.page = page
+        self.prediction = prediction
 
     def _repr_markdown_(self) -> str:
         parts = [f"*{self.page.origin}*"]
+        letters = iter(self.prediction)
         for block in self.page.blocks[len(_leading(self.page)) :]:  # they stand there already
             if isinstance(block, Question):
                 parts += [block.text] if block.always else []
-                parts.append(f"The run says: {answer(block)}")
+                letter = next(letters, "")
+                if letter:
+                    verdict = judged(block, LETTERS.index(letter))
+                    parts.append(block_as_markdown(verdict, _inline))
+                else:
+                    parts.append(f"You made no prediction. The run says: {answer(block)}")
             elif not isinstance(block, (Code, Printed)):
                 parts.append(block_as_markdown(block, _inline))
         return "\n\n".join(filter(None, parts))
@@ -63,17 +80,19 @@ class Shown:
         return f"<Shown {self.page.title!r}: a notebook renders it>"
 
 
-def station(name: str, backend: str = DEFAULT, **options: Any) -> Shown:
+def station(name: str, backend: str = DEFAULT, prediction: str = "", **options: Any) -> Shown:
     """Run a lesson and show what it says.
 
     Args:
         name: Of the lesson.
         backend: The engine to run it on.
+        prediction: A letter for each of its questions, in their order; "" for none.
         **options: Of the lesson, by key, as `seconds=2.0`.
 
     Raises:
         UnknownNameError: There is no such lesson, backend or option.
         MissingEngineError: The engine is not installed here.
+        BadInputError: A prediction is no letter of its question.
     """
     if name not in LESSONS:
         raise unknown_name("lesson", name, LESSONS)
@@ -82,22 +101,42 @@ def station(name: str, backend: str = DEFAULT, **options: Any) -> Shown:
     for key in options:
         if key not in known:
             raise unknown_name("option", key, known)
-    return Shown(_page(lesson, backend, options))
+    page = _page(lesson, backend, options)
+    letters = "".join(prediction.lower().split())
+    questions = [block for block in page.blocks if isinstance(block, Question)]
+    for letter, question in zip_longest(letters, questions[: len(letters)]):
+        known = LETTERS[: len(question.choices)] if question else ""
+        if letter not in known or not known:
+            raise BadInputError(
+                f"a prediction is a letter for each question, such as {LETTERS[0]!r}; "
+                f"got {prediction!r}"
+            )
+    return Shown(page, letters)
 
 
 def build() -> str:
     """The notebook as JSON, without outputs; its questions come from a run on MuJoCo."""
-    cells = [_cell("start", "markdown", _INTRODUCTION), _cell("setup", "code", _START)]
+    cells = [
+        _cell("start", "markdown", _INTRODUCTION),
+        _cell("install", "code", _INSTALL),
+        _cell("setup", "code", _START),
+    ]
     for number, lesson in enumerate(LESSONS.values(), start=1):
         page = _page(lesson, DEFAULT, {})
         title = f"## {number}. {page.title}\n\n" if lesson.station else f"## {page.title}\n\n"
         cells.append(_cell(f"{lesson.name}-text", "markdown", title + _opening(page)))
+        questions = [block for block in page.blocks if isinstance(block, Question)]
+        asks = {0: "", 1: f"  # {_letters(questions)}"}.get(len(questions), _SEVERAL)
+        if questions:
+            cells.append(_cell(f"{lesson.name}-prediction", "code", f'prediction = ""{asks}'))
         values = {option.key: option.default for option in lesson.options}
         line = f'sm.load("{lesson.model}", backend=BACKEND)'
         code = module(lesson.name).code(load(lesson.model), values, line)
         if code:
             cells.append(_cell(f"{lesson.name}-code", "code", code))
-        cells.append(_cell(f"{lesson.name}-run", "code", f'station("{lesson.name}", BACKEND)'))
+        given = ", prediction" if questions else ""
+        run = f'station("{lesson.name}", BACKEND{given})'
+        cells.append(_cell(f"{lesson.name}-run", "code", run))
     cells.append(_cell("end", "markdown", _END))
     notebook = {
         "cells": cells,
@@ -109,6 +148,15 @@ def build() -> str:
         "nbformat_minor": 5,
     }
     return json.dumps(notebook, indent=1, ensure_ascii=False) + "\n"
+
+
+_SEVERAL = "  # a letter for each question, in their order, like cab…"
+
+
+def _letters(questions: list[Question]) -> str:
+    """The letters to choose from, as "a, b or c"."""
+    *first, last = LETTERS[: len(questions[0].choices)]
+    return f"{', '.join(first)} or {last}"
 
 
 def _page(lesson: Lesson, backend: str, options: dict[str, Any]) -> Page:

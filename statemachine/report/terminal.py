@@ -67,7 +67,7 @@ def show(page: Page, footer: str = "", reader: Reader | None = None) -> None:
             continue
         _write(tell, [block])
         if reader and said:  # first what the run says, then who was right
-            _write(tell, [_judged(*said)])
+            _write(tell, [judged(*said)])
             said = None
             if k + 1 < len(page.blocks) and not isinstance(page.blocks[k + 1], Question):
                 reader.go_on()
@@ -91,7 +91,7 @@ def spelled(error: UnicodeError) -> tuple[str, int]:
     return lacking.encode("ascii", "replace").decode(), error.end
 
 
-def _judged(question: Question, choice: int) -> Verdict:
+def judged(question: Question, choice: int) -> Verdict:
     """What became of a prediction."""
     if choice == question.right:
         return Verdict(f"as you said. {question.because}", True)
