@@ -58,7 +58,7 @@ _HOMES = {
     "watch_freshness": "staleness",
 }
 _MODULES = (
-    "backends", "compare", "conformance", "errors", "experiments", "kinematics", "models",
+    "backends", "compare", "conformance", "errors", "kinematics", "models",
     "rotations", "traces",
 )  # fmt: skip
 

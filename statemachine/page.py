@@ -6,8 +6,16 @@ other media.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A heading within a page."""
+
+    text: str
 
 
 @dataclass(frozen=True)
@@ -99,6 +107,30 @@ class Pipeline:
     spans: Sequence[tuple[str, int, int]]
 
 
+@dataclass(frozen=True, eq=False)
+class RobotPicture:
+    """The robot where it was, in one pose or moving; shown where pictures can be.
+
+    Attributes:
+        title: What it shows.
+        words: What is to be seen, for who cannot see it.
+        view: What to type to look at the same in a browser.
+        model: Name of the model.
+        poses: Makes qpos (n, nq) of what is drawn solid, and of what is drawn as a ghost over
+            it or None; run only where it is drawn.
+        interval: Simulated time from a pose to the next [s].
+        near: Body to look at from close by; "" for the whole robot.
+    """
+
+    title: str
+    words: str
+    view: str
+    model: str
+    poses: Callable[[], tuple[Any, Any]]
+    interval: float = 0.08
+    near: str = ""
+
+
 @dataclass(frozen=True)
 class Table:
     """Rows of cells, already formatted.
@@ -126,8 +158,8 @@ class Verdict:
     holds: bool
 
 
-Picture = Traces | Slots | Pipeline
-Block = Text | Code | Printed | Question | Table | Verdict | Traces | Slots | Pipeline
+Picture = Traces | Slots | Pipeline | RobotPicture
+Block = Heading | Text | Code | Printed | Question | Table | Verdict | Picture
 
 
 @dataclass(frozen=True)

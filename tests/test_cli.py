@@ -81,6 +81,9 @@ def test_forward(cli: Cli) -> None:
     assert tips[1] == tips[2] != tips[3]
     assert found["equal"] == [[1, 2]]
     assert {reading["time"] for reading in found["readings"]} == {0.0}
+    # What the page shows when it is asked for is always here.
+    assert max(found["stages"]["lag"]) == pytest.approx(9.95e-3, abs=0.02e-3)
+    assert {each["name"] for each in found["stages"]["changes"]} >= {"qpos", "site_xpos"}
     page = cli("lesson", "forward").stdout
     assert "[0.3914 -0.0010 0.2463]" in page
     assert "270.5 mm" in page

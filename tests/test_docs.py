@@ -21,7 +21,7 @@ import statemachine as sm
 from statemachine.errors import BadInputError
 from statemachine.lessons import LESSONS
 from statemachine.lessons.session import page_of_lesson, take
-from statemachine.page import Page, Pipeline, Printed, Question, Slots, Table, Text, Traces
+from statemachine.page import Heading, Page, Pipeline, Printed, Question, Slots, Table, Text, Traces
 from statemachine.report import markdown as md
 from statemachine.report import terminal
 from statemachine.report.figures import svg
@@ -64,6 +64,17 @@ def test_markdown_takes_nothing_for_its_own() -> None:
     assert printed.count("```text") == 2
     assert "a, b:" in printed
     assert "(nothing)" in printed
+
+
+def test_what_follows_a_heading_is_folded_under_its_words() -> None:
+    asked = Question("Which?", ("x", "y"), 1, "So it is.")
+    page = Page("t", "o", [asked, Printed({"a": "1\n"}), Text("p"), Heading("More*"), Text("q")])
+    text = md.markdown(page, lambda _: "")
+    first, second = re.findall(r"<details>(.*?)</details>", text, re.DOTALL)
+    assert "So it is." in first
+    assert "p" in first
+    assert "<summary>More\\*</summary>" in second
+    assert second.rstrip().endswith("q")
 
 
 class _Links(HTMLParser):

@@ -13,8 +13,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.errors import BadInputError
-from statemachine.experiments import fingertip, forward
-from statemachine.lessons import in_turns, session
+from statemachine.lessons import fingertip, in_turns, session
 from statemachine.lessons._fall import Forces, milestones
 from statemachine.lessons.speed import Speed
 from statemachine.models import models_dir
@@ -159,7 +158,7 @@ def test_every_way_has_its_turn_in_every_round() -> None:
 
 
 def test_forward_compares_bits() -> None:
-    found = forward.run(sm.load("so101"), value=1e-12)
+    found = lesson_result("forward", sm.load("so101"), value=1e-12)
     assert (1, 3) not in found.equal
     assert found.equal == ((1, 2),)
 
@@ -194,7 +193,7 @@ class TestCertificate:
         assert (np.ptp(one[1:], axis=0) > 0.5 * (high - low)).all()
 
     def test_its_tolerance_is_what_the_project_promises(self) -> None:
-        found = fingertip.run(sm.load("so101"), poses=20)
+        found = fingertip.certify(sm.load("so101"), poses=20)
         assert found.tolerance == 1e-12
         assert found.agrees
 
@@ -210,7 +209,7 @@ class TestCertificate:
             return fingertip.Pose(pos, mat)
 
         monkeypatch.setattr(fingertip, "_engine_poses", wrong)
-        found = fingertip.run(sm.load("so101"), poses=20)
+        found = fingertip.certify(sm.load("so101"), poses=20)
         assert found.frames is not None
         assert found.frames.same
         assert not found.agrees
@@ -229,7 +228,7 @@ class TestCertificate:
         assert old in text
         file = tmp_path / "other.xml"
         file.write_text(text.replace(old, new))
-        found = fingertip.run(sm.load("so101"), poses=5, witness=file)
+        found = fingertip.certify(sm.load("so101"), poses=5, witness=file)
         assert found.frames is not None
         assert not found.frames.same
         assert found.position_worst is None
@@ -241,7 +240,7 @@ class TestCertificate:
         file = tmp_path / "other.xml"
         file.write_text("\n".join(ln for ln in kept if 'joint="wrist_roll"' not in ln))
         with pytest.raises(BadInputError, match="wrist_roll"):
-            fingertip.run(sm.load("so101"), poses=5, witness=file)
+            fingertip.certify(sm.load("so101"), poses=5, witness=file)
 
     def test_a_free_robot_has_a_certificate_too(self, tmp_path: Path) -> None:
         file = tmp_path / "m.xml"
@@ -251,5 +250,5 @@ class TestCertificate:
             f"<body name='b' pos='1 0 0'>{inertial}<joint name='w' type='ball'/>"
             "<site name='tip' pos='0.1 0.2 0.3'/></body></body></worldbody></mujoco>"
         )
-        found = fingertip.run(sm.load(file), poses=50, site="tip")
+        found = fingertip.certify(sm.load(file), poses=50, site="tip")
         assert found.agrees

@@ -29,7 +29,7 @@ from statemachine.lessons import LESSONS, STATIONS, module
 from statemachine.lessons.in_turns import Ratio
 from statemachine.lessons.records import Session
 from statemachine.lessons.session import Play, Taken, Watch, load_line, page_of_lesson, take
-from statemachine.page import Code, Page, Printed, Question, Text, Verdict
+from statemachine.page import Code, Heading, Page, Printed, Question, Table, Text, Verdict
 from statemachine.report import progress as bar
 from statemachine.report import quiz
 from statemachine.scenarios import SCENARIOS
@@ -38,7 +38,11 @@ from statemachine.traces.recorder import record_scenario
 from .conftest import ROOT, Cli, lesson_result, need_engine
 
 _TIMED = {"time", "speed", "objects", "questions"}  # print wall times
-_QUICK = {"speed": {"steps": 200}, "gravity": {"longer": 0.0}, "forward": {"seconds": 0.4}}
+_QUICK = {
+    "speed": {"steps": 200},
+    "gravity": {"longer": 0.0},
+    "forward": {"arrays": True, "seconds": 0.4},
+}
 
 
 def _take(name: str, backend: str, **options: Any) -> tuple[Page, Taken]:
@@ -307,6 +311,32 @@ def test_what_catches_the_falling_arm() -> None:
     (said,) = (b.text for b in page.blocks if isinstance(b, Verdict) and "catches" in b.text)
     assert "not damping or friction" in said
     assert "at 4 s it is at 23.92°, at 100 s at 53.89°" in said
+
+
+@pytest.mark.parametrize("asked", [(), ("arrays",), ("lag",), ("arrays", "lag")])
+def test_forward_computes_what_it_shows(asked: tuple[str, ...], backend: str) -> None:
+    options = {"arrays": False, "seconds": None} | dict.fromkeys(asked, True)
+    page, taken = _take("forward", backend, **options)
+    stages = taken.result.stages
+    assert bool(stages.changes) == ("arrays" in asked)
+    assert len(stages.lag) == (400 if "lag" in asked else 0)
+    own = {"arrays": {"write"}, "lag": {"step"}}
+    answers = {each.question for each in taken.result.itself}
+    assert answers == (set() if backend == "mujoco" else set().union(*(own[a] for a in asked)))
+    titles = [block.title for block in page.blocks if isinstance(block, Table)]
+    ours = [title for title in titles if "itself, without us" not in title]
+    assert len(ours) == 1 + len(asked)
+    assert sum(isinstance(block, Heading) for block in page.blocks) == len(asked)
+    said = [block.text for block in page.blocks if isinstance(block, Text)]
+    for flag in ("arrays", "lag"):
+        line = f"statemachine lesson forward --{flag}"
+        assert any(text.endswith(line) for text in said) == (flag not in asked)
+    assert page.holds
+
+
+def test_what_a_lesson_shows_when_it_is_asked_for_all() -> None:
+    assert LESSONS["forward"].whole == {"arrays": True, "lag": True}
+    assert LESSONS["time"].whole == {}
 
 
 def test_of_which_moment_a_step_leaves_what(backend: str) -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import gc
 import hashlib
+import math
 import os
 import pickle
 import signal
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
@@ -24,6 +26,7 @@ from statemachine.errors import (
     BadInputError,
     DivergedError,
     EngineError,
+    EngineWarning,
     ReadOnlyError,
     UnknownNameError,
     UnsupportedError,
@@ -466,7 +469,6 @@ _G = '<geom size="0.1" mass="1"/>'
 _JOINT = f'<worldbody><body name="x"><joint name="j"/>{_G}</body></worldbody>'
 REFUSED = {
     "ball joint": _world(f'<body><joint name="wrist" type="ball"/>{_G}</body>'),
-    "joint ref": _world(f'<body><joint name="wrist" ref="0.3"/>{_G}</body>'),
     "joint margin": _world(f'<body><joint name="wrist" range="-1 1" margin="0.1"/>{_G}</body>'),
     "mocap body": _world(f'<body name="hand" mocap="true">{_G}</body>'),
     "equality constraint": f'{_JOINT}<equality><joint joint1="j"/></equality>',
@@ -492,9 +494,6 @@ REFUSED = {
     "shape of a geom": _world(
         '<body><joint/><geom name="egg" type="ellipsoid" size="0.1 0.2 0.3" mass="1"/></body>'
     ),
-    "contact margin": _world(
-        '<body><joint/><geom name="skin" size="0.1" mass="1" margin="0.01"/></body>'
-    ),
     "explicit contact pair": _world(
         '<body><joint/><geom name="a" size="0.1" mass="1"/></body><geom name="b" size="0.1"/>'
     )
@@ -504,11 +503,11 @@ REFUSED = {
 }
 # The part of a file that an error has to name, where it has a name.
 NAMED = {
-    "ball joint": "wrist", "joint ref": "wrist", "joint margin": "wrist", "mocap body": "hand",
+    "ball joint": "wrist", "joint margin": "wrist", "mocap body": "hand",
     "actuator transmission": "pull",
     "actuator of a free joint": "jet", "actuator dynamics": "lag", "actuator gain": "odd",
     "free body of several bodies": "top", "damping of a free joint": "joint f",
-    "armature of a free joint": "joint f", "shape of a geom": "egg", "contact margin": "skin",
+    "armature of a free joint": "joint f", "shape of a geom": "egg",
 }  # fmt: skip
 
 
@@ -539,10 +538,104 @@ def test_an_ellipsoid_that_touches_nothing_is_taken(tmp_path: Path) -> None:
 
 
 def test_all_problems_of_a_file_are_named(tmp_path: Path) -> None:
-    both = '<body><joint name="wrist" ref="0.3"/><geom name="egg" margin="0.1" size="0.1"/></body>'
+    both = (
+        '<body><joint name="wrist" range="-1 1" margin="0.1"/>'
+        '<geom name="egg" type="ellipsoid" size="0.1 0.1 0.2" mass="1"/></body>'
+    )
     with pytest.raises(UnsupportedError) as caught:
         load(mjcf(tmp_path, f'<option viscosity="1"/>{_world(both)}'))
     assert all(word in str(caught.value) for word in ("joint wrist", "geom egg", "fluid"))
+
+
+_REFS = """<option timestep="0.002"/><worldbody>
+<body name="a" pos="0 0 1" euler="10 20 30">
+  <inertial mass="1" pos="0 0 .1" diaginertia=".01 .02 .015"/>
+  <joint name="s" type="slide" axis="1 2 .5" ref="0.3" damping="1"/>
+  <joint name="h" axis="0 1 1" pos=".1 0 .2" ref="40" damping=".1" armature=".01"/>
+  <body name="b" pos=".2 0 .1" quat=".9 .1 .2 .3">
+    <inertial mass=".5" pos=".05 .02 .1" diaginertia=".003 .002 .004"/>
+    <joint name="r" axis="0 0 1" pos="0 .05 0" ref="-75" range="-120 50" stiffness="2"
+      springref="-20" damping=".05"/>
+    <site name="tip" pos=".1 .1 .1"/>
+  </body>
+</body></worldbody>
+<actuator><position joint="r" kp="5" kv=".1" ctrlrange="-3 3"/><motor joint="s"/></actuator>"""
+
+
+def test_a_joints_zero_need_not_be_the_files_pose(tmp_path: Path) -> None:
+    """Joints with `ref`: the same numbers on both engines, from the default state on."""
+    file = mjcf(tmp_path, _REFS)
+    models = [sm.load(file, backend=backend) for backend in ("mujoco", "pybullet")]
+    with sm.make_data(models[0]) as one, sm.make_data(models[1]) as two:
+        assert two.qpos.tolist() == pytest.approx([0.3, math.radians(40), math.radians(-75)])
+        draw = np.random.default_rng(0)
+        worst = 0.0
+        for k in range(400):
+            if k % 50 == 0:
+                one.ctrl[:] = two.ctrl[:] = draw.uniform(-2, 2, 2)
+            for model, data in zip(models, (one, two), strict=True):
+                sm.step(model, data)
+            worst = max(worst, float(np.abs(one.qpos - two.qpos).max()))
+        assert worst < 1e-9
+        assert np.ptp(one.qpos) > 0.3  # it moved
+        two.qpos = one.qpos
+        for model, data in zip(models, (one, two), strict=True):
+            sm.forward(model, data)
+        assert np.abs(one.site_xpos - two.site_xpos).max() < 1e-12
+        assert np.abs(one.qfrc_bias - two.qfrc_bias).max() < 1e-12
+
+
+def test_a_contact_margin_is_told(tmp_path: Path) -> None:
+    skin = '<body><joint/><geom name="{}" size="0.1" mass="1" margin="{}" {}/></body>'
+    text = _world(
+        skin.format("skin", 0.01, "") + skin.format("look", 0.1, 'contype="0" conaffinity="0"')
+    )
+    with pytest.warns(EngineWarning, match=r"margin of 1 geoms \(the largest: 10 mm, skin\)"):
+        sm.load(mjcf(tmp_path, text), backend="pybullet")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sm.load(mjcf(tmp_path, text), backend="pybullet", contacts=False)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (
+            f'<option integrator="discrete"/>{_JOINT}',
+            "the integrator discrete acts as implicitfast",
+        ),
+        (
+            _world(f'<body><joint name="wrist" stiffness="2" springyield="0.5"/>{_G}</body>'),
+            r"springyield has no effect \(wrist 0.00873\)",
+        ),
+        (
+            _world('<geom name="belt" type="plane" size="1 1 1" surfacevel="0 2 0"/>')
+            + _world(f"<body><freejoint/>{_G}</body>"),
+            r"surfacevel has no effect \(belt 2\)",
+        ),
+    ],
+)
+def test_what_acts_otherwise_is_told(text: str, says: str, tmp_path: Path) -> None:
+    with pytest.warns(EngineWarning, match=says):
+        sm.load(mjcf(tmp_path, text), backend="pybullet")
+
+
+def test_what_is_switched_off_at_load_is_not_refused(tmp_path: Path) -> None:
+    file = mjcf(tmp_path, REFUSED["shape of a geom"])
+    model = sm.load(file, backend="pybullet", contacts=False, timestep=0.01, substeps=2)
+    same = sm.load(file, contacts=False, timestep=0.01, substeps=2)
+    assert (model.timestep, model.substeps) == (same.timestep, same.substeps) == (0.01, 2)
+    for each in (model, same):
+        with sm.make_data(each) as data:
+            data.qvel[0] = 1.0
+            sm.step(each, data, 10)
+            assert data.time == pytest.approx(0.1)
+    with pytest.raises(UnsupportedError, match="egg"):
+        model.replace(contacts=True)
+    with pytest.raises(UnsupportedError, match="no option named 'contcts'"):
+        sm.load(file, backend="pybullet", contcts=False)
+    with pytest.raises(BadInputError, match="timestep must be above 0"):
+        sm.load(file, backend="pybullet", contacts=False, timestep=-1)
 
 
 _BODY = (

@@ -113,7 +113,7 @@ def test_json_has_no_nan() -> None:
 
 def test_the_core_does_not_import_what_stands_on_it() -> None:
     above = {
-        "calls", "cli", "commands", "conformance", "conventions", "engines", "experiments",
+        "calls", "cli", "commands", "conformance", "conventions", "engines",
         "grading", "lessons", "report", "scenarios", "staleness",
     }  # fmt: skip
     package = ROOT / "statemachine"

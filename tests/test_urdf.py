@@ -231,7 +231,6 @@ def test_solids_of_a_capsule(tmp_path: Path) -> None:
     ("body", "word"),
     [
         ("<body><joint type='ball'/><geom size='1'/></body>", "ball"),
-        ("<body><joint ref='0.3'/><geom size='1'/></body>", "ref"),
         ("<body mocap='true'><geom size='1'/></body>", "mocap"),
     ],
 )

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
+import inspect
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, Protocol, cast
+from typing import Any, Literal, Protocol, cast
 
 from ..errors import BadInputError, MissingEngineError, unknown_name
 from ..installed import DEFAULT, ENGINES, raise_if_interrupted, require
@@ -34,7 +35,12 @@ __all__ = [
 
 
 class Loader(Protocol):
-    """What a backend module offers: from a file to a Model."""
+    """What a backend module offers: from a file to a Model.
+
+    A loader that refuses files for what they have takes `options`, too, a mapping as
+    `Model.replace` has them: what is switched off there is nothing to refuse. To the Models of
+    the others `load` applies them.
+    """
 
     def __call__(self, path: os.PathLike[str], defaults: Literal["model", "engine"]) -> Model: ...
 
@@ -96,6 +102,7 @@ def load(
     *,
     defaults: Literal["model", "engine"] = "model",
     menagerie: str | os.PathLike[str] | None = None,
+    **options: Any,
 ) -> Model:
     """Compile a model's file into a Model. The slow part, done once.
 
@@ -105,9 +112,13 @@ def load(
         defaults: "model" keeps the contract of this library on every backend;
             "engine" gives what the engine's own users get when they load the file.
         menagerie: A menagerie folder to look the name up in.
+        **options: As `Model.replace` takes them, before anything of the file is refused:
+            `contacts=False` loads a robot of whose geoms the engine knows no shape.
 
     Raises:
         UnknownNameError: No such backend or model.
+        UnsupportedError: The file has what the backend cannot do, or there is no such option.
+        BadInputError: The value of an option has the wrong shape, kind or size.
         MissingEngineError: The backend's engine is not installed here.
         ModelFileError: The file is not there.
         ModelError: The engine cannot read the file.
@@ -126,7 +137,11 @@ def load(
         raise MissingEngineError(
             f"backend {backend!r} cannot be loaded from {entry.loader!r}: {error}", engine=backend
         ) from error
-    return loader(path, defaults=defaults)
+    if not options:
+        return loader(path, defaults=defaults)
+    if "options" in inspect.signature(loader).parameters:
+        return loader(path, defaults=defaults, options=options)
+    return loader(path, defaults=defaults).replace(**options)
 
 
 def on_default(model: Model) -> Model:

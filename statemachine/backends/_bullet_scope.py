@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from ..errors import UnsupportedError
-from ..interface import JointType
+from ..interface import Array, JointType
 from ._bullet_plan import Plan
 from ._bullet_surfaces import NO_CONTACT, PLANE
 from ._bullet_urdf import axes, tree
@@ -84,6 +84,7 @@ def ignored(raw: mujoco.MjModel) -> list[str]:
     integrator = {
         int(mujoco.mjtIntegrator.mjINT_IMPLICIT): "implicit acts as implicitfast",
         int(mujoco.mjtIntegrator.mjINT_RK4): "RK4 acts as Euler",
+        int(mujoco.mjtIntegrator.mjINT_DISCRETE): "discrete acts as implicitfast",
     }.get(int(raw.opt.integrator))
     found = [f"the integrator {integrator}"] if integrator else []
     for what, there in (
@@ -93,7 +94,29 @@ def ignored(raw: mujoco.MjModel) -> list[str]:
     ):
         if there:
             found.append(f"{what} has no effect")
+    if raw.jnt_springyield.any():
+        found.append(f"springyield has no effect ({_list(raw, 'joint', raw.jnt_springyield)})")
+    if not raw.opt.disableflags & NO_CONTACT:
+        touching = (raw.geom_contype | raw.geom_conaffinity).astype(bool)
+        margins = raw.geom_margin * touching
+        if margins.any():
+            largest = int(margins.argmax())
+            found.append(
+                f"contacts begin at a distance of 0, not at the margin of "
+                f"{int(np.count_nonzero(margins))} geoms (the largest: "
+                f"{1e3 * margins[largest]:.3g} mm, {_name(raw, 'geom', largest)})"
+            )
+        belts = np.linalg.norm(raw.geom_surfacevel[:, :3], axis=1) * touching
+        if belts.any():
+            found.append(f"surfacevel has no effect ({_list(raw, 'geom', belts)})")
     return found
+
+
+def _list(raw: mujoco.MjModel, kind: str, values: Array) -> str:
+    """Elements whose value is not zero, the largest first, as "a 0.5, b 0.1, and 3 more"."""
+    order = [int(k) for k in np.argsort(-np.abs(values), kind="stable") if values[k]]
+    named = [f"{_name(raw, kind, k)} {values[k]:.3g}" for k in order[:2]]
+    return ", ".join(named) + (f", and {len(order) - 2} more" if len(order) > 2 else "")
 
 
 def _joints(raw: mujoco.MjModel) -> Found:
@@ -108,8 +131,6 @@ def _joints(raw: mujoco.MjModel) -> Found:
                     yield f"{what} of a free joint", f"joint {name} has it"
             if raw.jnt_stiffness[j]:
                 yield "stiffness of a free joint", f"joint {name} has it"
-        elif raw.qpos0[raw.jnt_qposadr[j]]:
-            yield "joint ref", f"the zero of joint {name} is not that of the file's pose"
         for what, values in (
             ("nonlinear spring", raw.jnt_stiffnesspoly[j]),
             ("nonlinear damping", raw.dof_dampingpoly[dof]),
@@ -149,8 +170,6 @@ def _geoms(raw: mujoco.MjModel) -> Found:
             yield "shape of a geom", f"geom {name} is a {mujoco.mjtGeom(kind).name[7:].lower()}"
         elif kind == PLANE and raw.geom_bodyid[g]:
             yield "plane on a body", f"geom {name} is not the world's own"
-        if raw.geom_margin[g]:
-            yield "contact margin", f"geom {name} has one"
 
 
 def _meshes(raw: mujoco.MjModel, path: Path) -> Found:

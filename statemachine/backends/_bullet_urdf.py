@@ -265,11 +265,26 @@ def _joints(
         if dialect.dynamics:
             numbers = f'damping="{_number(damping)}" friction="{_number(friction)}"'
             extra.append(f"    <dynamics {numbers}/>")
-        where = _origin(place, turn)
+        where = _origin(*_at_zero(raw, joint, place, turn))
         yield from _joint(names.joints[joint], kind, parent, child, where, extra)
         if joint != joints[-1]:
             parent, turn = child, np.eye(3)
             place = raw.jnt_pos[joint + 1] - raw.jnt_pos[joint]
+
+
+def _at_zero(raw: mujoco.MjModel, joint: int, place: Array, turn: Array) -> tuple[Array, Array]:
+    """Where a joint's frame is when its position is 0, from where it is in the file's pose.
+
+    There the position is the joint's `ref`.
+    """
+    ref, axis = float(raw.qpos0[raw.jnt_qposadr[joint]]), raw.jnt_axis[joint]
+    if not ref:
+        return place, turn
+    if raw.jnt_type[joint] == int(JointType.SLIDE):
+        return place - ref * dense.times(turn, axis), turn
+    half = -ref / 2
+    back = matrix_from_quat(np.array([np.cos(half), *(np.sin(half) * axis)]))
+    return place, dense.product(turn, back)
 
 
 def _joint(

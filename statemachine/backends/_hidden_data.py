@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import BadInputError, DivergedError, EngineError
 from ..interface import DERIVED, INPUTS, POSES, Array, Contacts, Data, Model, State
 from ..interface.checks import HUGE, check_entries, check_writable
+from ..interface.options import unsupported
 from ._hidden_world import HiddenWorld, LookAhead, Moment, bounded
 
 
@@ -238,7 +239,7 @@ class HiddenData(Data):
         if self._trouble:
             self._refuse_if_troubled()
         if name in self._machine.world.untold:
-            raise self._home._unsupported("forces by part")
+            raise unsupported(self._home, "forces by part")
         return self._machine.derive(name)
 
     def _find_contacts(self) -> Contacts:

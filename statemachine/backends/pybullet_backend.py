@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType, SimpleNamespace
 from typing import Any, Literal, cast
 
 import mujoco
@@ -23,6 +25,7 @@ from ..interface import (
     Behaviour,
     Capabilities,
 )
+from ..interface.options import checked_options
 from . import _bullet_urdf as urdf
 from ._bullet_driven import DrivenWorld
 from ._bullet_plan import Plan
@@ -91,19 +94,24 @@ def _capabilities(as_it_comes: bool) -> Capabilities:
 
 
 def load(
-    path: str | os.PathLike[str], defaults: Literal["model", "engine"] = "model"
+    path: str | os.PathLike[str],
+    defaults: Literal["model", "engine"] = "model",
+    options: Mapping[str, Any] = MappingProxyType({}),
 ) -> PybulletModel:
     """Compile an MJCF, URDF or MJB file, and write it as URDF for PyBullet.
 
     Args:
         path: The file.
+        options: As `Model.replace` takes them; what they switch off is not refused.
         defaults: "engine" is what `loadURDF` gives: velocity motors in the joints,
             damping 0.04, friction 0.5, inertias of the collision shapes, no gravity until
             it is set, 1/240 s a step. ctrl is then what POSITION_CONTROL aims at.
 
     Raises:
         ModelError: It cannot be compiled, or PyBullet cannot read what was written.
-        UnsupportedError: It has something that PyBullet has no counterpart for.
+        UnsupportedError: It has something that PyBullet has no counterpart for, or there is no
+            such option.
+        BadInputError: The value of an option has the wrong shape, kind or size.
     """
     with compiler_warnings() as texts:
         raw = compile_file(path)
@@ -112,9 +120,15 @@ def load(
     if defaults == "engine":
         raw.opt.gravity[:] = 0
         raw.opt.timestep = ENGINE_TIMESTEP
+    about = SimpleNamespace(
+        backend="pybullet", capabilities=_capabilities(defaults == "engine"), **facts(raw)
+    )
+    checked = checked_options(about, options)
+    raw, substeps = edited(raw, checked), checked.get("substeps", 1)
+    raw.opt.timestep = step_length(float(raw.opt.timestep), substeps, checked)
     plan = Plan(raw)
     check(plan, "pybullet", Path(path))
-    model = PybulletModel(plan, Path(path), 1, defaults)
+    model = PybulletModel(plan, Path(path), substeps, defaults)
     World(plan, model._shared.kind).close()  # what PyBullet cannot read shows now
     differences = [*ignored(raw), *plan.surfaces.differences]
     if differences and defaults == "model":

@@ -28,14 +28,13 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
-    from ..experiments import fingertip
-    from ..lessons import fingertip as words
+    from ..lessons.fingertip import certify, page
 
     results = on_each_backend(
         options,
         "fingertip",
         options.model,
-        lambda model, _backend, report: fingertip.run(
+        lambda model, _backend, report: certify(
             model,
             poses=options.poses,
             seed=options.seed,
@@ -45,4 +44,4 @@ def run(options: argparse.Namespace) -> int:
             progress=report,
         ),
     )
-    return show(words.page(results), results, options.json)
+    return show(page(results), results, options.json)

@@ -178,8 +178,7 @@ def run_path(options: argparse.Namespace) -> int:
                 reader.go_on(f"station {number}: {lesson.question}")
             if reader:
                 reader.lesson = lesson.name
-            values = {option.key: option.default for option in lesson.options}
-            page, results = _compute(options, lesson, lesson.model, values)
+            page, results = _compute(options, lesson, lesson.model, {})
             everything[lesson.name] = results
             code = code if page.holds else SAYS_NO
             if not options.json:
@@ -203,8 +202,11 @@ def _compute(
     options: argparse.Namespace, lesson: Lesson, model: str, values: dict[str, Any]
 ) -> tuple[Any, dict[str, Any]]:
     """The page of a station, and the results that it was made from, by backend."""
+    from ..lessons.pictures import with_picture
     from ..lessons.session import page_of_lesson, take
 
+    if options.json:
+        values |= lesson.whole
     taken = on_each_backend(
         options,
         lesson.name,
@@ -214,6 +216,8 @@ def _compute(
         ),
     )
     page = page_of_lesson(lesson, taken)
+    if model == lesson.model and values == {each.key: each.default for each in lesson.options}:
+        page = with_picture(page, lesson.name)
     if not options.calls:
         return page, {name: each.result for name, each in taken.items()}
     from ..report import calls

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import BadInputError, ReadOnlyError, UnsupportedError, shown, unknown_name
-from .checks import TINY, as_numbers, as_vector, index_of, whole_number
-from .options import OPTIONS, PER_DOF, as_option
+from ..errors import BadInputError, ReadOnlyError, unknown_name
+from .checks import TINY, index_of, whole_number
+from .options import checked_options
 from .records import Array, Capabilities, Ints, JointType, Keyframe, read_only
 
 
@@ -172,31 +172,7 @@ class Model(ABC):
             UnsupportedError: This backend has no such option.
             BadInputError: The value has the wrong shape, kind or size.
         """
-        checked = {}
-        for name, value in options.items():
-            if name not in OPTIONS:
-                error = unknown_name("option", name, self.capabilities.options)
-                raise UnsupportedError(
-                    str(error), backend=self.backend, feature=name, reason="unknown"
-                ) from None
-            if name not in self.capabilities.options:
-                raise self._unsupported(name)
-            if name in PER_DOF:
-                checked[name] = self._per_dof(name, value)
-            else:
-                checked[name] = as_option(name, value, self.capabilities.integrators)
-        return self._replace(checked)
-
-    def _unsupported(self, feature: str) -> UnsupportedError:
-        """The error for what this backend cannot do; the reason is in its record."""
-        known = self.capabilities.behaviours.get(feature)
-        reason = known.note if known else "the engine has no such setting"
-        return UnsupportedError(
-            f"backend {self.backend!r} does not support {feature!r}: {reason}",
-            backend=self.backend,
-            feature=feature,
-            reason=reason,
-        )
+        return self._replace(checked_options(self, options))
 
     def _check_quaternions(self, qpos: Array) -> None:
         """Raise BadInputError for a quaternion of `qpos` (nq,) that is zero."""
@@ -221,20 +197,6 @@ class Model(ABC):
             starts = self.jnt_qposadr if array == "qpos" else self.jnt_dofadr
             label = self.joint_names[int(np.searchsorted(starts, index, side="right")) - 1]
         return f" ({label})" if label else ""
-
-    def _per_dof(self, name: str, value: Any) -> Array:
-        """The value of an option of `PER_DOF`, one number or (nv,), as a new array (nv,)."""
-        numbers = as_numbers(value, name)
-        given = as_vector(numbers, (self.nv,) if numbers.ndim else (), name)
-        if (given < 0).any():
-            raise BadInputError(f"{name} must not be negative; got {shown(value)}")
-        if given.ndim:
-            return given
-        # One number is meant for the joints of the robot, not for a free body.
-        values = np.array(getattr(self, f"dof_{name}"))
-        scalar = np.isin(self.jnt_type, (JointType.SLIDE, JointType.HINGE))
-        values[self.jnt_dofadr[scalar]] = given
-        return values
 
     def _with_fingerprint(
         self, layout: tuple[tuple[str, int], ...]

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
 
-from ..errors import BadInputError, unknown_name
-from .checks import as_count, as_scalar, as_switch, as_vector
+import numpy as np
+
+from ..errors import BadInputError, UnsupportedError, shown, unknown_name
+from .checks import as_count, as_numbers, as_scalar, as_switch, as_vector
+from .records import Array, Capabilities, Ints, JointType
 
 PER_DOF = ("armature", "damping", "frictionloss")  # one number for each degree of freedom
 _SWITCHES = ("actuation", "contacts", "limits")
@@ -20,6 +23,69 @@ OPTIONS = (
     "limits",
     "integrator",
 )
+
+
+class Optioned(Protocol):
+    """What options are checked against: a Model, or the facts that one will be made from."""
+
+    backend: str
+    capabilities: Capabilities
+    nv: int
+    jnt_type: Ints
+    jnt_dofadr: Ints
+    dof_armature: Array
+    dof_damping: Array
+    dof_frictionloss: Array
+
+
+def checked_options(of: Optioned, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options of `Model.replace`, as a backend takes them.
+
+    Raises:
+        UnsupportedError: The backend has no such option.
+        BadInputError: A value has the wrong shape, kind or size.
+    """
+    checked = {}
+    for name, value in options.items():
+        if name not in OPTIONS:
+            error = unknown_name("option", name, of.capabilities.options)
+            raise UnsupportedError(
+                str(error), backend=of.backend, feature=name, reason="unknown"
+            ) from None
+        if name not in of.capabilities.options:
+            raise unsupported(of, name)
+        if name in PER_DOF:
+            checked[name] = _per_dof(of, name, value)
+        else:
+            checked[name] = as_option(name, value, of.capabilities.integrators)
+    return checked
+
+
+def unsupported(of: Optioned, feature: str) -> UnsupportedError:
+    """The error for what this backend cannot do; the reason is in its record."""
+    known = of.capabilities.behaviours.get(feature)
+    reason = known.note if known else "the engine has no such setting"
+    return UnsupportedError(
+        f"backend {of.backend!r} does not support {feature!r}: {reason}",
+        backend=of.backend,
+        feature=feature,
+        reason=reason,
+    )
+
+
+def _per_dof(of: Optioned, name: str, value: Any) -> Array:
+    """The value of an option of `PER_DOF`, one number or (nv,), as a new array (nv,)."""
+    numbers = as_numbers(value, name)
+    given = as_vector(numbers, (of.nv,) if numbers.ndim else (), name)
+    if (given < 0).any():
+        raise BadInputError(f"{name} must not be negative; got {shown(value)}")
+    if given.ndim:
+        return given
+    # One number is meant for the joints of the robot, not for a free body.
+    values = np.array(getattr(of, f"dof_{name}"))
+    scalar = np.isin(of.jnt_type, (JointType.SLIDE, JointType.HINGE))
+    values[of.jnt_dofadr[scalar]] = given
+    return values
 
 
 def as_option(name: str, value: Any, integrators: Sequence[str]) -> Any:

@@ -45,7 +45,9 @@ LESSONS = {
                 _JOINT,
                 _VALUE,
                 Option("--site", "gripperframe", "the fingertip"),
-                Option("--seconds", 2.0, "simulated time under a command", float),
+                Option("--arrays", False, "show which arrays each call changes", bool, more=True),
+                Option("--lag", False, "show how far behind a step leaves it", bool, more=True),
+                Option("--seconds", None, "simulated time of --lag (default 2)", float),
             ),
         ),
         Lesson(

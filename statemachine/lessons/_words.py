@@ -70,21 +70,6 @@ def emulation(results: Mapping[str, Any], *promises: str) -> list[Text]:
     return texts
 
 
-def itself(name: str, asked: Sequence[Any]) -> list[Table]:
-    """What the engine does without us."""
-    if not asked:
-        return []
-    questions = " ".join(dict.fromkeys(each.question for each in asked))
-    return [
-        Table(
-            ("after", "what", "is"),
-            [(f"a {each.question}", each.part, each.answer) for each in asked],
-            title=f"{name} itself, without us (statemachine conventions {questions})",
-            words=frozenset({0, 1, 2}),
-        )
-    ]
-
-
 def differences(
     results: Mapping[str, Any], rows: Sequence[tuple[str, Callable[[Any, Any], str]]]
 ) -> list[Table]:

@@ -1,38 +1,50 @@
-"""Stored, derived, integrated: what forward and step recompute, and of which moment it is."""
+"""Stored, derived: what forward recomputes, and when the fingertip notices a write."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
-from ..comparison import largest
-from ..comparison.text import count, millimetres, short_time, vector
-from ..experiments import forward
-from ..page import Page, Pipeline, Question, Table, Text, Traces, Verdict
-from ._words import differences, emulation, itself, page_of, sentence, typed, where
+import numpy as np
+
+from ..comparison.text import count, millimetres, vector
+from ..interface import Array, Data, Model
+from ..interface.checks import as_scalar
+from ..page import Page, Question, Table, Text, Verdict
+from ..scenarios.provenance import Provenance, provenance
+from ..scenarios.robot import scalar_joint
+from ..scenarios.runs import Progress, steps_in
+from ._stages import (
+    Look,
+    OwnAnswer,
+    Stages,
+    arrays_section,
+    find_stages,
+    lag_section,
+    look_at,
+    own_answers,
+)
+from ._words import differences, emulation, page_of, sentence, typed, where
 from .records import Session
+from .session import Play, Watch
 
-_WHEN = ("before it", "after it")
-_MOMENTS = ("xpos", "site_xpos", "contacts", "qacc")  # shown of what a step leaves behind
-
-
-def run(play: Any, options: Mapping[str, Any], progress: Any) -> forward.Forward:
-    """Four readings."""
-    model = play.model
-    play()
-    return forward.run(
-        model,
-        joint=options["joint"],
-        value=options["value"],
-        site=options["site"],
-        seconds=options["seconds"],
-        progress=progress,
-    )
+_SECONDS = 2.0  # under a command, long enough to touch something
+_INSIDE = 1e-3  # metres; less is how engines press things together
+_CHOICES: dict[tuple[tuple[int, int], ...], int] = {
+    ((0, 1),): 0,
+    ((1, 2),): 1,
+    ((2, 3),): 2,
+    ((1, 3),): 3,
+}
 
 
-def code(model: Any, options: Mapping[str, Any], load: str) -> str:
+def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """The four readings."""
+    scalar_joint(model, options["joint"])  # says what is wrong with it
+    model.site_id(options["site"])
+    value = as_scalar(options["value"], "value")
     return f"""\
 import statemachine as sm
 
@@ -43,16 +55,110 @@ data = sm.make_data(model)
 print(1, data.site_xpos[tip].round(4))
 sm.forward(model, data)
 print(2, data.site_xpos[tip].round(4))
-data.qpos[slot] = {options["value"]:g}
+data.qpos[slot] = {value}
 print(3, data.site_xpos[tip].round(4))
 sm.forward(model, data)
 print(4, data.site_xpos[tip].round(4))
 """
 
 
-def page(results: Mapping[str, forward.Forward], session: Session) -> Page:
-    """The readings, which are equal, what each call changes, and of which moment it is."""
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """One reading: what had been done, the fingertip (3,) [m], and the time [s]."""
+
+    after: str
+    fingertip: Array
+    time: float
+
+
+@dataclass(frozen=True, eq=False)
+class Forward:
+    """The four readings.
+
+    Attributes:
+        equal: Pairs (i, j), i < j, of readings that are equal bit by bit.
+        moved: Distance [m] that the write and the second `forward` moved the fingertip.
+        contacts: How many were found after the second `forward`; deepest: how far the two
+            surfaces of the worst of them are inside each other [m].
+        itself: What the engine does without us, where some of this is emulated.
+        stages: What each call changes, and of which moment derived values are; of these
+            two and of `itself` what was asked for.
+    """
+
+    joint: str
+    value: float
+    readings: tuple[Reading, ...]
+    equal: tuple[tuple[int, int], ...]
+    moved: float
+    contacts: int
+    deepest: float
+    itself: tuple[OwnAnswer, ...]
+    stages: Stages
+    provenance: Provenance
+
+
+def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Forward:
+    """Read the fingertip at each print; then what else was asked for."""
+    model, joint, value = play.model, options["joint"], options["value"]
+    place, _ = scalar_joint(model, joint)
+    arrays, steps = options["arrays"], _steps(model, options)
+    watch = _Readings(model.site_id(options["site"]), arrays)
+    names = play(watch)
+    labels = ("make_data", "forward", f"qpos[{place}] = {value:g}", "forward again")
+    tips = [fingertip for fingertip, _ in watch.read]
+    found = names["data"].contacts
+    itself = own_answers(model, "write") if arrays else ()
+    if steps:
+        itself += own_answers(model, "step")
+    return Forward(
+        joint=joint,
+        value=value,
+        readings=tuple(Reading(label, *at) for label, at in zip(labels, watch.read, strict=True)),
+        equal=tuple(
+            (i, j)
+            for i in range(len(tips))
+            for j in range(i + 1, len(tips))
+            if np.array_equal(tips[i], tips[j])
+        ),
+        moved=float(np.linalg.norm(tips[3] - tips[2])),
+        contacts=len(found),
+        deepest=max(0.0, -float(found.dist.min(initial=0.0))),
+        itself=itself,
+        stages=find_stages(model, options["site"], place, value, watch.looks[1:], steps, progress),
+        provenance=provenance(model),
+    )
+
+
+def _steps(model: Model, options: Mapping[str, Any]) -> int:
+    """Over how many steps to look at the lag; 0 if it is not asked for."""
+    seconds = options["seconds"]
+    if seconds is None:
+        return steps_in(model, _SECONDS) if options["lag"] else 0
+    return steps_in(model, seconds)
+
+
+class _Readings(Watch):
+    """The fingertip and the time at each print, and, if wanted, every array."""
+
+    def __init__(self, tip: int, arrays: bool) -> None:
+        self._tip, self._arrays = tip, arrays
+        self.read: list[tuple[Array, float]] = []
+        self.looks: list[Look] = []
+
+    def after_line(self, source: str, names: Mapping[str, Any]) -> None:
+        if not source.startswith("print("):
+            return
+        data: Data = names["data"]
+        self.read.append((np.array(data.site_xpos[self._tip]), data.time))
+        if self._arrays:
+            self.looks.append(look_at(data))
+
+
+def page(results: Mapping[str, Forward], session: Session) -> Page:
+    """The readings, which are equal, and what that means; then what was asked for."""
     first = next(iter(results.values()))
+    stages = {name: result.stages for name, result in results.items()}
+    arrays, lag = len(first.stages.changes) > 0, len(first.stages.lag) > 0
     blocks: list[Any] = [
         Text("A fresh arm. Where is its fingertip, and who works that out, and when?"),
         *typed(
@@ -72,7 +178,33 @@ def page(results: Mapping[str, forward.Forward], session: Session) -> Page:
             "forward recomputes all of it, and takes no time. step does the same, and then "
             "integrates: it makes the next qpos and qvel."
         ),
+        *_readings(results),
     ]
+    for name, result in results.items():
+        blocks += _findings(results, name, result)
+    promises = ["zeros when fresh", "stale after a write"]
+    blocks += emulation(results, *promises, *["stale after a step"] * lag)
+    rows = [(f"fingertip, reading {i + 1}", _apart(i)) for i in range(len(first.readings))]
+    blocks += differences(results, rows)
+    if arrays:
+        blocks += arrays_section(stages, _own(results, "write"))
+    if lag:
+        blocks += lag_section(stages, _own(results, "step"))
+    if not arrays:
+        blocks.append(
+            Text("Which arrays each call changes, one by one: statemachine lesson forward --arrays")
+        )
+    if not lag:
+        blocks.append(
+            Text("How far behind a step leaves the fingertip: statemachine lesson forward --lag")
+        )
+    return page_of("Stored, derived, integrated", results, blocks)
+
+
+def _readings(results: Mapping[str, Forward]) -> list[Table | Text]:
+    """The four readings, and what the first of them is."""
+    first = next(iter(results.values()))
+    blocks: list[Table | Text] = []
     if not any(first.readings[0].fingertip):
         blocks.append(
             Text(
@@ -101,187 +233,50 @@ def page(results: Mapping[str, forward.Forward], session: Session) -> Page:
             emphasis=frozenset(twins),
         )
     )
-    for name, result in results.items():
-        blocks.append(
-            Verdict(
-                f"{where(results, name)}readings 2 and 3 are equal bit by bit: the write changed "
-                "nothing that is derived",
-                (1, 2) in result.equal,
-            )
-        )
-        moved = millimetres(result.moved, 1)
-        if result.moved:
-            text = f"the second forward moved the fingertip by {moved}"
-        else:
-            text = (
-                f"the second forward moved the fingertip by {moved}: {result.joint} was there "
-                "already, or does not carry it"
-            )
-        blocks.append(sentence(results, name, f"{text}."))
-        unmoved = all(reading.time == result.readings[0].time for reading in result.readings)
-        blocks.append(
-            Verdict(f"{where(results, name)}data.time is the same in all four readings", unmoved)
-        )
-        if result.deepest > _INSIDE:
-            blocks.append(
-                sentence(
-                    results,
-                    name,
-                    "nobody checks whether a robot could be where you write it: forward finds "
-                    f"{count(result.contacts, 'contact')} now, the worst "
-                    f"{millimetres(result.deepest, 1)} inside each other.",
-                )
-            )
-    blocks += emulation(results, "zeros when fresh", "stale after a write", "stale after a step")
-    for name, result in results.items():
-        blocks += itself(name, result.itself)
-    blocks += _what_changes(results)
-    blocks += _moments(results)
-    rows = [(f"fingertip, reading {i + 1}", _apart(i)) for i in range(len(first.readings))]
-    blocks += differences(results, rows)
-    return page_of("Stored, derived, integrated", results, blocks)
-
-
-_CHOICES: dict[tuple[tuple[int, int], ...], int] = {
-    ((0, 1),): 0,
-    ((1, 2),): 1,
-    ((2, 3),): 2,
-    ((1, 3),): 3,
-}
-
-
-def _what_changes(results: Mapping[str, forward.Forward]) -> list[Any]:
-    """Arrays whose bytes a write, forward and step changed, in groups that behave alike."""
-    blocks: list[Any] = []
-    first = next(iter(results.values())).stages
-    alike = {result.stages.changes: [] for result in results.values()}
-    for name, result in results.items():
-        alike[result.stages.changes].append(name)
-    for changes, names in alike.items():
-        groups: dict[tuple[bool, ...], list[str]] = {}
-        for each in changes:
-            key = (each.stored, each.write, each.forward, each.step)
-            groups.setdefault(key, []).append(each.name)
-        prefix = f"{', '.join(names)}: " if len(results) > 1 else ""
-        blocks.append(
-            Table(
-                ("", "a write", "forward", "step"),
-                [
-                    (_list(members, stored), *("changes" if flag else "–" for flag in flags))
-                    for (stored, *flags), members in groups.items()
-                ],
-                title=f"{prefix}Whose bytes change, after a write to qpos[…] and then one call",
-                words=frozenset({0, 1, 2, 3}),
-            )
-        )
-    for name, result in results.items():
-        derived = [each.name for each in result.stages.changes if not each.stored]
-        other = [each for each in derived if each not in result.stages.same]
-        text = f"step computed {len(derived) - len(other)} of {len(derived)} derived arrays with "
-        text += "the same bits as forward"
-        blocks.append(
-            Verdict(
-                f"{where(results, name)}from the written state {text}"
-                + (f", not {', '.join(other)}" if other else "; then it integrated"),
-                {"xpos", "xquat", "site_xpos", "site_xmat"} <= set(result.stages.same),
-            )
-        )
-    stored = [each.name for each in first.changes if each.stored]
-    derived = [each.name for each in first.changes if not each.stored and each.forward]
-    moved = [each.name for each in first.changes if each.stored and each.step]
-    blocks.append(
-        Pipeline(
-            "What forward and step cover, as found by comparing bytes",
-            (("stored", stored), ("derived", derived), ("integrated", moved)),
-            (("forward", 0, 1), ("step", 0, 2)),
-        )
-    )
     return blocks
 
 
-def _list(names: list[str], stored: bool) -> str:
-    lines = ["stored: " if stored else "derived: "]
-    for name in names:
-        if len(lines[-1]) + len(name) > _COLUMN:
-            lines.append("  ")
-        lines[-1] += name + ("" if name == names[-1] else ", ")
-    return "\n".join(line.rstrip() for line in lines)
-
-
-_COLUMN = 44
-_INSIDE = 1e-3  # metres; less is how engines press things together
-
-
-def _moments(results: Mapping[str, forward.Forward]) -> list[Any]:
-    """To which moment belongs what a step leaves behind."""
-    first = next(iter(results.values())).stages
-    steps = len(first.lag)
-    blocks: list[Any] = [
-        Text(
-            "And after a step, of which moment is what you read? step computes first and moves "
-            f"afterwards. A command moves the arm for {count(steps, 'step')}; after each, what "
-            "the step left is compared with what forward says before and after it, bit by bit."
-        ),
-        Table(
-            (
-                "after a step",
-                *(
-                    f"{where(results, name)}{m}"
-                    for name in results
-                    for m in ("before it", "after it")
-                ),
-            ),
-            [
-                (
-                    name,
-                    *(
-                        str(table.get(name, "–"))
-                        for result in results.values()
-                        for table in (result.stages.of_before, result.stages.of_after)
-                    ),
-                )
-                for name in _MOMENTS
-            ],
-            title=f"Of {count(steps, 'step')}: how often that of the state before it, and after it",
-        ),
-        Text("(What did not change in a step, as an empty list of contacts, is of both.)"),
+def _findings(results: Mapping[str, Forward], name: str, result: Forward) -> list[Text | Verdict]:
+    """What the readings of one engine mean."""
+    blocks: list[Text | Verdict] = [
+        Verdict(
+            f"{where(results, name)}readings 2 and 3 are equal bit by bit: the write changed "
+            "nothing that is derived",
+            (1, 2) in result.equal,
+        )
     ]
-    for name, result in results.items():
-        stages = result.stages
-        lag, row = largest(stages.lag)
-        if lag == 0:
-            blocks.append(sentence(results, name, f"{stages.site} did not move in this run."))
-            continue
-        # Contacts of step and forward may be found with another memory of what touched before.
-        left = ["site_xpos"] + ["contacts"] * (stages.of_before["contacts"] == steps)
+    text = f"the second forward moved the fingertip by {millimetres(result.moved, 1)}"
+    if not result.moved:
+        text += f": {result.joint} was there already, or does not carry it"
+    blocks.append(sentence(results, name, f"{text}."))
+    unmoved = all(reading.time == result.readings[0].time for reading in result.readings)
+    blocks.append(
+        Verdict(f"{where(results, name)}data.time is the same in all four readings", unmoved)
+    )
+    if result.deepest > _INSIDE:
         blocks.append(
-            Verdict(
-                f"{where(results, name)}after each step {' and '.join(left)} "
-                f"{'are' if len(left) > 1 else 'is'} of the state before it: the fingertip is "
-                f"{millimetres(lag)} behind at worst (in the step from "
-                f"{short_time(stages.time[row])}). Drawings in which step delivers the next "
-                "state's xpos and contacts are wrong: call forward before you read",
-                all(stages.of_before[each] == steps > stages.of_after[each] for each in left),
+            sentence(
+                results,
+                name,
+                "nobody checks whether a robot could be where you write it: forward finds "
+                f"{count(result.contacts, 'contact')} now, the worst "
+                f"{millimetres(result.deepest, 1)} inside each other.",
             )
         )
-    blocks.append(
-        Traces(
-            "How far site_xpos is behind after each step",
-            "time [s]",
-            "distance [mm]",
-            {
-                name: (result.stages.time.tolist(), (result.stages.lag * 1e3).tolist())
-                for name, result in results.items()
-            },
-        )
-    )
     return blocks
 
 
-def _apart(reading: int) -> Callable[[Any, Any], str]:
-    def say(one: forward.Forward, two: forward.Forward) -> str:
-        return (
-            f"{math.dist(one.readings[reading].fingertip, two.readings[reading].fingertip):.1e} m"
-        )
+def _own(results: Mapping[str, Forward], question: str) -> dict[str, list[OwnAnswer]]:
+    """What each engine itself does, of one question."""
+    return {
+        name: [each for each in result.itself if each.question == question]
+        for name, result in results.items()
+    }
+
+
+def _apart(reading: int) -> Callable[[Forward, Forward], str]:
+    def say(one: Forward, two: Forward) -> str:
+        tips = [each.readings[reading].fingertip for each in (one, two)]
+        return f"{math.dist(*tips):.1e} m"
 
     return say

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..comparison.text import count, degrees, duration, millimetres
-from ..experiments import forward
 from ..interface import Model
 from ..page import Page, Question, Text, Verdict
 from ..scenarios.provenance import Provenance, provenance
 from ..scenarios.runs import Progress, part_of
-from . import LESSONS, gravity, objects, replay, state, time
+from . import LESSONS, forward, gravity, objects, replay, state, time
 from ._words import page_of, where
 from .records import Session
 from .session import Play, take
@@ -21,7 +20,7 @@ from .session import Play, take
 _Answered = tuple[Question, str, bool]
 # The lessons that answer, by the field of `Answers`, with little to do.
 _ASKED: dict[str, tuple[str, dict[str, Any]]] = {
-    "forward": ("forward", {"seconds": 0.1}),
+    "forward": ("forward", {}),
     "state": ("state", {}),
     "replay": ("replay", {"steps": 150}),
     "gravity": ("gravity", {"seconds": 4.0, "longer": 0.0}),

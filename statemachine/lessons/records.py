@@ -11,7 +11,11 @@ from ..page import Page
 
 @dataclass(frozen=True)
 class Option:
-    """An option of a lesson: a flag of the command line, a key of `options`."""
+    """An option of a lesson: a flag of the command line, a key of `options`.
+
+    Attributes:
+        more: Whether it shows more of the lesson; JSON and documentation show all.
+    """
 
     flag: str
     default: Any
@@ -19,6 +23,7 @@ class Option:
     kind: type = str
     choices: tuple[str, ...] | None = None
     many: bool = False
+    more: bool = False
 
     @property
     def key(self) -> str:
@@ -35,6 +40,11 @@ class Lesson:
     model: str
     options: tuple[Option, ...] = ()
     station: bool = True  # of the path
+
+    @property
+    def whole(self) -> dict[str, Any]:
+        """The options that show all of it."""
+        return {option.key: True for option in self.options if option.more}
 
 
 @dataclass(frozen=True)

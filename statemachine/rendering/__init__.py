@@ -10,8 +10,8 @@ of its room, in a process of its own, which an OpenGL library that is missing ta
 
 from __future__ import annotations
 
-from .motion import Motion, models_of, motion_of
-from .pictures import LONGEST, Timing, camera_for, frames, timing_of
+from .motion import Motion, models_of, motion_of, motion_through
+from .pictures import LONGEST, Timing, camera_for, drawn, frames, timing_of
 from .probe import Renderer, renderer_here, renderers
 
 __all__ = [
@@ -20,9 +20,11 @@ __all__ = [
     "Renderer",
     "Timing",
     "camera_for",
+    "drawn",
     "frames",
     "models_of",
     "motion_of",
+    "motion_through",
     "renderer_here",
     "renderers",
     "timing_of",

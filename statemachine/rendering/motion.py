@@ -47,7 +47,7 @@ def models_of(*traces: Trace) -> tuple[Model, ...]:
 def motion_of(trace: Trace, model: Model, times: Array) -> Motion:
     """The poses of a trace at times (n,), counted from its start: each of the nearest row.
 
-    A trace without poses has them from its qpos, by MuJoCo's kinematics.
+    A trace without poses has them from its qpos.
 
     Raises:
         TraceError: The model has other bodies than the trace, or a pose is no number.
@@ -67,11 +67,16 @@ def motion_of(trace: Trace, model: Model, times: Array) -> Motion:
                 "bodies that are numbers: it cannot be drawn"
             )
         return Motion(model.path, xpos, xquat)
+    return motion_through(model, trace.qpos[rows])
+
+
+def motion_through(model: Model, qpos: Array) -> Motion:
+    """The poses that qpos (n, nq) stands for, by MuJoCo's kinematics."""
     reader = on_default(model)
-    xpos, xquat = np.empty((len(rows), model.nbody, 3)), np.empty((len(rows), model.nbody, 4))
+    xpos, xquat = np.empty((len(qpos), model.nbody, 3)), np.empty((len(qpos), model.nbody, 4))
     with make_data(reader) as data:
-        for k, row in enumerate(rows.tolist()):
-            data.qpos[:] = trace.qpos[row]
+        for k, row in enumerate(qpos):
+            data.qpos[:] = row
             forward(reader, data)
             xpos[k], xquat[k] = data.xpos, data.xquat
     return Motion(model.path, xpos, xquat)

@@ -141,7 +141,7 @@ def frames(
     ]
     if camera is None:
         camera = camera_for(motions, models, size)
-    yield from _drawn(motions, size, camera, renderer_here() if renderer is None else renderer)
+    yield from drawn(motions, size, camera, renderer_here() if renderer is None else renderer)
 
 
 def camera_for(motions: list[Motion], models: tuple[Model, ...], size: tuple[int, int]) -> Camera:
@@ -161,9 +161,10 @@ def camera_for(motions: list[Motion], models: tuple[Model, ...], size: tuple[int
     return framed(np.concatenate(points), size[0] / size[1], azimuth, _ELEVATION)
 
 
-def _drawn(
+def drawn(
     motions: list[Motion], size: tuple[int, int], camera: Camera, renderer: Renderer
 ) -> Generator[Pixels]:
+    """Pictures of one motion, or of two in one place, as `frames` has them."""
     width, height = size
     facts = {
         "renderer": renderer.room.__name__,

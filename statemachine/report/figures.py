@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 
 from ..errors import MissingEngineError
-from ..page import Picture, Pipeline, Slots, Traces
+from ..page import Pipeline, Slots, Traces
 from .log_axis import LogAxis
 
 _COLOURS = ("#1f5fa8", "#c2571a", "#2f8f4e", "#8a4fa0", "#b03a48", "#6b6b6b", "#3aa6a6")
@@ -17,7 +17,7 @@ _INK, _PAPER, _BELOW = "#222222", "#ffffff", "#f0f0f0"  # the last: behind the l
 _POWERS = 8  # that a log axis names, at most
 
 
-def svg(picture: Picture) -> str:
+def svg(picture: Traces | Slots | Pipeline) -> str:
     """A picture as SVG; the same figures give the same text.
 
     Raises:

@@ -5,7 +5,20 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
-from ..page import LETTERS, Block, Code, Page, Picture, Printed, Question, Table, Text, Verdict
+from ..page import (
+    LETTERS,
+    Block,
+    Code,
+    Heading,
+    Page,
+    Picture,
+    Printed,
+    Question,
+    RobotPicture,
+    Table,
+    Text,
+    Verdict,
+)
 from .terminal import together
 
 # What Markdown would take for its own; underscores within words it leaves alone.
@@ -28,11 +41,15 @@ def body(page: Page, picture: Callable[[Picture], str]) -> Iterator[str]:
     """The page under its heading, block by block.
 
     What follows a question is folded away, up to the next one: it would give the answer away.
+    So is what follows a heading, under the heading's own words.
     """
     yield f"*{_escaped(page.origin)}*"
     blocks = list(page.blocks)
     while blocks:
         block = blocks.pop(0)
+        if isinstance(block, Heading):
+            yield _folded(_until(blocks, (Question, Heading), picture), _escaped(block.text))
+            continue
         if not isinstance(block, Question):
             yield block_as_markdown(block, picture)
             continue
@@ -40,14 +57,25 @@ def body(page: Page, picture: Callable[[Picture], str]) -> Iterator[str]:
         while blocks and isinstance(blocks[0], says):
             inside.append(block_as_markdown(blocks.pop(0), picture))
         inside.append(answer(block))
-        while blocks and not isinstance(blocks[0], Question):
-            inside.append(block_as_markdown(blocks.pop(0), picture))
+        inside += _until(blocks, (Question, Heading), picture)
         yield f"{asked(block)}\n\n{_folded(inside)}"
+
+
+def _until(
+    blocks: list[Block], ends: tuple[type, ...], picture: Callable[[Picture], str]
+) -> list[str]:
+    """Take the blocks before the next that begins something else, as Markdown."""
+    taken = []
+    while blocks and not isinstance(blocks[0], ends):
+        taken.append(block_as_markdown(blocks.pop(0), picture))
+    return taken
 
 
 def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
     """One block; empty if there is nothing to show."""
     match block:
+        case Heading(text):
+            return f"**{_escaped(text)}**"
         case Text(text):
             return _escaped(text)
         case Code(lines):
@@ -63,6 +91,10 @@ def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
             return _table(block)
         case Verdict(text, holds):
             return f"{'✓' if holds else '✗'} {_escaped(text)}"
+        case RobotPicture():
+            where = picture(block)
+            shown = f"![{_escaped(block.words)}]({where})" if where else _escaped(block.words)
+            return f"{shown}\n\n*{_escaped(block.title)}* Live: `{block.view}`"
         case _:
             where = picture(block)
             return f"![{_escaped(block.title)}]({where})" if where else ""
@@ -84,9 +116,9 @@ def answer(block: Question) -> str:
     return f"{letter}{_escaped(right)}. {_escaped(block.because)}"
 
 
-def _folded(inside: list[str]) -> str:
+def _folded(inside: list[str], summary: str = "What the run says") -> str:
     text = "\n\n".join(filter(None, inside))
-    return f"<details><summary>What the run says</summary>\n\n{text}\n\n</details>"
+    return f"<details><summary>{summary}</summary>\n\n{text}\n\n</details>"
 
 
 def _table(block: Table) -> str:

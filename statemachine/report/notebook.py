@@ -16,11 +16,13 @@ from ..backends import load
 from ..errors import BadInputError, MissingEngineError, unknown_name
 from ..installed import DEFAULT
 from ..lessons import LESSONS, module
+from ..lessons.pictures import with_picture
 from ..lessons.records import Lesson
 from ..lessons.session import page_of_lesson, take
-from ..page import LETTERS, Code, Page, Picture, Printed, Question, Text
+from ..page import LETTERS, Code, Page, Picture, Printed, Question, RobotPicture, Text
 from .figures import svg
 from .markdown import answer, asked, block_as_markdown
+from .robot_pictures import webp
 from .terminal import judged
 
 _INSTALL = """\
@@ -111,7 +113,7 @@ def station(name: str, backend: str = DEFAULT, prediction: str = "", **options: 
                 f"a prediction is a letter for each question, such as {LETTERS[0]!r}; "
                 f"got {prediction!r}"
             )
-    return Shown(page, letters)
+    return Shown(page if options else with_picture(page, name), letters)
 
 
 def build() -> str:
@@ -179,12 +181,14 @@ def _opening(page: Page) -> str:
 
 
 def _inline(picture: Picture) -> str:
-    """A picture as a data address; none without matplotlib."""
+    """A picture as a data address; none without what draws it."""
+    robot = isinstance(picture, RobotPicture)
     try:
-        encoded = base64.b64encode(svg(picture).encode()).decode()
+        content = webp(picture) if robot else svg(picture).encode()
     except MissingEngineError:
         return ""
-    return f"data:image/svg+xml;base64,{encoded}"
+    encoded = base64.b64encode(content).decode()
+    return f"data:image/{'webp' if robot else 'svg+xml'};base64,{encoded}"
 
 
 def _cell(name: str, kind: str, source: str) -> dict[str, Any]:

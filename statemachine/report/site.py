@@ -14,8 +14,9 @@ from ..conventions import phrasebook, probe
 from ..errors import MissingEngineError
 from ..installed import available
 from ..lessons import LESSONS
+from ..lessons.pictures import with_picture
 from ..lessons.session import page_of_lesson, take
-from ..page import Page, Picture, Traces, Verdict
+from ..page import Page, Picture, RobotPicture, Traces, Verdict
 from ..scenarios import scenario
 from ..traces.whole import replace_file
 from . import compare as comparison
@@ -23,6 +24,7 @@ from . import conventions, why
 from .cheat_sheet import cheat_sheet
 from .figures import svg
 from .markdown import block_as_markdown, markdown
+from .robot_pictures import webp
 
 
 def make_path(
@@ -50,8 +52,8 @@ def make_path(
                 if backends:
                     raise
                 continue
-            taken[backend] = take(lesson, model, backend)
-        page = page_of_lesson(lesson, taken)
+            taken[backend] = take(lesson, model, backend, lesson.whole)
+        page = with_picture(page_of_lesson(lesson, taken), lesson.name)
         name, typed = f"{number:02}-{lesson.name}", f"statemachine lesson {lesson.name}"
         written.append(_write(folder, name, page, lesson.question, typed))
     return written
@@ -75,7 +77,7 @@ def make_reference(folder: Path, say: Callable[[str], None] = print) -> list[Pat
         "cheat-sheet": cheat_sheet(table),
     }
     for name, text in pages.items():
-        _save(folder / f"{name}.md", text)
+        _save(folder / f"{name}.md", text.encode())
     return [folder / f"{name}.md" for name in pages]
 
 
@@ -139,21 +141,28 @@ def _write(folder: Path, name: str, page: Page, question: str, typed: str) -> Pa
     pictures: list[str] = []
 
     def picture(block: Picture) -> str:
-        file = f"{name}-{len(pictures) + 1}.svg"
-        pictures.append(file)
-        _save(folder / file, svg(block))
+        robot = isinstance(block, RobotPicture)
+        try:
+            content = webp(block) if robot else svg(block).encode()
+        except MissingEngineError:
+            if robot:
+                return ""  # the page has its words
+            raise
+        file = f"{name}-robot.webp" if robot else f"{name}-{len(pictures) + 1}.svg"
+        pictures.extend([] if robot else [file])
+        _save(folder / file, content)
         return file
 
     text = markdown(page, picture)
     heading, _, rest = text.partition("\n\n")
     lead = f"**{question}** " if question else ""
     path = folder / f"{name}.md"
-    _save(path, f"{heading}\n\n{lead}In a terminal: `{typed}`\n\n{rest}")
+    _save(path, f"{heading}\n\n{lead}In a terminal: `{typed}`\n\n{rest}".encode())
     return path
 
 
-def _save(path: Path, text: str) -> None:
+def _save(path: Path, content: bytes) -> None:
     """Write beside, then rename: a page is never half there."""
-    if path.exists() and path.read_text(encoding="utf-8") == text:
+    if path.exists() and path.read_bytes() == content:
         return
-    replace_file(path, lambda out: out.write(text.encode()))
+    replace_file(path, lambda out: out.write(content))

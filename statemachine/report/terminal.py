@@ -7,7 +7,19 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from ..page import LETTERS, Block, Code, Page, Printed, Question, Table, Text, Verdict
+from ..page import (
+    LETTERS,
+    Block,
+    Code,
+    Heading,
+    Page,
+    Printed,
+    Question,
+    RobotPicture,
+    Table,
+    Text,
+    Verdict,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -65,6 +77,8 @@ def show(page: Page, footer: str = "", reader: Reader | None = None) -> None:
                 right = "none of the above" if block.right is None else block.choices[block.right]
                 _write(tell, [Text(block.text), Text(f"Answer: {right}. {block.because}")])
             continue
+        if isinstance(block, RobotPicture):
+            continue
         _write(tell, [block])
         if reader and said:  # first what the run says, then who was right
             _write(tell, [judged(*said)])
@@ -73,6 +87,9 @@ def show(page: Page, footer: str = "", reader: Reader | None = None) -> None:
                 reader.go_on()
     if len(answered) > 1:
         _write(tell, [Text(f"You had {sum(answered)} of {len(answered)} right.")])
+    views = [block.view for block in page.blocks if isinstance(block, RobotPicture)]
+    if reader and views:
+        _write(tell, [Text(f"To look at it: {views[0]}")])
     if footer:
         _write(tell, [], footer=footer)
     else:
@@ -137,6 +154,9 @@ def _print(console: Console, blocks: Sequence[Block], heading: Page | None, foot
         console.print(f"[dim]{escape(heading.origin)}[/]")
     for block in blocks:
         match block:
+            case Heading(text):
+                console.print()
+                console.print(f"[bold]{escape(text)}[/]")
             case Text(text):
                 console.print()
                 console.print(escape(text))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ...compare import Agreement, Comparison, Witness
 from ...comparison.text import capital, milliseconds, numbers, quantity, short_time
-from ...page import Code, Page, Printed, Table, Text, Verdict
+from ...page import Code, Heading, Page, Printed, Table, Text, Verdict
 from ...traces import Header
 from .finding import coarsely, name_of, window
 from .markup import Html, joined, kept, tag
@@ -155,7 +155,9 @@ def from_page(page: Page) -> Html:
     """The blocks of a page of the terminal."""
     parts: list[object] = []
     for block in page.blocks:
-        if isinstance(block, Text):
+        if isinstance(block, Heading):
+            parts.append(tag("h3", block.text))
+        elif isinstance(block, Text):
             parts.append(tag("p", block.text))
         elif isinstance(block, Table):
             words = [k for k in block.words if k]

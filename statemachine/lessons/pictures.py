@@ -1,0 +1,187 @@
+"""What a reader sees of the robot at each station: one pose or a short run, on MuJoCo.
+
+Nothing is run before a picture is drawn: a terminal shows only how to look at the same in
+a browser.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ..backends import load
+from ..interface import Array, Data, Model, forward, make_data, reset, step
+from ..page import Page, Printed, RobotPicture
+from ..scenarios import SCENARIOS, TARGET
+
+_ARM, _BOX = "so101/scene", "so101/scene_box"
+_EVERY = 16  # steps of 5 ms from one picture of a film to the next, which is shown 0.08 s later
+_SLOW = 4  # the same, for four times as slow
+
+
+def with_picture(page: Page, lesson: str) -> Page:
+    """The page of a lesson, and after what its code printed a picture of the robot."""
+    if lesson not in PICTURES:
+        return page
+    printed = [k for k, block in enumerate(page.blocks) if isinstance(block, Printed)]
+    if not printed:
+        return page
+    at = printed[0] + 1
+    return replace(page, blocks=[*page.blocks[:at], PICTURES[lesson], *page.blocks[at:]])
+
+
+def _poses(
+    name: str,
+    pictures: int,
+    ctrl: Sequence[float] | None = None,
+    keyframe: int | None = None,
+    change: Callable[[Model, Data], None] = lambda _model, _data: None,
+    options: Mapping[str, Any] | None = None,
+    every: int = _EVERY,
+) -> Array:
+    """Rows of qpos (pictures, nq) of a run, from its start on, so many steps apart."""
+    model = load(name).replace(**(options or {}))
+    found = np.empty((pictures, model.nq))
+    with make_data(model) as data:
+        reset(model, data, keyframe=keyframe)
+        if ctrl is not None:
+            data.ctrl[:] = ctrl
+        change(model, data)
+        for k in range(pictures):
+            found[k] = data.qpos
+            step(model, data, every)
+    return found
+
+
+def _still(name: str, keyframe: int | None = None, steps: int = 0, **qpos: float) -> Array:
+    """One row of qpos (1, nq): a keyframe, some steps later, with joints put elsewhere."""
+    model = load(name)
+    with make_data(model) as data:
+        reset(model, data, keyframe=keyframe)
+        for _ in range(steps):
+            step(model, data)
+        for joint, value in qpos.items():
+            data.qpos[model.jnt_qposadr[model.joint_id(joint)]] = value
+        return data.qpos[None].copy()
+
+
+def _two_data() -> tuple[Array, Array]:
+    moved = _poses(_ARM, 16, ctrl=TARGET, every=_SLOW)
+    return moved, np.repeat(moved[:1], len(moved), axis=0)
+
+
+def _lag() -> tuple[Array, Array]:
+    """Where the bodies are by site_xpos after a step, and where they are by qpos."""
+    model = load(_ARM)
+    with make_data(model) as data:
+        data.ctrl[:] = TARGET
+        step(model, data, 50)
+        before = data.qpos[None].copy()
+        step(model, data)
+        forward(model, data)
+        return before, data.qpos[None].copy()
+
+
+def _to_the_goal() -> tuple[Array, Array]:
+    run = _poses(_ARM, 16, ctrl=TARGET, every=_SLOW)
+    return run, np.repeat(np.array([TARGET]), len(run), axis=0)
+
+
+def _limp() -> tuple[Array, Array]:
+    off = SCENARIOS["gravity"].options
+    return _poses(_ARM, 22, options=off), _poses(_ARM, 22)
+
+
+def _twice() -> tuple[Array, Array]:
+    def swing(_model: Model, data: Data) -> None:
+        data.ctrl[:2] += (0.4, -0.2)
+
+    run = partial(_poses, _BOX, 16, keyframe=0, change=swing)
+    return run(), run()
+
+
+PICTURES: Mapping[str, RobotPicture] = {
+    "objects": RobotPicture(
+        "Two Data of one Model, four times as slow: one is commanded and advanced; the other, in "
+        "violet, waits.",
+        "Two arms in one place. One turns down towards the floor; the other, in violet, stays "
+        "stretched out where both began, for nobody advances it.",
+        "statemachine view --model so101/scene",
+        _ARM,
+        _two_data,
+    ),
+    "state": RobotPicture(
+        "Six hinges and a box that nothing holds but the jaws: 13 positions, 12 velocities.",
+        "The arm with a small box between its jaws, above the floor.",
+        "statemachine view --keyframe held",
+        _BOX,
+        lambda: (_still(_BOX, 0), None),
+    ),
+    "write": RobotPicture(
+        "What xpos still says, and in violet what was written into qpos.",
+        "Two arms: one stretched out as before the write; the other, in violet, bent down at "
+        "shoulder_lift by 0.8 rad, where qpos says that it is, part of it below the floor.",
+        "statemachine view --model so101/scene --paused",
+        _ARM,
+        lambda: (_still(_ARM), _still(_ARM, shoulder_lift=0.8)),
+    ),
+    "forward": RobotPicture(
+        "After the step from 0.250 s: the arm by site_xpos, and in violet by qpos, 9.95 mm on.",
+        "The jaws from close by, twice: the outline in violet, where qpos has the arm, is about "
+        "a centimetre ahead of the one that site_xpos tells of.",
+        "statemachine view --model so101/scene --speed 0.1",
+        _ARM,
+        _lag,
+        near="gripper",
+    ),
+    "hold": RobotPicture(
+        "The arm on its way, four times as slow, and in violet the goal that ctrl tells it.",
+        "The arm folds from stretched out into the violet pose in about 0.3 s, meets the floor "
+        "with a finger, and stays a degree short of it.",
+        "statemachine trace record hold && statemachine view hold.mujoco.npz",
+        _ARM,
+        _to_the_goal,
+    ),
+    "gravity": RobotPicture(
+        "Nobody writes ctrl: the servos off, and in violet on.",
+        "Without servos the arm sinks until its gripper lies on the floor, after half a second; "
+        "with servos, in violet, it stays stretched out above it.",
+        "statemachine trace record gravity && statemachine view gravity.mujoco.npz",
+        _ARM,
+        _limp,
+    ),
+    "reset": RobotPicture(
+        "The keyframe 'held', and in violet the default state of the arm.",
+        "The arm holds the box between its jaws; in violet it is stretched out, with all "
+        "joints at zero, and the box stands away from it.",
+        "statemachine view --keyframe held",
+        _BOX,
+        lambda: (_still(_BOX, 0), _still(_BOX)),
+    ),
+    "replay": RobotPicture(
+        "Two runs in one picture. The second would be violet wherever it parts from the first.",
+        "The arm swings the box to the side. No violet is to be seen: the second run is "
+        "in the same place all the time.",
+        "statemachine view --keyframe held",
+        _BOX,
+        _twice,
+    ),
+    "time": RobotPicture(
+        "After 100 steps, and 0.2 s later by the clock: the second is drawn in violet.",
+        "One arm, stretched out. No violet is to be seen: while nobody called step, nothing moved.",
+        "statemachine view --model so101/scene --paused",
+        _ARM,
+        lambda: (_still(_ARM, steps=100), _still(_ARM, steps=100)),
+    ),
+    "speed": RobotPicture(
+        "What is advanced here: six joints, a box, and the contacts between them.",
+        "The arm with a small box between its jaws, above the floor.",
+        "statemachine view --keyframe held --speed 4",
+        _BOX,
+        lambda: (_still(_BOX, 0), None),
+    ),
+}

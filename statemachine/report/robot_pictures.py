@@ -1,0 +1,62 @@
+"""Small pictures of a robot for a page: one pose as WebP, or a few seconds of a run."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..backends import load
+from ..drawing.camera import Camera, framed
+from ..errors import MissingEngineError
+from ..interface import Array
+from ..page import RobotPicture
+from ..rendering import Motion, camera_for, drawn, motion_through, renderer_here
+from .film_files import write_webp
+
+_SIZE = (480, 360)
+_LAST = 1500  # milliseconds that the last pose of a film is shown
+_CLOSE = 0.07  # metres about a body that is looked at from close by
+
+
+def webp(picture: RobotPicture) -> bytes:
+    """The picture as WebP, animated if it has several poses.
+
+    Raises:
+        MissingEngineError: Nothing here can draw, or Pillow is not installed.
+    """
+    try:
+        from PIL import Image
+    except ImportError as error:
+        raise MissingEngineError(
+            "pictures of a robot need Pillow: pip install 'statemachine-sim[render]'",
+            engine="pillow",
+        ) from error
+    renderer = renderer_here()
+    model = load(picture.model)
+    motions = [motion_through(model, qpos) for qpos in picture.poses() if qpos is not None]
+    camera = camera_for(motions, (model,) * len(motions), _SIZE)
+    if picture.near:
+        camera = _close(camera, motions, model.body_id(picture.near))
+
+    def images() -> Iterator[Any]:
+        for pixels in drawn(motions, _SIZE, camera, renderer):
+            yield Image.fromarray(pixels)
+
+    milliseconds = [round(1000 * picture.interval)] * len(motions[0].xpos)
+    milliseconds[-1] = _LAST
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "picture.webp")
+        write_webp(path, images(), milliseconds)
+        return path.read_bytes()
+
+
+def _close(camera: Camera, motions: list[Motion], body: int) -> Camera:
+    """A camera in the same direction that sees what is about a body."""
+    places: Array = np.concatenate([motion.xpos[:, body] for motion in motions])
+    corners = _CLOSE * np.stack(np.meshgrid(*[(-1, 1)] * 3), axis=-1).reshape(-1, 3)
+    points = (places[:, None] + corners).reshape(-1, 3)
+    return framed(points, _SIZE[0] / _SIZE[1], camera.azimuth, camera.elevation)

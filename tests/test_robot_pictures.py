@@ -1,0 +1,127 @@
+"""Every station has a picture of the robot, words for it, and a command that shows it live."""
+
+from __future__ import annotations
+
+import io
+import shlex
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine import cli
+from statemachine.errors import MissingEngineError
+from statemachine.lessons import STATIONS
+from statemachine.lessons.pictures import PICTURES, with_picture
+from statemachine.page import Page, Printed, Question, RobotPicture, Text
+from statemachine.report import markdown as md
+from statemachine.report import robot_pictures, site, terminal
+from statemachine.report.quiz import Reader
+
+from .rendering import rendering_environment
+
+
+def test_every_station_has_one() -> None:
+    assert list(PICTURES) == [lesson.name for lesson in STATIONS]
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_it_is_of_the_lesson_s_model_and_says_what_is_to_be_seen(name: str) -> None:
+    picture = PICTURES[name]
+    (lesson,) = [lesson for lesson in STATIONS if lesson.name == name]
+    assert picture.model == lesson.model
+    assert len(picture.words) > 40
+    model = sm.load(picture.model)
+    solid, ghost = picture.poses()
+    assert solid.shape[1] == model.nq
+    assert ghost is None or ghost.shape == solid.shape
+    for command in picture.view.split(" && "):
+        program, *words = shlex.split(command)
+        assert program == "statemachine"
+        assert cli._options(words).run
+
+
+def test_they_show_what_they_say() -> None:
+    lift = 1  # shoulder_lift in qpos
+    limp, held = PICTURES["gravity"].poses()
+    assert limp[-1, lift] > 0.4
+    assert abs(held[:, lift]).max() < 0.001
+    before, after = PICTURES["forward"].poses()
+    model = sm.load("so101/scene")
+    tip = model.site_id("gripperframe")
+    with sm.make_data(model) as data:
+        places = []
+        for row in (before[0], after[0]):
+            data.qpos[:] = row
+            sm.forward(model, data)
+            places.append(data.site_xpos[tip].copy())
+    assert np.linalg.norm(places[1] - places[0]) == pytest.approx(9.95e-3, abs=5e-6)
+    one, two = PICTURES["replay"].poses()
+    assert np.array_equal(one, two)
+    assert np.ptp(one[:, 0]) > 0.2
+
+
+def _picture() -> RobotPicture:
+    return RobotPicture(
+        "the title",
+        "the words",
+        "statemachine view",
+        "so101/scene",
+        lambda: (np.zeros((1, 6)), None),
+    )
+
+
+def test_it_stands_after_what_the_code_printed() -> None:
+    question = Question("q", ("a", "b"), 0, "because")
+    page = Page("t", "o", [question, Printed({"x": "1"}), Text("rest")])
+    kinds = [type(block) for block in with_picture(page, "write").blocks]
+    assert kinds == [Question, Printed, RobotPicture, Text]
+    assert with_picture(page, "questions") is page
+    assert with_picture(Page("t", "o"), "write").blocks == []
+
+
+def test_without_a_renderer_a_page_has_the_words(
+    tmp_path: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def none() -> None:
+        raise MissingEngineError("nothing draws", engine="OpenGL")
+
+    monkeypatch.setattr(robot_pictures, "renderer_here", none)
+    path = site._write(tmp_path, "page", Page("t", "o", [_picture()]), "", "x")  # pyright: ignore
+    text = path.read_text()
+    assert "the words" in text
+    assert "![" not in text
+    assert "*the title* Live: `statemachine view`" in text
+
+
+def test_it_is_a_picture_with_its_words_where_there_is_one() -> None:
+    text = md.block_as_markdown(_picture(), lambda _: "file.webp")
+    assert text.startswith("![the words](file.webp)")
+
+
+def test_a_terminal_says_how_to_look_at_it_to_who_sits_there(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    page = Page("t", "o", [_picture(), Text("rest")])
+    terminal.show(page, "footer")
+    piped = capsys.readouterr().out
+    assert "statemachine view" not in piped
+    terminal.show(Page("t", "o", [Text("rest")]), "footer")
+    assert capsys.readouterr().out == piped
+    terminal.show(page, "footer", Reader())
+    shown = capsys.readouterr().out
+    assert shown.index("rest") < shown.index("statemachine view") < shown.index("footer")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PICTURES)
+def test_it_is_small_and_the_same_each_time(name: str) -> None:
+    rendering_environment()
+    image = pytest.importorskip("PIL.Image", reason="Pillow is not installed")
+    content = robot_pictures.webp(PICTURES[name])
+    assert len(content) < 150_000
+    assert content == robot_pictures.webp(PICTURES[name])
+    with image.open(io.BytesIO(content)) as opened:
+        assert opened.size == (480, 360)
+        assert opened.n_frames == len(PICTURES[name].poses()[0])
+        assert np.asarray(opened.convert("RGB")).std() > 20
