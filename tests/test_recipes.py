@@ -22,7 +22,7 @@ PLACES = {
     "statemachine/comparison/quantities.py, in QUANTITIES": '        Quantity("force"',
     "statemachine/comparison/quantities.py, in _SUFFIXES": "_SUFFIXES = (",
     "statemachine/compare/series.py, in series": "            found += _joint(",
-    "statemachine/compare/tolerances.py, in tolerance_for": '        return Tolerance(given[kind], "as ',
+    "statemachine/compare/tolerances.py, in tolerance_for": "        return Tolerance(given[",
     "statemachine/conventions/__init__.py, in QUESTIONS": '    "timestep",',
 }
 
@@ -63,6 +63,9 @@ class Copy:
             else:
                 lines = file.read_text().splitlines()
                 (at,) = [k for k, line in enumerate(lines) if line.startswith(PLACES[place])]
+                body = (
+                    f"{body.rstrip()}," if where.removeprefix("in ").isupper() else body
+                )  # an entry of a table
                 lines[at + 1 : at + 1] = textwrap.indent(body, " " * 4).splitlines()
                 file.write_text("\n".join(lines) + "\n")
 
