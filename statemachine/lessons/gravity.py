@@ -62,7 +62,7 @@ for each in (model, limp):
 
 
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Gravity:
-    """CodeWatch both runs; then the servos off for longer, with and without anything to touch."""
+    """Watch both runs; then the servos off for longer, with and without anything to touch."""
     model, joint, seconds = play.model, options["joint"], options["seconds"]
     limp = model.replace(**SCENARIOS["gravity"].options)
     runs = {}

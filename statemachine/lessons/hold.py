@@ -94,7 +94,7 @@ class Hold:
 
 
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Hold:
-    """CodeWatch the way to the command; then the same with nothing to touch."""
+    """Watch the way to the command; then the same with nothing to touch."""
     model = play.model
     names = [model.joint_names[i] if i >= 0 else "" for i in model.actuator_jntid]
     if not all(names):

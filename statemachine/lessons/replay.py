@@ -132,7 +132,7 @@ class Replay:
 
 
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Replay:
-    """CodeWatch both runs; then play the code that breaks them, and theirs with half the timestep."""
+    """Watch both runs; then play the code that breaks them, and theirs with half the timestep."""
     model, nstep, way = play.model, options["steps"], options["break"]
     shares = [part_of(progress, k / 3, 1 / 3) for k in range(3)]
     paths = Paths(nstep, progress if way else shares[0])

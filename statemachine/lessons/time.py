@@ -112,7 +112,7 @@ class Pace:
 
 
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Pace:
-    """CodeWatch the loop that is typed, and the other of the two on another Data."""
+    """Watch the loop that is typed, and the other of the two on another Data."""
     model, total = play.model, _steps(play.model, options)
     also = (_free if options["realtime"] else _paced)(total, "sm.load()")
     with CodeRun(also, model) as second:
