@@ -1,13 +1,13 @@
-"""A page: what a lesson has to say, free of how it is shown.
+"""A page: what a command has to say, free of how it is shown.
 
-Lessons, probes and gradings make pages; `report` turns them into text for a terminal and into
-other media.
+Lessons, comparisons, probes and gradings make pages; `report` turns them into text for a
+terminal and into other media.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 
@@ -20,9 +20,25 @@ class Heading:
 
 @dataclass(frozen=True)
 class Text:
-    """A paragraph."""
+    """A paragraph.
+
+    Attributes:
+        text: What it says.
+        see: Name and heading of the section that it ends with a link to; empty for none.
+        small: Whether it is a note to what stands above it.
+    """
 
     text: str
+    see: tuple[str, str] = ("", "")
+    small: bool = False
+
+
+@dataclass(frozen=True)
+class Items:
+    """A list of short texts; numbered where their order counts."""
+
+    texts: Sequence[str]
+    ordered: bool = False
 
 
 @dataclass(frozen=True)
@@ -107,6 +123,35 @@ class Pipeline:
     spans: Sequence[tuple[str, int, int]]
 
 
+class TableCell(str):
+    """The text of a cell, and what a medium may make of it; elsewhere it is only its text.
+
+    Attributes:
+        at: The moment of the run that it names [s]: a slider can go there.
+        verdict: "agrees", "settles" or "differs", if it is one.
+        share: The part of a whole that it names, which a bar can show; of either sign.
+        code: Whether it is typed or copied as it is.
+    """
+
+    at: float | None
+    verdict: str
+    share: float | None
+    code: bool
+
+    def __new__(
+        cls,
+        text: str,
+        *,
+        at: float | None = None,
+        verdict: str = "",
+        share: float | None = None,
+        code: bool = False,
+    ) -> TableCell:
+        cell = super().__new__(cls, text)
+        cell.at, cell.verdict, cell.share, cell.code = at, verdict, share, code
+        return cell
+
+
 @dataclass(frozen=True, eq=False)
 class RobotPicture:
     """The robot where it was, in one pose or moving; shown where pictures can be.
@@ -137,10 +182,11 @@ class Table:
 
     Attributes:
         headers: One for each column.
-        rows: Cells as text.
+        rows: Cells as text, some of them a TableCell.
         title: What the table shows.
         words: Columns of words, by number; they are aligned to the left, others right.
         emphasis: Rows to set off, by number.
+        wide: Columns, by number, that are left out where there are 80 characters to a line.
     """
 
     headers: Sequence[str]
@@ -148,6 +194,18 @@ class Table:
     title: str = ""
     words: frozenset[int] = frozenset({0})
     emphasis: frozenset[int] = frozenset()
+    wide: frozenset[int] = frozenset()
+
+    def narrow(self) -> Table:
+        """The table without its wide columns."""
+        kept = [k for k in range(len(self.headers)) if k not in self.wide]
+        return replace(
+            self,
+            headers=[self.headers[k] for k in kept],
+            rows=[[row[k] for k in kept] for row in self.rows],
+            words=frozenset(kept.index(k) for k in self.words if k in kept),
+            wide=frozenset(),
+        )
 
 
 @dataclass(frozen=True)
@@ -158,25 +216,88 @@ class Verdict:
     holds: bool
 
 
+@dataclass(frozen=True)
+class Interactive:
+    """What is looked at by moving a slider; shown where that can be, left out elsewhere."""
+
+    title: str
+
+
+@dataclass(frozen=True)
+class Section:
+    """Blocks under a heading.
+
+    Attributes:
+        name: What links call it; "" where none leads there.
+        heading: Of the section.
+        blocks: Its content.
+        folded: Whether it is opened on demand, where that can be.
+        detail: Whether a terminal leaves it out.
+    """
+
+    name: str
+    heading: str
+    blocks: Sequence[Block]
+    folded: bool = False
+    detail: bool = False
+
+
+@dataclass(frozen=True)
+class Headline:
+    """The answer of a page, in a few sentences.
+
+    Attributes:
+        lead: The main fact; a sentence without its end.
+        causes: What explains it, the strongest reason first; sentences.
+        end: What is left of it, a sentence; "" where there is nothing to say.
+        holds: Whether that is what was asked for.
+    """
+
+    lead: str
+    causes: tuple[str, ...] = ()
+    end: str = ""
+    holds: bool = True
+
+    @property
+    def text(self) -> str:
+        """All of it on one line."""
+        return " ".join(part for part in (f"{self.lead}.", *self.causes, self.end) if part)
+
+
 Picture = Traces | Slots | Pipeline | RobotPicture
-Block = Heading | Text | Code | Printed | Question | Table | Verdict | Picture
+Block = (
+    Heading
+    | Text
+    | Items
+    | Code
+    | Printed
+    | Question
+    | Table
+    | Verdict
+    | Picture
+    | Interactive
+    | Section
+)
 
 
 @dataclass(frozen=True)
 class Page:
-    """A lesson's page.
+    """What a command has to say.
 
     Attributes:
         title: Its heading.
         origin: What it was computed with, in one line.
         blocks: Its content, from top to bottom.
+        headline: Its answer: above all else, or last where the end is what stays in sight.
     """
 
     title: str
     origin: str
     blocks: Sequence[Block] = field(default_factory=list)
+    headline: Headline | None = None
 
     @property
     def holds(self) -> bool:
-        """Whether every verdict on it held."""
-        return all(block.holds for block in self.blocks if isinstance(block, Verdict))
+        """Whether its headline and every verdict on it held."""
+        verdicts = [block.holds for block in self.blocks if isinstance(block, Verdict)]
+        return all(verdicts) and (self.headline is None or self.headline.holds)

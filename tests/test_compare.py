@@ -228,9 +228,9 @@ def test_a_force_is_named_and_both_figures_are_given() -> None:
     need_engine("pybullet")
     (one, two), _ = sides_of("hold")
     (touch,) = touches(one, two)
-    found = report.page(compare(one, two), touches=[touch])
+    found = report.page(compare(one, two), one, two)
     text = [b.text for b in found.blocks if isinstance(b, Text)]
-    said = f"pressed with {touch.one.force:.1f} N (with friction {touch.one.total:.1f} N)"
+    said = f"presses on floor with {touch.one.force:.1f} N (with friction {touch.one.total:.1f} N)"
     assert any(said in each for each in text)
     assert "gripper on floor, normal force" in by_name(compare(one, two))
     # The greatest that the course's page shows, and that of the vectors.
@@ -449,7 +449,7 @@ def test_without_pybullet_its_recorded_run_takes_its_place(
     assert ", recorded" in found.two.label
     if defaults == "model":
         assert found.agrees == (name in ("droop", "fall", "waves"))
-    terminal.show(report.page(found, one.header.says, said))
+    terminal.show(report.page(found, one, two, said=said))
     assert "its side is the recorded run" in " ".join(capsys.readouterr().out.split())
 
 

@@ -10,7 +10,7 @@ import pytest
 import statemachine as sm
 from statemachine.compare import compare, touches
 from statemachine.comparison import ContactNames, Gap, largest, nearest, same_pairs, text, together
-from statemachine.report.html.timeline import events_of
+from statemachine.report.events import events_of
 from statemachine.report.plot_panels import of_trace
 from statemachine.scenarios import SCENARIOS
 from statemachine.traces import Trace, record, record_scenario, shipped
@@ -30,7 +30,7 @@ def test_a_contact_has_one_name_in_lesson_comparison_page_and_freshness(trace: T
         f"{name}, first touch"
     }
     assert [touch.pair for touch in touches(trace, trace)] == [name]
-    assert {event.what for event in events_of(found, trace, trace) if event.what} == {name}
+    assert {event.what for event in events_of(found, touches(trace, trace)) if event.what} == {name}
     assert [touch.name for touch in of_trace(trace).touches] == [name]
     # The lesson and freshness also say which of the gripper's geoms it is.
     model = sm.load("so101/scene")

@@ -16,6 +16,7 @@ from statemachine.report.figures import svg
 from statemachine.report.film_overlay import Overlay, Strip
 from statemachine.report.html.charts import difference_chart
 from statemachine.report.log_axis import LogAxis
+from statemachine.report.over_time import chart_of
 from statemachine.report.plot_draw import draw
 from statemachine.report.plot_panels import Panel, Plot
 
@@ -110,7 +111,7 @@ def test_in_a_report() -> None:
         tolerance=1e-3, reason="", verdict="differs",
     )  # fmt: skip
     curve = Series("a", "joint", TIME, np.zeros(0), np.zeros(0), VALUES)
-    chart = difference_chart(curve, found)
+    chart = difference_chart(chart_of(curve, found, ("a", "b")))
     ticks = [
         (float(top), text)
         for top, text in re.findall(r'ytick" style="top:([\d.]+)%">([^<]+)<', chart)
@@ -119,8 +120,9 @@ def test_in_a_report() -> None:
     _level(ticks, np.array([float(point.split()[1]) for point in path.split("L")]))
     assert 'class="zero"' in chart
     never = replace(curve, difference=np.maximum(VALUES, 1e-9))
-    assert 'class="zero"' not in difference_chart(never, found)
-    assert ">0<" not in difference_chart(never, found)
+    chart = difference_chart(chart_of(never, found, ("a", "b")))
+    assert 'class="zero"' not in chart
+    assert ">0<" not in chart
 
 
 def test_in_a_film() -> None:

@@ -19,21 +19,24 @@ import pytest
 from PIL import Image
 
 import statemachine as sm
-from statemachine.compare import Comparison, compare, series, sides_of
+from statemachine.compare import Comparison, compare, series, sides_of, touches
 from statemachine.compare.series import total_forces
 from statemachine.compare.sides import Request
 from statemachine.compare.why import Attribution, Deviation, FactorTrial, FirstTouch
 from statemachine.comparison.text import quantity
 from statemachine.drawing import drawing_of
 from statemachine.errors import BadInputError
-from statemachine.page import Page, Verdict
+from statemachine.page import Block, Page, Section, Text, Verdict
+from statemachine.report.compare import page as compared
+from statemachine.report.contacts import contact_words
+from statemachine.report.events import events_of
+from statemachine.report.finding import headline
 from statemachine.report.html import SideDrawing, check_target, report, write_report
 from statemachine.report.html.between import shown_series
 from statemachine.report.html.charts import difference_chart, spread
-from statemachine.report.html.finding import headline
 from statemachine.report.html.geometry import bones_of, mesh_of, octahedral
-from statemachine.report.html.pressing import pressing, pressing_words
-from statemachine.report.html.timeline import events_of, frames_of
+from statemachine.report.html.timeline import frames_of
+from statemachine.report.over_time import chart_of
 from statemachine.scenarios import SCENARIOS
 from statemachine.traces import Trace, record_scenario, shipped, write
 
@@ -54,7 +57,8 @@ def look_of(trace: Trace) -> SideDrawing:
 
 def page_of(made: Made, **more: Any) -> str:
     comparison, one, two, look = made
-    return report(comparison, one, two, **{"looks": (look, look), **more})
+    looks = more.pop("looks", (look, look))
+    return report(compared(comparison, one, two, **more), looks)
 
 
 def rows(trace: Trace, count: int) -> Trace:
@@ -260,7 +264,7 @@ def test_the_headline_is_made_of_the_figures(hold: Made) -> None:
     comparison, one, two, _ = hold
     found = {each.name: each for each in comparison.agreements}
     curves = series(one, two)
-    finding = headline(comparison, events_of(comparison, one, two), None, curves)
+    finding = headline(comparison, events_of(comparison, touches(one, two)), None, curves)
     wrist = found["wrist_flex"]
     far, at = quantity(wrist.max, wrist.unit), f"{wrist.at:.3f} s"
     assert finding.lead.startswith(f"Joint wrist_flex is up to {far} apart")
@@ -396,18 +400,18 @@ def test_the_section_of_causes(hold: Made, tmp_path: Path) -> None:
 
 def test_who_presses_on_what(hold: Made) -> None:
     comparison, one, two, _ = hold
-    found = pressing(one, comparison.until)
-    assert found
+    (touch,) = touches(one, two)
     late = one["contact_row"] >= 360  # the last tenth of 401 rows
     mean = float(one["contact_force"][late, 0].sum()) / 41
-    assert found.force == {"gripper on floor": pytest.approx(mean)}
-    assert found.deepest == -float(one["contact_dist"].min())
-    never, said = pressing_words(comparison, (one, two))
-    assert never == []
-    both = f"with {mean:.1f} N (with friction {found.total['gripper on floor']:.1f} N)"
+    assert touch.pair == "gripper on floor"
+    assert touch.one.force == pytest.approx(mean)
+    assert touch.one.deepest == -float(one["contact_dist"].min())
+    said = texts(contact_words(comparison, touches(one, two)))
+    assert not any("never touches" in each for each in said)
+    both = f"with {mean:.1f} N (with friction {touch.one.total:.1f} N)"
     assert f"gripper presses on floor {both}" in said[0]
     whole = total_forces(one)["gripper on floor"][360:]
-    assert found.total == {"gripper on floor": pytest.approx(whole.mean())}
+    assert touch.one.total == pytest.approx(whole.mean())
     assert whole.mean() > mean
     said_under = "it is at most 351 N; the whole force, friction added as vectors, is at most 383 N"
     assert said_under in page_of(hold)
@@ -419,12 +423,23 @@ def test_who_presses_on_what(hold: Made) -> None:
         for name, array in two.columns.items()
     }
     bare = Trace(two.header, none)
-    never, said = pressing_words(compare(one, bare), (one, bare))
-    assert never == ["On pybullet gripper never touches floor in this run."]
-    assert "on pybullet nothing touches at all" in said[0]
+    said = texts(contact_words(compare(one, bare), touches(one, bare)))
+    assert said[0] == "On pybullet gripper never touches floor in this run."
+    assert "on pybullet nothing touches at all" in said[1]
     text = page_of(of_look(one, bare, hold[3]))
     assert "On pybullet gripper never touches floor" in text
     assert "gripper on floor normal force over time on both sides" in text
+
+
+def texts(blocks: list[Block]) -> list[str]:
+    """The paragraphs among blocks, those of sections too."""
+    said = []
+    for block in blocks:
+        if isinstance(block, Section):
+            said += texts(list(block.blocks))
+        elif isinstance(block, Text):
+            said.append(block.text)
+    return said
 
 
 def test_names_in_a_list_have_no_comma(hold: Made, page: Path) -> None:
@@ -498,7 +513,8 @@ def test_a_difference_far_beyond_its_tolerance_has_a_log_axis(hold: Made) -> Non
     text = page_of(made)
     assert text.count("log axis") == before + 1
     found = next(a for a in made[0].agreements if a.name == "elbow_flex")
-    chart = difference_chart(next(c for c in series(one, far) if c.name == "elbow_flex"), found)
+    curve = next(c for c in series(one, far) if c.name == "elbow_flex")
+    chart = difference_chart(chart_of(curve, found, ("a", "b")))
     heights = {float(y) for y in re.findall(r'y="([\d.]+)"', chart)}
     (band,) = heights
     assert 30 < band < 70  # the tolerance is seen, two decades over the foot of the axis
@@ -542,12 +558,12 @@ def test_on_a_phone_the_slider_is_under_the_picture(page: Path) -> None:
         # The verdicts are seen without scrolling, and a shadow says that there is more.
         badge = tab.locator("#figures .badge").first.bounding_box()
         assert badge["x"] + badge["width"] <= 390
-        wide = tab.locator("#figures .wide")
+        wide = tab.locator("#figures .wide").first
         assert wide.evaluate("(e) => e.scrollWidth > e.clientWidth")
         wide.scroll_into_view_if_needed()
-        edge = picture(tab, "#figures .wide")[40:200]
+        edge = picture(tab, "#figures .wide >> nth=0")[40:200]
         tab.evaluate("document.documentElement.style.setProperty('--cue', 'transparent')")
-        assert changed(edge, picture(tab, "#figures .wide")[40:200]) > 200
+        assert changed(edge, picture(tab, "#figures .wide >> nth=0")[40:200]) > 200
 
 
 def test_it_opens_near_the_tool_where_the_gap_is_small(hold: Made, tmp_path: Path) -> None:
@@ -567,7 +583,7 @@ def test_it_opens_near_the_tool_where_the_gap_is_small(hold: Made, tmp_path: Pat
 def test_other_figures_make_another_headline(hold: Made) -> None:
     comparison, one, two, _ = hold
     same = compare(one, one)
-    assert "same in every figure" in headline(same, events_of(same, one, one)).text
+    assert "same in every figure" in headline(same, events_of(same, touches(one, one))).text
     near = compare(one, Trace(one.header, {**one.columns, "qpos": one.qpos + 1e-6}))
     assert "agree for 2 s" in headline(near, []).text
     # Without contacts, nothing is said of a touch.
@@ -576,14 +592,19 @@ def test_other_figures_make_another_headline(hold: Made) -> None:
         for t in (one, two)
     ]
     apart = compare(*bare)
-    assert "touches" not in headline(apart, events_of(apart, *bare)).text
+    assert "touches" not in headline(apart, events_of(apart, touches(*bare))).text
     assert comparison.agreements != apart.agreements
 
 
 def test_every_figure_of_the_comparison_is_on_the_page(hold: Made, page: Path) -> None:
     with browser(java_script_enabled=False) as tab:
         open_page(tab, page)
-        text = tab.locator("#figures table").inner_text().replace("−", "-").replace("\u00a0", " ")
+        text = (
+            tab.locator("#figures table")
+            .first.inner_text()
+            .replace("−", "-")
+            .replace("\u00a0", " ")
+        )
     for found in hold[0].agreements:
         (line,) = [
             row for row in text.splitlines() if row.startswith(found.name.replace(", ", " ") + "\t")
@@ -1023,7 +1044,7 @@ def test_timesteps_that_differ_are_drawn_between_and_it_is_said(tmp_path: Path) 
     assert (frames.share[common] == 0).all()
     with browser() as tab:
         open_page(tab, write_report(tmp_path / "x.html", page_of(of(one, two))))
-        assert "taken between two of its rows" in tab.locator("#origin").inner_text()
+        assert "taken between two of its rows" in tab.locator("#picture").inner_text()
         go(tab, 7)
         assert "between two of its rows" in tab.locator("#now").inner_text()
         cell = tab.locator("#readout tr", has_text="elbow_flex").locator("td").last.inner_text()
@@ -1039,7 +1060,7 @@ def test_without_the_model_there_are_sticks(hold: Made, tmp_path: Path) -> None:
     target = write_report(tmp_path / "x.html", page_of(hold, looks=(none, none)))
     with browser(height=1000) as tab:
         open_page(tab, target)
-        assert "there is no so101/scene.xml here" in tab.locator("#origin").inner_text()
+        assert "there is no so101/scene.xml here" in tab.locator("#picture").inner_text()
         tab.locator("#view-all").click()
         before = picture(tab)
         go(tab, 0)
@@ -1200,7 +1221,7 @@ def test_the_request_of_the_finding_is_not_needed() -> None:
     """An experiment's sides make a page with nothing but what `sides_of` gives."""
     need_engine("pybullet")
     (one, two), said = sides_of(Request(("droop",), seconds=0.2))
-    text = report(compare(one, two), one, two, said=said)
+    text = report(compared(compare(one, two), one, two, said=said))
     assert "no model was given" in text
     assert Parsed.of(text).unclosed == []
 

@@ -60,20 +60,21 @@ def write(
         said: What stood in for a run.
         witness: The third party's figures, or None.
     """
+    from ..report import compare as pages
     from ..report.html import report, write_report
 
     attribution, why_not = (None, "") if options.no_why else _why(request, traces, options.quantity)
-    text = report(
+    page = pages.page(
         comparison,
         *traces,
-        looks=_looks(request, traces),
+        said=said,
+        witness=witness,
         attribution=attribution,
         why_not=why_not,
         models=_models(request, traces),
-        said=said,
         command=_typed(options, request),
-        witness=witness,
     )
+    text = report(page, _looks(request, traces))
     target = write_report(options.html, text)
     print(f"wrote {target} ({len(text.encode()) / 1e6:.2f} MB)", file=sys.stderr)
 

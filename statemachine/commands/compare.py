@@ -168,9 +168,8 @@ def _run_compare(options: argparse.Namespace) -> int:
     asked = witness(one, two)
     if options.html:
         _compare_html.write(options, request, found, (one, two), said, asked)
-    page = report.page(found, one.header.says, said, asked, touches(one, two))
-    code = show(
-        page, {"comparison": found, "witness": asked, "touches": touches(one, two)}, options.json
-    )
+    page = report.page(found, one, two, said=said, witness=asked)
+    result = {"comparison": found, "witness": asked, "touches": touches(one, two)}
+    code = show(page, result, options.json)
     pictures.write(wanted, options, one, two, found)
     return code

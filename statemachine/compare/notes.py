@@ -99,9 +99,11 @@ def _of_columns(one: Trace, two: Trace) -> Iterator[str]:
 def _of_time(one: Trace, two: Trace, common: Common) -> Iterator[str]:
     steps = [trace.header.timestep for trace in (one, two)]
     if steps[0] != steps[1]:
+        apart = float(common.time[-1]) / max(1, len(common.time) - 1)
         yield (
-            f"timesteps differ, {significant(1000 * steps[0])} and {milliseconds(steps[1])}: "
-            "compared are the moments that both have, nothing is interpolated"
+            f"timesteps differ, {significant(1000 * steps[0])} and {milliseconds(steps[1])}, and "
+            f"meet every {milliseconds(apart, 3)}: compared are these common moments alone, "
+            "nothing is interpolated, and a peak between two of them is not seen"
         )
     ends = [float(trace.time[-1] - trace.time[0]) for trace in (one, two)]
     if abs(ends[0] - ends[1]) > max(steps) * (1 + SAME):

@@ -1,110 +1,240 @@
-"""The page of a comparison of two runs."""
+"""The page of a comparison of two runs: all that is said of it, in every medium."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
-from ..compare import Agreement, Comparison, Contact, Touch, Witness
+import numpy as np
+
+from ..compare import Agreement, Comparison, Series, Witness, default_tip, series, touches
+from ..compare.why import Attribution
 from ..comparison import QUANTITIES
-from ..comparison.text import few, figure, milliseconds, quantity, sentence, short_time
-from ..page import Page, Table, Text, Verdict
+from ..comparison.text import NONE, milliseconds, quantity, sentence
+from ..page import Block, Code, Items, Page, Section, Table, TableCell, Text, Verdict
+from ..traces import Trace
+from . import why
+from .commanded import commanded
+from .contacts import contact_words
+from .events import Event, events_of, events_table
+from .finding import (
+    headline,
+    in_words,
+    leading,
+    long_labels,
+    name_of,
+    short_labels,
+    subject,
+    window,
+)
+from .over_time import BothRuns, QuantityChart, chart_of, foot_of
+from .provenance import emulated, provenance
 
-# Of the promises that a backend may emulate, those that move the arm.
-_PHYSICS = ("position servo", "armature", "joint damping", "dry friction", "joint limits")
-_WORDS = {"agrees": "agree", "settles": "settle", "differs": "DIFFER"}
+_ROUNDING = 1e-6  # of a tolerance: what is less is shown as nothing
+_EMULATED = ("emulated", "What is emulated")
 
 
 def page(
     comparison: Comparison,
-    says: str = "",
+    one: Trace,
+    two: Trace,
+    *,
+    tip: str | None = None,
     said: Sequence[str] = (),
     witness: Witness | None = None,
-    touches: Sequence[Touch] = (),
+    attribution: Attribution | None = None,
+    why_not: str = "",
+    models: Page | None = None,
+    command: str = "",
 ) -> Page:
-    """Figures and verdicts, then the reasons of the tolerances.
+    """What was found in comparing two runs.
 
     Args:
-        comparison: What was found.
-        says: What happens in the experiment.
+        comparison: The figures.
+        one: The first run.
+        two: The second.
+        tip: The site that was compared, as given to `compare`.
         said: What stood in for a run, line by line.
-        witness: What a third party says of both sides' fingertips.
-        touches: Who touches whom on each side.
+        witness: What a third party says of both sides' fingertips, if asked.
+        attribution: How much each factor explains, if that was asked.
+        why_not: Why there is none, as a sentence.
+        models: The differences between what the engines make of the model, if asked.
+        command: What makes the page again.
     """
-    one, two = comparison.one, comparison.two
-    blocks: list[Any] = []
-    if says:
-        blocks.append(Text(says))
-    blocks += [Text(sentence(line)) for line in (*said, *comparison.notes)]
-    blocks.append(
-        Table(
-            ("quantity", "max", "at", "RMS", "settled", "from", "verdict"),
-            [_row(found) for found in comparison.agreements],
-            title=f"{one.label} against {two.label}: how far apart (times in s)",
-            words=frozenset({0, 6}),
-            emphasis=frozenset(
-                k for k, found in enumerate(comparison.agreements) if found.verdict == "differs"
-            ),
+    labels = long_labels(comparison)
+    curves = series(one, two, tip)
+    touching = touches(one, two)
+    events = events_of(comparison, touching)
+    notes = [sentence(line) for line in (*said, *comparison.notes)]
+    blocks: list[Block] = [
+        *([Text(one.header.says)] if one.header.says else []),
+        *commanded(one, two, labels),
+        *in_words(comparison, events, attribution),
+        *contact_words(comparison, touching),
+        *([Items(notes)] if notes else []),
+    ]
+    both = _over_time(comparison, one, two, curves, events, attribution, tip)
+    blocks.append(both)
+    if attribution is not None:
+        blocks.append(
+            Section("why", "What causes it", [*_rerun(attribution), *why.causes(attribution)])
         )
+    elif why_not:
+        blocks.append(Section("why", "What causes it", [Text(why_not)]))
+    blocks.append(Section("curves", "How far apart, over time", _sorted(both.charts), detail=True))
+    blocks.append(Section("figures", "The figures", _figures(comparison, witness)))
+    table = events_table(events, (comparison.one.label, comparison.two.label))
+    blocks.append(Section("events", "What happens when", [table], detail=True))
+    kept = emulated(comparison)
+    if models is not None:
+        blocks.append(_models(models, bool(kept)))
+    if kept:
+        blocks.append(Section(*_EMULATED, kept))
+    if attribution is not None and attribution.alone:
+        blocks.append(Section("agree", "To make them agree", why.steps(attribution)))
+    made: list[Block] = [provenance((one.header, two.header), comparison)]
+    if command:
+        made += [Text("This page was made by:"), Code([command])]
+    blocks.append(Section("origin", "Where this comes from", made, detail=True))
+    return Page(
+        f"{one.header.experiment}: {comparison.one.label} and {comparison.two.label}",
+        _origin(comparison),
+        blocks,
+        headline(comparison, events, attribution, curves),
     )
-    blocks.append(Text(_summary(comparison)))
-    told = [_touch(touch, one.backend, two.backend) for touch in touches]
-    if told:
-        blocks.append(Text(" ".join(told)))
-    blocks.append(
-        Text(
-            f"Compared at {comparison.moments} moments over {comparison.until:g} s. Settled is "
-            "the mean over the last tenth of them (of forces: how far apart the means are); from "
-            "is when it is first beyond its tolerance. A quantity agrees if it is never beyond "
-            "it, settles if what is settled is not beyond it, and differs otherwise."
-        )
+
+
+def _over_time(
+    comparison: Comparison,
+    one: Trace,
+    two: Trace,
+    curves: Sequence[Series],
+    events: Sequence[Event],
+    attribution: Attribution | None,
+    tip: str | None,
+) -> BothRuns:
+    """The scene and a chart for each quantity that is a number throughout."""
+    labels = long_labels(comparison)
+    found = {each.name: each for each in comparison.agreements}
+    charts = tuple(
+        chart_of(curve, found[curve.name], labels, foot_of(curve, one, two, labels))
+        for curve in curves
+        if np.isfinite(curve.difference).all()
     )
-    blocks.append(
-        Table(
-            ("quantities", "tolerance", "because"),
-            _reasons(comparison),
-            title="What does not matter, and why",
-            words=frozenset({0, 2}),
-        )
+    of, most = subject(comparison, attribution), leading(comparison)
+    lead = [k for k, chart in enumerate(charts) if most and chart.curve.name == most.name]
+    lead += [k for k, chart in enumerate(charts) if chart.curve.kind == "tip"]
+    moments = {each.at for each in found.values()}
+    moments |= {each.since for each in found.values() if each.since is not None}
+    return BothRuns(
+        comparison.one.experiment,
+        one,
+        two,
+        labels,
+        short_labels(comparison),
+        default_tip(one.header, two.header) if tip is None else tip,
+        comparison.until,
+        0.0 if of is None else of.at,
+        tuple(sorted(moments)),
+        tuple(events),
+        charts,
+        tuple(dict.fromkeys(lead))[:2] or (0,),
     )
-    for side in (one, two):
-        emulated = [name for name in side.provenance.emulated if name in _PHYSICS]
-        if emulated and side.defaults == "model":
-            blocks.append(
-                Text(
-                    f"{side.backend}: what the model asks for and the engine lacks is emulated "
-                    f"({', '.join(emulated)}). The engine as its own users meet it: "
-                    "--defaults engine."
-                )
-            )
-            break
+
+
+def _rerun(attribution: Attribution) -> list[Block]:
+    """How the causes were looked for."""
+    if not attribution.alone:
+        return []
+    text = (
+        f"Both sides were run again, {attribution.runs} runs in all, with less and less between "
+        "them. What a thing explains is the part of the gap that goes when it is made the same on "
+        "both sides or, where it is each engine's own doing, left out on both."
+    )
+    return [Text(text)]
+
+
+def _sorted(charts: Sequence[QuantityChart]) -> list[Block]:
+    """Charts, those that differ first; those that agree folded away if they are not all."""
+    order = {"differs": 0, "settles": 1, "agrees": 2}
+    ranked = sorted(charts, key=lambda c: (order[c.found.verdict], -c.found.tolerances()))
+    beyond: list[Block] = [chart for chart in ranked if chart.found.verdict != "agrees"]
+    within: list[Block] = [chart for chart in ranked if chart.found.verdict == "agrees"]
+    if not beyond or not within:
+        return beyond or within
+    told = f"The {len(within)} that agree" if len(within) > 1 else "The one that agrees"
+    return [*beyond, Section("", told, within, folded=True)]
+
+
+def _figures(comparison: Comparison, witness: Witness | None) -> list[Block]:
+    """Figures and verdicts, the reasons of the tolerances, and what a third party says."""
+    one, two = short_labels(comparison)
+    agreements = comparison.agreements
+    more: list[Block] = []
     text = "Neither side is the truth, and two engines that agree may both be wrong."
     if witness is not None:
         text += (
             f" So a third party was asked where {witness.site} is in each of {witness.rows} "
-            f"poses: {witness.by} puts it within {witness.one:.0e} m of {one.backend}'s and "
-            f"within {witness.two:.0e} m of {two.backend}'s."
+            f"poses: {witness.by} puts it within {1e3 * witness.one:.0e} mm of {one}'s and "
+            f"within {1e3 * witness.two:.0e} mm of {two}'s."
         )
-    blocks.append(Text(text))
-    blocks.append(Verdict(_verdict(comparison), comparison.agrees))
-    title = f"{one.experiment}: {one.label} and {two.label}"
-    return Page(title, _origin(comparison), blocks)
+        checked = f"That checks where {witness.site} is for given joint angles, not the motion."
+        more.append(Section("", "", [Text(checked)], detail=True))
+    return [
+        Table(
+            ("quantity", "verdict", "largest", "at, s", "RMS", "settled", "from, s", "tolerance"),
+            [_row(found) for found in agreements],
+            f"{one} against {two}: how far apart",
+            words=frozenset({0, 1}),
+            emphasis=frozenset(
+                k for k, found in enumerate(agreements) if found.verdict == "differs"
+            ),
+            wide=frozenset({7}),
+        ),
+        Text(
+            f"Compared at {comparison.moments} moments over {comparison.until:g} s. Settled: the "
+            f"mean over {window(comparison)} (of forces: how far apart the means are). From: the "
+            "first moment beyond the tolerance. What is never beyond it agrees, what is settled "
+            "within it settles, the rest differs."
+        ),
+        Table(
+            ("quantities", "tolerance", "because"),
+            _reasons(comparison),
+            "What does not matter, and why",
+            words=frozenset({0, 2}),
+        ),
+        Text(text),
+        *more,
+    ]
 
 
 def _row(found: Agreement) -> tuple[str, ...]:
+    verdict = TableCell(found.verdict, verdict=found.verdict)
+    at, tolerance = _moment(found.at), quantity(found.tolerance, found.unit)
+    name = name_of(found.name)
     if found.kind == "contact":
         gap = found.note or quantity(found.max, found.unit)
-        return (found.name, gap, f"{found.at:.3f}", "", "", "", _WORDS[found.verdict])
-    since = "" if found.since is None else f"{found.since:.3f}"
+        return name, verdict, gap, at, NONE, NONE, NONE, tolerance
     return (
-        found.name,
-        quantity(found.max, found.unit),
-        f"{found.at:.3f}",
-        quantity(found.rms, found.unit),
-        quantity(found.settled, found.unit),
-        since,
-        _WORDS[found.verdict],
+        name,
+        verdict,
+        _small(found.max, found),
+        at,
+        _small(found.rms, found),
+        _small(found.settled, found),
+        "never" if found.since is None else _moment(found.since),
+        tolerance,
     )
+
+
+def _moment(time: float) -> TableCell:
+    return TableCell(f"{time:.3f}", at=time)
+
+
+def _small(value: float, found: Agreement) -> str:
+    """A difference as text; what is a millionth of its tolerance is rounding."""
+    if 0 < abs(value) < _ROUNDING * found.tolerance:
+        return "≈ 0"
+    return quantity(value, found.unit)
 
 
 def _reasons(comparison: Comparison) -> list[tuple[str, str, str]]:
@@ -119,58 +249,19 @@ def _reasons(comparison: Comparison) -> list[tuple[str, str, str]]:
     ]
 
 
-def _summary(comparison: Comparison) -> str:
-    counts = [
-        sum(found.verdict == verdict for found in comparison.agreements)
-        for verdict in ("agrees", "settles", "differs")
-    ]
-    total = len(comparison.agreements)
-    if counts[0] == total:
-        worst = comparison.worst
-        text = f"All {total} quantities agree at every moment that was compared"
-        if worst is not None:
-            text += (
-                f"; nearest to its tolerance comes {worst.name}, with "
-                f"{quantity(worst.max, worst.unit)} of {quantity(worst.tolerance, worst.unit)}"
-            )
-        return text + "."
-    apart = [found.since for found in comparison.agreements if found.since is not None]
-    text = f"Of {total} quantities {counts[0]} agree, {counts[1]} settle and {counts[2]} differ."
-    if apart:
-        first = min(apart)
-        names = [found.name for found in comparison.agreements if found.since == first]
-        text += f" They part at {short_time(first)}: first {few(names)}."
-    return text
-
-
-def _touch(touch: Touch, one: str, two: str) -> str:
-    """What becomes of a contact on each side, in a sentence."""
-    first, second = _end(touch.one, one), _end(touch.two, two)
-    return f"{touch.pair}: {first}; {second}."
-
-
-def _end(contact: Contact, backend: str) -> str:
-    if contact.last is None:
-        return f"on {backend} they never touch"
-    if contact.ends:
-        force, total = figure(contact.force), figure(contact.total)
-        return f"on {backend} in touch at the end, pressed with {force} N (with friction {total} N)"
-    return f"on {backend} last in touch at {short_time(contact.last)}"
-
-
-def _verdict(comparison: Comparison) -> str:
-    if comparison.agrees:
-        return f"{comparison.one.backend} and {comparison.two.backend} agree within tolerance"
-    if comparison.ended:
-        sides = [side.backend for side in (comparison.one, comparison.two) if side.ended]
-        return f"both runs come to their end (not: {' and '.join(sides)})"
-    found = comparison.agreements
-    parts = []
-    for verdict, word in (("differs", "differ"), ("settles", "settle")):
-        names = [each.name for each in found if each.verdict == verdict]
-        if names:
-            parts.append(f"{len(names)} {word}: {few(names, 4, '; ')}")
-    return f"not within tolerance always: of {len(found)} quantities {'. '.join(parts)}"
+def _models(models: Page, has_emulated: bool) -> Section:
+    """What each engine makes of the model: the verdict, and what it is of on demand."""
+    verdicts: list[Block] = [each for each in models.blocks if isinstance(each, Verdict)]
+    rest = [each for each in models.blocks if not isinstance(each, Verdict)]
+    first = Text("Before anything moves.")
+    if has_emulated:
+        first = Text(
+            "Before anything moves. What the backends then do about it for the runs above is in",
+            see=_EMULATED,
+        )
+    folded = Section("", models.title, rest, folded=True)
+    heading = "What each engine makes of the model"
+    return Section("models", heading, [first, *verdicts, folded], detail=True)
 
 
 def _origin(comparison: Comparison) -> str:

@@ -10,11 +10,14 @@ from ..page import (
     Block,
     Code,
     Heading,
+    Interactive,
+    Items,
     Page,
     Picture,
     Printed,
     Question,
     RobotPicture,
+    Section,
     Table,
     Text,
     Verdict,
@@ -44,6 +47,8 @@ def body(page: Page, picture: Callable[[Picture], str]) -> Iterator[str]:
     So is what follows a heading, under the heading's own words.
     """
     yield f"*{_escaped(page.origin)}*"
+    if page.headline:
+        yield f"**{_escaped(page.headline.text)}**"
     blocks = list(page.blocks)
     while blocks:
         block = blocks.pop(0)
@@ -76,8 +81,10 @@ def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
     match block:
         case Heading(text):
             return f"**{_escaped(text)}**"
-        case Text(text):
-            return _escaped(text)
+        case Text(text, (_, heading)):
+            return _escaped(f"{text} {heading}." if heading else text)
+        case Items(texts, ordered):
+            return "\n".join(f"{'1.' if ordered else '-'} {_escaped(text)}" for text in texts)
         case Code(lines):
             return _fenced("\n".join(lines), "python")
         case Printed(by_engine):
@@ -91,6 +98,10 @@ def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
             return _table(block)
         case Verdict(text, holds):
             return f"{'✓' if holds else '✗'} {_escaped(text)}"
+        case Section():
+            return _section(block, picture)
+        case Interactive():
+            return ""
         case RobotPicture():
             where = picture(block)
             shown = f"![{_escaped(block.words)}]({where})" if where else _escaped(block.words)
@@ -98,6 +109,17 @@ def block_as_markdown(block: Block, picture: Callable[[Picture], str]) -> str:
         case _:
             where = picture(block)
             return f"![{_escaped(block.title)}]({where})" if where else ""
+
+
+def _section(block: Section, picture: Callable[[Picture], str]) -> str:
+    parts = [part for each in block.blocks if (part := block_as_markdown(each, picture))]
+    if not parts:
+        return ""
+    heading = _escaped(block.heading)
+    if block.folded or block.detail:
+        inside = "\n\n".join(parts)
+        return f"<details><summary>{heading}</summary>\n\n{inside}\n\n</details>"
+    return "\n\n".join([f"## {heading}", *parts])
 
 
 def asked(block: Question) -> str:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..backends import backend_names, load
-from ..compare import Request, compare, series, sides_of, touches, witness
+from ..compare import Request, compare, series, sides_of, witness
 from ..compare.why import attribute
 from ..comparison.text import reading
 from ..conventions import phrasebook, probe
@@ -97,7 +97,7 @@ def make_comparisons(folder: Path, say: Callable[[str], None] = print) -> list[P
         say(f"comparing: {name} ...")
         (one, two), said = sides_of(Request((name,)))
         asked = witness(one, two)
-        page = comparison.page(compare(one, two), one.header.says, said, asked, touches(one, two))
+        page = comparison.page(compare(one, two), one, two, said=said, witness=asked)
         curves = {
             curve.name: (curve.time.tolist(), (curve.difference * reading(curve.unit)[0]).tolist())
             for curve in series(one, two)

@@ -12,11 +12,14 @@ from ..page import (
     Block,
     Code,
     Heading,
+    Items,
     Page,
     Printed,
     Question,
     RobotPicture,
+    Section,
     Table,
+    TableCell,
     Text,
     Verdict,
 )
@@ -90,6 +93,8 @@ def show(page: Page, footer: str = "", reader: Reader | None = None) -> None:
     views = [block.view for block in page.blocks if isinstance(block, RobotPicture)]
     if reader and views:
         _write(tell, [Text(f"To look at it: {views[0]}")])
+    if page.headline:  # last, where it stays in sight
+        _write(tell, [Verdict(page.headline.text, page.headline.holds)])
     if footer:
         _write(tell, [], footer=footer)
     else:
@@ -139,45 +144,71 @@ def _write(
 
 
 def _print(console: Console, blocks: Sequence[Block], heading: Page | None, footer: str) -> None:
-    from rich.markup import escape as escaped
-
     plain = console.legacy_windows or console.options.ascii_only
-
-    def escape(text: str) -> str:
-        text = _CONTROL.sub("?", text)
-        return escaped(text.translate(ASCII) if plain else text)
-
-    good, bad = ("yes", "NO ") if plain else ("✓", "✗")
+    escape = _escape(plain)
     if heading:
         console.print()
         console.print(f"[bold]{escape(heading.title)}[/]")
         console.print(f"[dim]{escape(heading.origin)}[/]")
     for block in blocks:
-        match block:
-            case Heading(text):
-                console.print()
-                console.print(f"[bold]{escape(text)}[/]")
-            case Text(text):
-                console.print()
-                console.print(escape(text))
-            case Code(lines):
-                console.print()
-                for line in lines:
-                    console.print(f"    [cyan]{escape(line)}[/]", soft_wrap=True)
-            case Printed(by_engine):
-                _print_outputs(console, by_engine, escape)
-            case Table():
-                console.print()
-                if block.title:
-                    console.print(f"[italic]{escape(block.title)}[/]")
-                console.print(_grid(block, plain, escape, console.width))
-            case Verdict(text, holds):
-                console.print()
-                mark = f"[green]{good}[/]" if holds else f"[red]{bad}[/]"
-                console.print(_hanging(mark, escape(text)))
+        _print_block(console, block, plain, escape)
     if footer:
         console.print()
         console.print(f"[dim]{escape(footer)}[/]\n")
+
+
+def _escape(plain: bool) -> Callable[[str], str]:
+    """What keeps a text from being taken for a style, or for a command to the terminal."""
+    from rich.markup import escape as escaped
+
+    def escape(text: str) -> str:
+        text = _CONTROL.sub("?", text)
+        return escaped(text.translate(ASCII) if plain else text)
+
+    return escape
+
+
+def _print_block(console: Console, block: Block, plain: bool, escape: Callable[[str], str]) -> None:
+    match block:
+        case Heading(text):
+            console.print()
+            console.print(f"[bold]{escape(text)}[/]")
+        case Text(text, (_, linked)):
+            console.print()
+            console.print(escape(f"{text} {linked}." if linked else text))
+        case Items(texts, ordered):
+            console.print()
+            for number, text in enumerate(texts, start=1):
+                console.print(_hanging(f"{number}." if ordered else "-", escape(text)))
+        case Code(lines):
+            console.print()
+            for line in lines:
+                console.print(f"    [cyan]{escape(line)}[/]", soft_wrap=True)
+        case Printed(by_engine):
+            _print_outputs(console, by_engine, escape)
+        case Table():
+            console.print()
+            if block.title:
+                console.print(f"[italic]{escape(block.title)}[/]")
+            console.print(_grid(block.narrow(), plain, escape, console.width))
+        case Section():
+            _print_section(console, block, escape)
+        case Verdict(text, holds):
+            console.print()
+            good, bad = ("yes", "NO ") if plain else ("✓", "✗")
+            mark = f"[green]{good}[/]" if holds else f"[red]{bad}[/]"
+            console.print(_hanging(mark, escape(text)))
+
+
+def _print_section(console: Console, block: Section, escape: Callable[[str], str]) -> None:
+    """A section that is no detail; its heading where a table's title is none already."""
+    shown = [b for b in block.blocks if not (isinstance(b, Section) and b.detail)]
+    if block.detail or not shown:
+        return
+    if len(shown) > 1 and not isinstance(shown[0], Table):
+        console.print()
+        console.print(f"[bold]{escape(block.heading)}[/]")
+    _print(console, shown, None, "")
 
 
 def _print_outputs(
@@ -217,8 +248,15 @@ def _grid(block: Table, plain: bool, escape: Callable[[str], str], width: int) -
             min_width=name if k == 0 else None,
         )
     for k, row in enumerate(block.rows):
-        grid.add_row(*map(escape, row), style="bold" if k in block.emphasis else None)
+        cells = (escape(_loud(cell)) for cell in row)
+        grid.add_row(*cells, style="bold" if k in block.emphasis else None)
     return grid
+
+
+def _loud(cell: str) -> str:
+    """A cell; that something differs is seen without a colour."""
+    differs = isinstance(cell, TableCell) and cell.verdict == "differs"
+    return cell.upper() if differs else cell
 
 
 def _whole_name(block: Table, width: int) -> int | None:

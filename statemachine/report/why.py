@@ -1,16 +1,13 @@
-"""The page of an attribution: what each difference explains, and what stays."""
+"""What an attribution says: what each difference explains, what stays, and what to set."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
-from ..compare.why import FACTORS, Attribution, FactorTrial
-from ..comparison.text import NONE, capital, percent, quantity, short_time
-from ..page import Page, Table, Text, Verdict
-from .why_words import ENOUGH, amount, astray, conclusion, shown, titles
-
-_BAR = 16  # characters of the longest bar
+from ..compare.why import Attribution, FactorTrial
+from ..comparison.text import NONE, capital, listed, percent, quantity, short_time
+from ..page import Block, Items, Page, Section, Table, TableCell, Text, Verdict
+from .why_words import ENOUGH, amount, astray, conclusion, moves, shown, title, titles
 
 
 def page(result: Attribution, said: Sequence[str] = ()) -> Page:
@@ -20,46 +17,88 @@ def page(result: Attribution, said: Sequence[str] = ()) -> Page:
         result: The attribution.
         said: Lines to say before anything else.
     """
-    blocks: list[Any] = [Text(line) for line in (*said, result.says) if line]
-    blocks.append(Text(_gap_sentence(result)))
-    if not result.alone:
-        blocks.append(
-            Text(
-                f"What is below {amount(result, result.negligible)} is taken for rounding: "
-                "there is nothing to explain."
-            )
-        )
-        return Page(_title(result), _origin(result), blocks)
-    blocks += [_alone(result), *(Text(line) for line in _notes(result))]
-    blocks += [_ladder(result), Text(f"The order. {' '.join(result.order)}")]
-    blocks += [Text(line) for line in conclusion(result)]
-    blocks.append(
-        Verdict(
-            f"{percent(1 - result.unexplained)} of the gap is explained, "
-            f"{percent(result.unexplained)} is not",
-            abs(result.unexplained) <= ENOUGH,
-        )
-    )
-    return Page(_title(result), _origin(result), blocks)
-
-
-def _title(result: Attribution) -> str:
     one, two = result.names
-    return f"{result.experiment}: why {two} is not {one}"
-
-
-def _origin(result: Attribution) -> str:
-    return (
+    name = f"{result.experiment}: why {two} is not {one}"
+    origin = (
         f"{result.one} and {result.two}, {result.seconds:g} s, "
         f"{result.runs} runs compared at {result.moments} moments"
+    )
+    blocks: list[Block] = [Text(line) for line in (*said, result.says) if line]
+    blocks += causes(result)
+    if result.alone:
+        blocks.append(Section("agree", "To make them agree", steps(result), detail=True))
+        blocks.append(
+            Verdict(
+                f"{percent(1 - result.unexplained)} of the gap is explained, "
+                f"{percent(result.unexplained)} is not",
+                abs(result.unexplained) <= ENOUGH,
+            )
+        )
+    return Page(name, origin, blocks)
+
+
+def causes(result: Attribution) -> list[Block]:
+    """How much of the gap each factor takes away, all on top of each other and alone."""
+    blocks: list[Block] = [Text(_gap_sentence(result))]
+    if not result.alone:
+        told = f"What is below {amount(result, result.negligible)} is taken for rounding: "
+        return [*blocks, Text(f"{told}there is nothing to explain.")]
+    blocks.append(_ladder(result))
+    starred = any(moves(trial) for trial in result.ladder)
+    if starred:
+        blocks.append(_star(result))
+    marked = False
+    for line in conclusion(result):
+        blocks.append(Text(line))
+        if "!" in line:
+            blocks.append(_astray(result))
+            marked = True
+    return [*blocks, _alone(result, starred, marked)]
+
+
+def steps(result: Attribution) -> list[Block]:
+    """What to set, in order, so that the runs agree, and what stays."""
+    one, two = result.names
+    same = amount(result, result.settings_same)
+    settings = [trial for trial in result.ladder if trial.way == "parity" and trial.did]
+    if settings:
+        blocks: list[Block] = [
+            Text("Bring these to the same, in this order, each kept for the next:"),
+            Items([_step(result, trial) for trial in settings], ordered=True),
+        ]
+        text = f"What remains with all of it: {same}."
+    else:
+        blocks = []
+        text = (
+            f"Every setting that was tried is the same on {one} and {two}: there is nothing to "
+            f"set. What remains is all of the gap, {same}."
+        )
+    rest = [t for t in result.ladder if t.way == "off" and t.explains is not None]
+    if rest:
+        names = listed([title(trial.factor) for trial in rest])
+        text += (
+            f" With {names} left out on both ({rest[-1].did.removesuffix(', both')}) it is "
+            f"{amount(result, rest[-1].worst)}: that is each engine's own doing, and no setting "
+            "that was tried brings it to the same."
+        )
+    return [*blocks, Text(text)]
+
+
+def _step(result: Attribution, trial: FactorTrial) -> str:
+    one, two = result.names
+    whose = two if trial.did == f"as {one}" else one
+    left = trial.note or "not known by itself"
+    if trial.worst is not None:
+        left = amount(result, trial.worst)
+    return (
+        f"{capital(title(trial.factor))} of {whose}: {_brought(result, trial)} – the gap is then "
+        f"{left}"
     )
 
 
 def _what(result: Attribution) -> str:
-    if result.quantity == "joints":
-        return "the worst joint"
-    if result.quantity == "slides":
-        return "the worst slide"
+    if result.quantity in ("joints", "slides"):
+        return f"the worst {result.quantity.removesuffix('s')}"
     return f"the {result.quantity}"
 
 
@@ -82,30 +121,6 @@ def _gap_sentence(result: Attribution) -> str:
     return text
 
 
-def _alone(result: Attribution) -> Table:
-    set_back = any(trial.put_back is not None for trial in result.alone)
-    rows = []
-    for trial in result.alone:
-        last = shown(result, trial.put_back) if set_back else amount(result, trial.moved)
-        rows.append(
-            (
-                FACTORS[trial.factor].title,
-                _brought(result, trial),
-                shown(result, trial.worst, trial),
-                percent(trial.explains) + ("*" if _another(trial) else ""),
-                last,
-            )
-        )
-    headers = (
-        "",
-        "brought to",
-        "gap",
-        "explains",
-        "put back" if set_back else f"moves {result.names[0]} by",
-    )
-    return Table(headers, rows, "One at a time: what happens to the gap", frozenset({0, 1}))
-
-
 def _brought(result: Attribution, trial: FactorTrial) -> str:
     if trial.way == "parity":
         had = trial.had if trial.did == f"as {result.names[0]}" else trial.had[::-1]
@@ -113,74 +128,118 @@ def _brought(result: Attribution, trial: FactorTrial) -> str:
     return trial.did or NONE
 
 
-def _another(trial: FactorTrial) -> bool:
-    """Whether one itself moves otherwise with it: then the gap is that of another motion."""
-    return bool(trial.moved) and trial.worst is not None
+def _star(result: Attribution) -> Text:
+    text = (
+        f"* {result.names[0]} itself then moves otherwise than it did, so the gap is that of "
+        "another motion; a smaller one there is a hint, not a proof."
+    )
+    return Text(text, small=True)
 
 
-def _notes(result: Attribution) -> list[str]:
-    one, two = result.names[0], result.names[1]
-    found = []
-    if any(trial.put_back is not None for trial in result.alone):
-        found.append(
-            "Explains: the part of the gap that goes when this alone is brought to the same; "
-            "below zero, the gap grows. Put back: the gap when all settings are the same and "
-            "this one is as it came. The parts need not add up: one setting can hide another."
-        )
-    found += [
-        f"{capital(FACTORS[trial.factor].title)}, put back, takes {titles(trial.along)} back "
-        "with it: they can be set only where it is."
-        for trial in result.alone
-        if trial.along
-    ]
-    if any(_another(trial) for trial in result.alone):
-        found.append(
-            f"* This moves {one} itself, so the gap is that of another motion. A smaller gap "
-            "there is a hint, not a proof."
-        )
-    marked = [t.put_back for t in result.alone] + [t.worst for t in result.alone if not t.moved]
-    if any(astray(result, gap) for gap in marked):
-        found.append(
-            f"! More than twice what {one} moves at all ({amount(result, result.extent)}), and "
-            f"than the gap itself: so {two} does not do the experiment any more."
-        )
-    for trial in result.alone:
-        if trial.note:
-            found.append(f"{capital(FACTORS[trial.factor].title)}: {trial.note}.")
-    if any(trial.way == "one side" for trial in result.alone):
-        found.append(f"Integrator: {two} has none to choose from, so only {one} was changed.")
-    return found
+def _astray(result: Attribution) -> Text:
+    one, two = result.names
+    text = (
+        f"! More than twice what {one} moves at all ({amount(result, result.extent)}), and than "
+        f"the gap itself: {two} does not do the experiment any more."
+    )
+    return Text(text, small=True)
 
 
 def _ladder(result: Attribution) -> Table:
-    gaps = [result.gap, *(t.worst for t in result.ladder if t.worst is not None)]
-    longest = max(gaps)
-    rows = [("as they come", "", amount(result, result.gap), "", _bar(result.gap, longest))]
-    for trial in result.ladder:
-        rows.append(
-            (
-                f"+ {FACTORS[trial.factor].title}",
-                trial.did.removesuffix(", both"),
-                amount(result, trial.worst),
-                _rung(trial),
-                "" if trial.worst is None else _bar(trial.worst, longest),
-            )
+    """All factors, one on top of the other."""
+    rows = [
+        (
+            capital(title(trial.factor)),
+            _share(trial.explains, percent(trial.explains), trial),
+            amount(result, trial.worst),
+            _brought(result, trial),
         )
-    rows.append(("unexplained", "", amount(result, result.left), percent(result.unexplained), ""))
+        for trial in result.ladder
+    ]
+    gap, left = amount(result, result.gap), amount(result, result.left)
     return Table(
-        ("", "brought to", "gap left", "explains", ""),
+        ("what", "explains", "gap left", "brought to"),
         rows,
-        "All of them, one on top of the other",
-        frozenset({0, 1, 4}),
-        frozenset({len(rows) - 1}),
+        f"All of them, one on top of the other: from {gap} to {left}",
+        words=frozenset({0, 3}),
     )
 
 
-def _rung(trial: FactorTrial) -> str:
-    if trial.explains is None and trial.worst:
-        return trial.note
-    return percent(trial.explains) + ("*" if _another(trial) else "")
+def _alone(result: Attribution, starred: bool, marked: bool) -> Section:
+    """What the gap becomes when one thing alone is changed.
+
+    Args:
+        result: The attribution.
+        starred: Whether it was said already what a star means.
+        marked: The same of an exclamation mark.
+    """
+    set_back = any(trial.put_back is not None for trial in result.alone)
+    rows = []
+    for trial in result.alone:
+        change = None if trial.explains is None else -trial.explains
+        text = NONE if change is None else _signed(change)
+        rows.append(
+            (
+                capital(title(trial.factor)),
+                _share(change, text, trial),
+                shown(result, trial.worst, trial),
+                shown(result, trial.put_back) if set_back else amount(result, trial.moved),
+                _brought(result, trial),
+            )
+        )
+    table = Table(
+        (
+            "what",
+            "change of\nthe gap",
+            "gap",
+            "put back" if set_back else f"moves {result.names[0]} by",
+            "brought to",
+        ),
+        rows,
+        f"One at a time: what becomes of the {amount(result, result.gap)}",
+        words=frozenset({0, 4}),
+    )
+    notes: list[Block] = []
+    if any(moves(trial) for trial in result.alone) and not starred:
+        notes.append(_star(result))
+    given = [t.put_back for t in result.alone] + [t.worst for t in result.alone if not t.moved]
+    if any(astray(result, gap) for gap in given) and not marked:
+        notes.append(_astray(result))
+    notes += [Text(_meaning(result, set_back)), Text(f"The order above. {' '.join(result.order)}")]
+    heading = "Each by itself: what the gap becomes when one thing alone is changed"
+    return Section("", heading, [table, *notes], folded=True)
 
 
-def _bar(value: float, longest: float) -> str:
-    return "█" * round(_BAR * value / longest)
+def _meaning(result: Attribution, set_back: bool) -> str:
+    """What the figures of one thing alone mean."""
+    one, two = result.names
+    lines = [
+        "These figures are no shares of an explanation, and need not add up: one setting can hide "
+        "another, and what is left out on both sides makes another motion."
+    ]
+    if set_back:
+        lines.append("Put back: the gap when all settings are the same and this one is as it came.")
+    lines += [
+        f"{capital(title(trial.factor))}, put back, takes {titles(trial.along)} back with it: "
+        "they can be set only where it is."
+        for trial in result.alone
+        if trial.along
+    ]
+    lines += [f"{capital(title(t.factor))}: {t.note}." for t in result.alone if t.note]
+    if any(trial.way == "one side" for trial in result.alone):
+        lines.append(f"Integrator: {two} has none to choose from, so only {one} was changed.")
+    return " ".join(lines)
+
+
+def _share(share: float | None, text: str, trial: FactorTrial) -> TableCell:
+    return TableCell(f"{text}*" if moves(trial) else text, share=share)
+
+
+def _signed(change: float) -> str:
+    text = percent(abs(change))
+    if change == 0:
+        return text
+    sign = "+" if change > 0 else "-"
+    if text[0] in "<>":
+        return f"{text[0]} {sign}{text[2:]}" if change > 0 else f"{sign}{text[2:]}"
+    return sign + text

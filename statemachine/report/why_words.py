@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from ..compare.why import FACTORS, Attribution, FactorTrial
 from ..comparison.text import listed, percent, quantity, short_time
 
-_WORTH = 0.005  # the least part of the gap that the conclusion speaks of
+_WORTH = 0.005  # the least part of the gap that is spoken of
+_SOME = 0.1  # part of the gap from which on a factor is a cause
+_PROOF = 1e-3  # of the gap: nearer than this until the first touch, the touch parts them
 ENOUGH = 0.1  # what may stay unexplained without the answer being no
 _OPENS = 1.5  # times the gap of equal settings: a setting put back that opens more is named
 _OTHERWISE = 0.05  # of the gap: a part that changes by more with the order is given both ways
@@ -28,6 +30,49 @@ def shown(result: Attribution, value: float | None, trial: FactorTrial | None = 
 def astray(result: Attribution, value: float | None) -> bool:
     """Whether a gap is more than twice what one moves at all, and than the first gap."""
     return value is not None and value > 2 * max(result.extent, result.gap)
+
+
+def causes(result: Attribution) -> tuple[str, ...]:
+    """What takes the largest difference away, of the ladder; what is a proof comes first."""
+    if not result.alone:
+        return ()
+    counted = [trial for trial in result.ladder if trial.explains is not None]
+    if max((trial.explains or 0.0 for trial in counted), default=0.0) < _SOME:
+        return ("None of the factors that were tried explains a tenth of it.",)
+    worth = [trial for trial in counted if (trial.explains or 0.0) >= _WORTH]
+    worth.sort(key=lambda trial: -(trial.explains or 0.0))
+    found = []
+    touch = result.touch
+    contact = next((t for t in worth if t.factor == "contact" and t.way == "off"), None)
+    if contact is not None and touch is not None and touch.before < _PROOF * result.gap:
+        what = touch.what.split("; ", maxsplit=1)[0]
+        verb = "are" if result.quantity in ("joints", "slides") else "is"
+        found.append(
+            f"Until the first touch, {what} at {short_time(touch.time)}, the {result.quantity} "
+            f"{verb} {amount(result, touch.before)} apart."
+        )
+    same = [f"{title(t.factor)} {percent(t.explains)}" for t in worth if not moves(t)]
+    if same:
+        found.append(f"Of that, made the same one on top of the other: {', '.join(same)}.")
+    other = [
+        f"{title(t.factor)} takes {percent(t.explains)} of it away*" for t in worth if moves(t)
+    ]
+    if other:
+        found.append(
+            f"{'Then, left' if same else 'Left'} out on both sides, {', '.join(other)}. "
+            f"* This moves {result.names[0]} itself: a hint, not a proof."
+        )
+    return tuple(found)
+
+
+def moves(trial: FactorTrial) -> bool:
+    """Whether it moves the first side itself, so that the gap is of another motion."""
+    return bool(trial.moved and trial.worst is not None and trial.way != "none")
+
+
+def title(factor: str) -> str:
+    """A factor in words."""
+    return FACTORS[factor].title if factor in FACTORS else factor
 
 
 def conclusion(result: Attribution) -> list[str]:
@@ -77,7 +122,7 @@ def conclusion(result: Attribution) -> list[str]:
             "how each engine makes it."
         )
         touch = result.touch
-        if touch is not None and touch.before < 1e-3 * result.gap:
+        if touch is not None and touch.before < _PROOF * result.gap:
             acting = [t.factor for t in result.alone if t.way in ("off", "one side")]
             named = [FACTORS[name].title for name in acting if name not in _AT_TOUCH]
             what = touch.what.split("; ", maxsplit=1)[0]

@@ -1,10 +1,11 @@
-"""The report of a comparison as one self-contained page.
+"""A page as one self-contained HTML file.
 
-    text = report(comparison, one, two, looks=(look, look))
+    text = report(page, looks=(look, look))
     write_report("hold.html", text)
 
-Made in Python: the finding in words, tables, and curves as SVG, which read without a script.
-The script, ours and without a library, draws both runs in WebGL and moves the cursor.
+Made in Python: words, tables, and curves as SVG, which read without a script. The script, ours
+and without a library, draws both runs in WebGL and moves the cursor. No word about what was found
+is made here.
 """
 
 from __future__ import annotations

@@ -11,10 +11,13 @@ import numpy as np
 
 from ...compare import Agreement, Series
 from ...comparison import largest
-from ...comparison.text import figure, quantity, reading, short_time
+from ...comparison.text import figure, reading
 from ...interface import Array, Ints
+from ...page import Table
+from ..finding import name_of
 from ..log_axis import LogAxis
-from .finding import name_of
+from ..over_time import QuantityChart
+from .blocks import badge, table
 from .markup import Html, joined, tag
 
 _ROWS = 21  # of the table under a chart
@@ -35,17 +38,45 @@ class Curve:
     time: Array | None = None
 
 
-def difference_chart(curve: Series, found: Agreement, points: int = 600) -> Html:
+def quantity_row(chart: QuantityChart, own: tuple[Series, Series] | None, points: int) -> Html:
+    """A row of a quantity: how far apart over time, both sides, and the figures on demand.
+
+    Args:
+        chart: The quantity.
+        own: Each side's curve at its own rows; None where there is none.
+        points: At most, of a curve.
+    """
+    values = None if own is None else values_chart(*own, chart.labels, points)
+    axis = "log axis; " if logarithmic(chart.found) else ""
+    said = f"how far apart, {chart.unit}; {axis}shaded: within tolerance"
+    return tag(
+        "section",
+        tag("h3", tag("span", chart.title, class_="quantity"), badge(chart.found.verdict)),
+        tag(
+            "div",
+            tag("figure", tag("figcaption", said), difference_chart(chart, points)),
+            tag("figure", tag("figcaption", _sides(chart)), values) if values else None,
+            class_="charts",
+        ),
+        tag("p", chart.foot, class_="foot") if chart.foot else None,
+        tag("details", tag("summary", f"The figures of {chart.title}"), data_table(chart),
+            class_="data"),
+        class_="quantity-row",
+    )  # fmt: skip
+
+
+def _sides(chart: QuantityChart) -> Html:
+    """What the lines of both sides are."""
+    one, two = chart.labels
+    keys = (tag("i", class_="key one"), f"{one} ", tag("i", class_="key two"), two)
+    return joined((f"both sides, {chart.unit}: ", *keys))
+
+
+def difference_chart(chart: QuantityChart, points: int = 600) -> Html:
     """How far apart over time, with the tolerance as a band."""
+    curve, found, said = chart.curve, chart.found, chart.said
     scale = reading(curve.unit)[0]
     top = 1.08 * max(float(curve.difference.max()), found.tolerance) * scale
-    said = (
-        f"{name_of(curve.name)}, difference over time: at most "
-        f"{quantity(found.max, curve.unit)} at {short_time(found.at)}, settled at "
-        f"{quantity(found.settled, curve.unit)}; tolerance "
-        f"{quantity(found.tolerance, curve.unit)}, "
-        + ("never left." if found.since is None else f"left at {short_time(found.since)}.")
-    )
     band = found.tolerance * scale
     values = curve.difference * scale
     if logarithmic(found):
@@ -101,45 +132,34 @@ def values_chart(
     return _plot(np.array([0.0, until]), curves, (floor, high + pad), said, points=points)
 
 
-def data_table(curve: Series, found: Agreement, labels: tuple[str, str]) -> Html:
+def data_table(chart: QuantityChart) -> Html:
     """The figures of a chart: moments evenly spaced, and that of the largest difference."""
-    scale, unit = reading(curve.unit)
+    curve, tolerance = chart.curve, chart.found.tolerance
+    scale = reading(curve.unit)[0]
     rows = np.linspace(0, len(curve.time) - 1, min(_ROWS, len(curve.time))).round().astype(int)
     _, worst = largest(curve.difference)
     rows = np.unique([*rows, worst])
     columns = []
     parts = "xyz" if curve.one.ndim == 2 and curve.one.shape[1] == 3 else ("",)
     if curve.one.size:
-        for side, label in zip((curve.one, curve.two), labels, strict=True):
+        for side, label in zip((curve.one, curve.two), chart.labels, strict=True):
             for k, part in enumerate(parts):
                 columns.append((f"{label} {part}".strip(), side.reshape(len(side), -1)[:, k]))
     columns.append(("apart", curve.difference))
-    head = tag(
-        "tr",
-        tag("th", "time, s", scope="col"),
-        *(tag("th", f"{name}, {unit.strip()}", scope="col") for name, _ in columns),
-    )
-    body = [
-        tag(
-            "tr",
-            tag("th", f"{curve.time[row]:.3f}", scope="row"),
-            *(
-                tag("td", _number(float(values[row]) * scale, found.tolerance * scale))
-                for _, values in columns
-            ),
-            class_="most" if row == worst else None,
+    cells = [
+        (
+            f"{curve.time[row]:.3f}",
+            *(_number(float(values[row]) * scale, tolerance * scale) for _, values in columns),
         )
         for row in rows.tolist()
     ]
-    count = f"{len(rows)} of {len(curve.time)} moments"
-    caption = f"{name_of(curve.name)}: {count}, the largest difference bold"
-    return tag(
-        "div",
-        tag("table", tag("caption", caption), tag("thead", head), tag("tbody", *body)),
-        class_="wide",
-        tabindex="0",
-        role="region",
-        aria_label=f"Figures of {name_of(curve.name)}",
+    return table(
+        Table(
+            ("time, s", *(f"{name}, {chart.unit}" for name, _ in columns)),
+            cells,
+            f"{chart.title}: {len(rows)} of {len(curve.time)} moments, the largest difference bold",
+            emphasis=frozenset(np.flatnonzero(rows == worst).tolist()),
+        )
     )
 
 

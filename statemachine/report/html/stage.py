@@ -4,44 +4,91 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ...compare import Comparison, Series
+from ...compare import Series
 from ...comparison.text import figure, reading, short_time
+from ..over_time import BothRuns, QuantityChart
+from .between import own_series, shown_series
+from .budget import Budget
 from .charts import time_axis
-from .finding import name_of
 from .geometry import packed
 from .markup import Html, joined, kept, tag
-from .timeline import Event, Frames
+from .scene import SideDrawing, scene_of
+from .sketch import sketch
+from .timeline import Frames, frames_of
 
 
-def stage(
-    comparison: Comparison,
-    curves: Sequence[Series],
-    events: Sequence[Event],
-    frames: Frames,
-    start: int,
-    labels: tuple[str, str],
-    still: Html,
-    tip: str,
-    strongest: float,
-) -> Html:
+@dataclass(frozen=True, eq=False)
+class StagePart:
+    """What a page shows of both runs.
+
+    Attributes:
+        of: What it is made of.
+        html: The scene, the slider and the lanes under it.
+        data: For the script.
+        own: Each side's curves at its own rows, by name.
+        notes: What a reader should know of the picture, in sentences.
+    """
+
+    of: BothRuns
+    html: Html
+    data: dict[str, Any]
+    own: Mapping[str, tuple[Series, Series]]
+    notes: tuple[str, ...]
+
+    @property
+    def charts(self) -> int:
+        """How many charts follow the slider."""
+        return len(self.of.charts)
+
+
+def staged(runs: BothRuns, looks: Sequence[SideDrawing], budget: Budget) -> StagePart:
+    """Both runs, drawn.
+
+    Args:
+        runs: The runs.
+        looks: What each is drawn as.
+        budget: How much detail there may be.
+    """
+    one, two, tip = runs.one, runs.two, runs.site
+    frames = frames_of(one, two, runs.moments, budget.frames(one, two))
+    start = int(np.argmin(np.abs(frames.time - runs.start)))
+    scene = scene_of(one, two, frames, looks, tip, budget, start)
+    at_frames = shown_series(one, two, frames, tip, [chart.curve for chart in runs.charts])
+    data = {
+        "time": packed(frames.time, "f8"),
+        "between": packed(frames.share > 0, "u1"),
+        "other": runs.labels[1],
+        "until": runs.until,
+        "start": start,
+        "quantities": [
+            _quantity_data(curve, chart)
+            for curve, chart in zip(at_frames, runs.charts, strict=True)
+        ],
+        "lead": list(runs.lead),
+        "scene": scene.data,
+    }
+    still = sketch(scene, one, two, frames, start, runs.labels)
+    html = _stage(runs, frames, start, still, scene.strongest)
+    return StagePart(runs, html, data, own_series(one, two, tip), scene.notes)
+
+
+def _stage(runs: BothRuns, frames: Frames, start: int, still: Html, strongest: float) -> Html:
     """The scene, what the figures are at its moment, the slider and the lanes under it.
 
     Args:
-        comparison: What was found.
-        curves: What the lanes are of.
-        events: First touches are marked.
+        runs: The runs.
         frames: What the slider goes over.
         start: The moment to open at, among the frames.
-        labels: What the sides are called.
         still: The drawing that needs no script.
-        tip: The site whose way is drawn; "" for none.
         strongest: The largest force of an arrow [N]; 0 if there are no contacts.
     """
+    labels, tip = runs.labels, runs.site
     now = float(frames.time[start])
     toggles = [
         ("solid", f"{labels[0]}, solid", "one"),
@@ -119,13 +166,15 @@ def stage(
         aria_valuetext=short_time(now),
         hidden=True,
     )
-    share = now / comparison.until if comparison.until else 0.0
+    share = now / runs.until if runs.until else 0.0
     return tag(
         "section",
         tag("h2", "Both runs, moment by moment", id="stage-heading"),
-        tag("div", tag("div", canvas, transport, looks, class_="left"), _readout(comparison),
+        tag("p", kept(f"{runs.until:g} s on {labels[0]}, as a solid arm, and on {labels[1]}, as a "
+                      "ghost over it."), class_="says"),
+        tag("div", tag("div", canvas, transport, looks, class_="left"), _readout(runs),
             class_="pair"),
-        tag("div", _lanes(comparison, curves, events, slider, labels), class_="lanes"),
+        tag("div", _lanes(runs, slider), class_="lanes"),
         id="stage",
         aria_labelledby="stage-heading",
         style=f"--start:{share:.6f}",
@@ -144,7 +193,7 @@ def _arrows(strongest: float) -> str:
     )
 
 
-def _readout(comparison: Comparison) -> Html:
+def _readout(runs: BothRuns) -> Html:
     """The table that the script keeps at the cursor's moment."""
     return tag(
         "div",
@@ -152,9 +201,9 @@ def _readout(comparison: Comparison) -> Html:
             "table",
             tag("caption", "At ", tag("span", "…", id="now"), class_="now"),
             tag("thead", tag("tr", tag("th", "quantity", scope="col", class_="word"),
-                             tag("th", tag("i", class_="key one"), comparison.one.backend,
+                             tag("th", tag("i", class_="key one"), runs.one.header.backend,
                                  scope="col"),
-                             tag("th", tag("i", class_="key two"), comparison.two.backend,
+                             tag("th", tag("i", class_="key two"), runs.two.header.backend,
                                  scope="col"),
                              tag("th", "apart", scope="col"))),
             tag("tbody", id="readout"),
@@ -165,33 +214,24 @@ def _readout(comparison: Comparison) -> Html:
     )  # fmt: skip
 
 
-def _lanes(
-    comparison: Comparison,
-    curves: Sequence[Series],
-    events: Sequence[Event],
-    slider: Html,
-    labels: tuple[str, str],
-) -> Html:
+def _lanes(runs: BothRuns, slider: Html) -> Html:
     """For each quantity when it is beyond its tolerance, under the slider and as wide."""
-    until = comparison.until or 1.0
+    until = runs.until or 1.0
     rows = [_lane("time", slider, "slide")]
-    short = comparison.one.backend, comparison.two.backend
-    if short[0] == short[1]:
-        short = labels
     for side, look in enumerate(("one", "two")):
         marks = [
             tag("i", class_=f"mark {look}", title=event.text,
                 style=f"left:{100 * event.time / until:.2f}%")
-            for event in events
+            for event in runs.events
             if event.kind == "touch" and event.side == side
         ]  # fmt: skip
         if marks:
             key = tag("i", class_=f"mark key-of {look}")
-            name = joined(("first touches, ", short[side], " ", key))
+            name = joined(("first touches, ", runs.short[side], " ", key))
             rows.append(_lane(name, joined(marks), "touches"))
-    beyond = [(curve, _beyond(curve, comparison)) for curve in curves]
-    beyond = sorted(((c, s) for c, s in beyond if s), key=lambda pair: pair[1][0][0])
-    for curve, spans in beyond:
+    beyond = [(chart.title, _beyond(chart)) for chart in runs.charts]
+    beyond = sorted(((name, s) for name, s in beyond if s), key=lambda pair: pair[1][0][0])
+    for name, spans in beyond:
         bars = [
             tag(
                 "i",
@@ -200,16 +240,15 @@ def _lanes(
             )
             for a, b in spans
         ]
-        rows.append(_lane(name_of(curve.name), joined(bars), "quantity"))
-    within = len(curves) - len(beyond)
+        rows.append(_lane(name, joined(bars), "quantity"))
+    within = len(runs.charts) - len(beyond)
     said = "Bars: beyond tolerance." if beyond else "No quantity leaves its tolerance."
     if beyond and within:
         said += f" {within} more never {'are' if within > 1 else 'is'}."
     rows.append(_lane("", time_axis(until), "axis"))
     spoken = "; ".join(
-        f"{name_of(curve.name)} from {short_time(spans[0][0])}, "
-        f"{sum(b - a for a, b in spans):.3g} s in all"
-        for curve, spans in beyond
+        f"{name} from {short_time(spans[0][0])}, {sum(b - a for a, b in spans):.3g} s in all"
+        for name, spans in beyond
     )
     return joined(
         (
@@ -229,27 +268,27 @@ def _lane(name: str, content: Html, look: str) -> Html:
     )
 
 
-def _beyond(curve: Series, comparison: Comparison) -> list[list[float]]:
+def _beyond(chart: QuantityChart) -> list[list[float]]:
     """From when to when a quantity is beyond its tolerance [s]."""
-    found = next(each for each in comparison.agreements if each.name == curve.name)
-    beyond = curve.difference > found.tolerance
+    time = chart.curve.time
+    beyond = chart.curve.difference > chart.found.tolerance
     edges = np.flatnonzero(np.diff(np.concatenate([[False], beyond, [False]]).astype(int)))
-    step = comparison.until / max(1, comparison.moments - 1)
+    until = float(time[-1])
+    step = until / max(1, len(time) - 1)
     spans = [
-        [float(curve.time[a]), float(min(curve.time[b - 1] + step, comparison.until))]
+        [float(time[a]), float(min(time[b - 1] + step, until))]
         for a, b in edges.reshape(-1, 2).tolist()
     ]
     return _few(spans)
 
 
-def quantity_data(curve: Series, comparison: Comparison) -> dict[str, Any]:
+def _quantity_data(curve: Series, chart: QuantityChart) -> dict[str, Any]:
     """What the script shows of a quantity at each moment shown, and when it is beyond."""
-    found = next(each for each in comparison.agreements if each.name == curve.name)
     scale, unit = reading(curve.unit)
     data: dict[str, Any] = {
-        "name": name_of(curve.name),
+        "name": chart.title,
         "unit": unit.replace(" ", "\u00a0"),
-        "tolerance": found.tolerance * scale,
+        "tolerance": chart.found.tolerance * scale,
         "apart": packed(curve.difference * scale, "f4"),
     }
     if curve.one.ndim == 1 and curve.one.size:

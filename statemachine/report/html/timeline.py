@@ -1,14 +1,12 @@
-"""The moments that the page can show, and what happens at some of them."""
+"""The moments that the page can show."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
-from ...compare import Comparison
-from ...comparison import common_moments, same_pairs
+from ...comparison import common_moments
 from ...interface import Array, Ints
 from ...traces import Trace
 
@@ -80,60 +78,3 @@ def frames_of(one: Trace, two: Trace, must: tuple[float, ...] = (), most: int = 
         between=bool((share > 0).any()),
         left_out=n - len(time) if rows is not common.one and len(time) < n else 0,
     )
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something that happens.
-
-    Attributes:
-        time: Since the start [s].
-        kind: "touch", "part", "largest" or "end".
-        text: What, in a few words.
-        side: 0 or 1, or None for both.
-        what: What touches what; empty otherwise.
-    """
-
-    time: float
-    kind: Literal["touch", "part", "largest", "end"]
-    text: str
-    side: int | None
-    what: str = ""
-
-
-def events_of(comparison: Comparison, one: Trace, two: Trace) -> list[Event]:
-    """First touches on each side, where each quantity parts, largest differences, early ends."""
-    found: list[Event] = []
-    until = comparison.until
-    first = [_touches(trace, until) for trace in (one, two)]
-    first[1] = same_pairs(*first)
-    for pair in dict.fromkeys([*first[0], *first[1]]):
-        for side, times in enumerate(first):
-            if pair in times:
-                found.append(Event(times[pair], "touch", f"first touch: {pair}", side, pair))
-    since: dict[float, list[str]] = {}
-    largest: dict[float, list[str]] = {}
-    for agreement in comparison.agreements:
-        if agreement.kind == "contact":
-            continue
-        if agreement.since is not None:
-            since.setdefault(agreement.since, []).append(agreement.name.replace(", ", " "))
-            largest.setdefault(agreement.at, []).append(agreement.name.replace(", ", " "))
-    for time, names in since.items():
-        found.append(Event(time, "part", f"beyond tolerance from here: {'; '.join(names)}", None))
-    for time, names in largest.items():
-        found.append(Event(time, "largest", f"largest difference: {'; '.join(names)}", None))
-    for side, (trace, has) in enumerate(
-        zip((one, two), (comparison.one, comparison.two), strict=True)
-    ):
-        if has.ended:
-            last = float(trace.time[-1] - trace.time[0])
-            found.append(Event(last, "end", f"ends early: {has.ended}", side))
-    return sorted(found, key=lambda event: event.time)
-
-
-def _touches(trace: Trace, until: float) -> dict[str, float]:
-    """When each pair of bodies first touches [s], of those that do by then."""
-    time = trace.time - trace.time[0]
-    first = {pair: float(time[np.argmax(rows)]) for pair, rows in trace.touches().items()}
-    return {pair: at for pair, at in first.items() if at <= until + 1e-9}

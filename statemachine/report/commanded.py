@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...comparison import largest
-from ...comparison.text import figure, quantity
-from ...interface import Array, JointType
-from ...traces import Trace
-from .markup import Html, kept, tag
-from .sections import table
+from ..comparison import largest
+from ..comparison.text import figure, quantity
+from ..interface import Array, JointType
+from ..page import Block, Section, Table, Text
+from ..traces import Trace
 
 _NEAR = 0.2  # rad: joints that end as near as this to their ctrl were told an angle
 
 
-def commanded(one: Trace, two: Trace, labels: tuple[str, str]) -> Html | None:
-    """What each actuator was told, at the start and in the end; None without actuators."""
+def commanded(one: Trace, two: Trace, labels: tuple[str, str]) -> list[Block]:
+    """What each actuator was told, at the start and in the end; empty without actuators."""
     if not one.header.nu or one.header.actuators != two.header.actuators:
-        return None
+        return []
     if all(trace.header.options.get("actuation") is False for trace in (one, two)):
-        return tag("p", "The actuators are off on both sides: nothing is commanded.")
+        return [Text("The actuators are off on both sides: nothing is commanded.")]
     angles = [_is_angle(trace) for trace in (one, two)]
     angle = angles[0] and angles[1]
     unit = "°" if angle else ""
@@ -36,7 +35,7 @@ def commanded(one: Trace, two: Trace, labels: tuple[str, str]) -> Html | None:
         text = f"{what} from the first moment to the last, the same on both sides: {listed}."
         if angle:
             text += _misses(one, two, labels)
-        return tag("p", kept(text))
+        return [Section("", "", [Text(text)], detail=True)]
     columns = [("at the start", first), ("in the end", last)]
     if not same:
         columns = [
@@ -48,10 +47,9 @@ def commanded(one: Trace, two: Trace, labels: tuple[str, str]) -> Html | None:
         (name, *(f"{_amount(float(values[k]))}{unit}" for _, values in columns))
         for k, name in enumerate(one.header.actuators)
     ]
-    summary = f"What was commanded ({'' if same else 'not '}the same on both sides)"
-    caption = f"{what}, by actuator"
-    made = table(caption, ("actuator", *(name for name, _ in columns)), rows)
-    return tag("details", tag("summary", summary), made)
+    table = Table(("actuator", *(name for name, _ in columns)), rows, f"{what}, by actuator")
+    told = f"What was commanded ({'' if same else 'not '}the same on both sides)"
+    return [Section("", told, [table], folded=True, detail=True)]
 
 
 def _amount(value: float) -> str:

@@ -7,38 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...compare import Agreement, Comparison, Series
-from ...compare.agreement import SETTLED
-from ...compare.why import FACTORS, Attribution, FactorTrial
-from ...comparison import QUANTITIES
-from ...comparison.text import capital, milliseconds, percent, quantity, short_time, significant
-from ..why_words import amount
-from .timeline import Event
+from ..compare import Agreement, Comparison, Series
+from ..compare.agreement import SETTLED
+from ..compare.why import Attribution
+from ..comparison import QUANTITIES
+from ..comparison.text import capital, quantity, short_time
+from ..page import Block, Headline, Section, Text
+from .events import Event
+from .why_words import amount, causes
 
-_SOME = 0.1  # share of the gap from which on a factor is a cause
-_WORTH = 0.005  # share below which a factor is not named beside others
-_PROOF = 1e-3  # of the gap: nearer than this until the first touch, the touch parts them
 _MOVES = 0.1  # share by which a difference may change in the end and be called settled
-
-
-@dataclass(frozen=True)
-class Headline:
-    """What the page begins with.
-
-    Attributes:
-        lead: The largest difference and when it is; a sentence without its end.
-        causes: What explains that difference, the strongest reason first; sentences.
-        end: What is still apart in the end, a sentence; "" where there is nothing to say.
-    """
-
-    lead: str
-    causes: tuple[str, ...] = ()
-    end: str = ""
-
-    @property
-    def text(self) -> str:
-        """All of it on one line."""
-        return " ".join(part for part in (f"{self.lead}.", *self.causes, self.end) if part)
 
 
 @dataclass(frozen=True)
@@ -69,10 +47,11 @@ def headline(
         sides = [side.label for side in (comparison.one, comparison.two) if side.ended]
         return Headline(
             f"The two runs agree for {comparison.until:g} s, and {' and '.join(sides)} ended "
-            "before its time"
+            "before its time",
+            holds=False,
         )
     if of is None:
-        return Headline("The two runs differ")
+        return Headline("The two runs differ", holds=False)
     if of.found is not None and of.found.kind == "contact":
         found = of.found
         lead = f"{name_of(found.name)}: {found.note or of.far + ' apart'}"
@@ -84,8 +63,9 @@ def headline(
         lead += f", at {short_time(of.at)}"
     return Headline(
         capital("; ".join([lead, *_parting(comparison, events)])),
-        _causes(attribution),
+        () if attribution is None else causes(attribution),
         _in_the_end(comparison, curves),
+        holds=False,
     )
 
 
@@ -98,7 +78,7 @@ def _parting(comparison: Comparison, events: Sequence[Event]) -> list[str]:
         return ["the runs part from the start"]
     touch = touch_at(comparison, events)
     when = f", when {_meets(touch[0].what)}" if touch else ""
-    apart = spacing(comparison)
+    apart = _spacing(comparison)
     if apart is None:
         return [f"the runs part at {short_time(at)}{when}"]
     if at <= 1.001 * apart:
@@ -106,11 +86,23 @@ def _parting(comparison: Comparison, events: Sequence[Event]) -> list[str]:
     return [f"they are apart from the common moment {short_time(at)} on{when}"]
 
 
-def spacing(comparison: Comparison) -> float | None:
+def _spacing(comparison: Comparison) -> float | None:
     """How far apart common moments are [s], if that is more than a timestep of both."""
     apart = comparison.until / max(1, comparison.moments - 1)
     steps = comparison.one.timestep, comparison.two.timestep
     return apart if apart > 1.5 * max(steps) else None
+
+
+def short_labels(comparison: Comparison) -> tuple[str, str]:
+    """What the sides are called for short: their engines, or which of two of one engine."""
+    one, two = comparison.one.backend, comparison.two.backend
+    return (f"{one} (first)", f"{two} (second)") if one == two else (one, two)
+
+
+def long_labels(comparison: Comparison) -> tuple[str, str]:
+    """What the sides are called: engine and version, and which of two that are alike."""
+    one, two = comparison.one.label, comparison.two.label
+    return (f"{one} (first)", f"{two} (second)") if one == two else (one, two)
 
 
 def window(comparison: Comparison) -> str:
@@ -220,15 +212,15 @@ def touch_at(comparison: Comparison, events: Sequence[Event]) -> list[Event]:
 
 def in_words(
     comparison: Comparison, events: Sequence[Event], attribution: Attribution | None = None
-) -> list[str]:
-    """What a reader should know before the figures, a paragraph each."""
+) -> list[Block]:
+    """What a reader should know before the figures."""
     one, two = comparison.one, comparison.two
     counts = {
         verdict: sum(found.verdict == verdict for found in comparison.agreements)
         for verdict in ("agrees", "settles", "differs")
     }
     total = len(comparison.agreements)
-    found: list[str] = []
+    found: list[Block] = []
     if comparison.agrees:
         worst = comparison.worst
         text = f"All {total} quantities stay within tolerance at all {comparison.moments} moments."
@@ -237,7 +229,7 @@ def in_words(
                 f" Nearest to its tolerance comes {name_of(worst.name)}: "
                 f"{quantity(worst.max, worst.unit)} of {quantity(worst.tolerance, worst.unit)}."
             )
-        found.append(text)
+        found.append(Text(text))
     else:
         still = counts["differs"]
         text = (
@@ -259,80 +251,17 @@ def in_words(
                 f"{quantity(far.max, far.unit)} of {quantity(far.tolerance, far.unit)}, at "
                 f"{short_time(far.at)}."
             )
-        found.append(text)
+        found.append(Text(text))
         touch = touch_at(comparison, events)
         if touch:
             labels = one.label, two.label
             each = [f"at {short_time(e.time)} on {labels[e.side or 0]}" for e in touch]
             missing = [labels[k] for k in (0, 1) if k not in [e.side for e in touch]]
             each += [f"never on {label}" for label in missing]
-            found.append(f"The first touch of {touch[0].what} is {' and '.join(each)}.")
-    coarse = coarsely(comparison)
-    return [*found, coarse] if coarse else found
-
-
-def coarsely(comparison: Comparison) -> str:
-    """That figures are of moments which are farther apart than the timesteps; "" if not."""
-    apart = spacing(comparison)
-    if apart is None:
-        return ""
-    steps = " and ".join(
-        significant(1000 * step, 3) for step in (comparison.one.timestep, comparison.two.timestep)
-    )
-    return (
-        f"The sides step every {steps} ms and meet every {milliseconds(apart, 3)}. Figures are of "
-        "these common moments alone: times are no finer, and a peak between two of them is not "
-        "seen, so a largest difference may be larger."
-    )
+            text = f"The first touch of {touch[0].what} is {' and '.join(each)}."
+            found.append(Section("", "", [Text(text)], detail=True))
+    return found
 
 
 def _s(count: int, verb: str) -> str:
     return verb + ("s" if count == 1 else "")
-
-
-def _causes(attribution: Attribution | None) -> tuple[str, ...]:
-    """What takes the largest difference away, of the ladder; what is a proof comes first."""
-    if attribution is None or not attribution.alone:
-        return ()
-    counted = [trial for trial in attribution.ladder if trial.explains is not None]
-    if max((trial.explains or 0.0 for trial in counted), default=0.0) < _SOME:
-        return ("None of the factors that were tried explains a tenth of it.",)
-    worth = [trial for trial in counted if (trial.explains or 0.0) >= _WORTH]
-    worth.sort(key=lambda trial: -(trial.explains or 0.0))
-    found = []
-    touch = attribution.touch
-    contact = next((t for t in worth if t.factor == "contact" and t.way == "off"), None)
-    if contact is not None and touch is not None and touch.before < _PROOF * attribution.gap:
-        what = touch.what.split("; ", maxsplit=1)[0]
-        found.append(
-            f"Until the first touch, {what} at {short_time(touch.time)}, "
-            f"{_all(attribution)} {amount(attribution, touch.before)} apart."
-        )
-    same = [trial for trial in worth if not moves(trial)]
-    other = [trial for trial in worth if moves(trial)]
-    listed = [f"{title(t.factor)} {percent(t.explains)}" for t in same]
-    if same:
-        found.append(f"Of that, made the same one on top of the other: {', '.join(listed)}.")
-    if other:
-        listed = [f"{title(t.factor)} takes {percent(t.explains)} of it away*" for t in other]
-        found.append(
-            f"{'Then, left' if same else 'Left'} out on both sides, {', '.join(listed)}. "
-            f"* This moves {attribution.names[0]} itself: a hint, not a proof."
-        )
-    return tuple(found)
-
-
-def _all(attribution: Attribution) -> str:
-    if attribution.quantity in ("joints", "slides"):
-        return f"the {attribution.quantity} are"
-    return f"the {attribution.quantity} is"
-
-
-def moves(trial: FactorTrial) -> bool:
-    """Whether it moves the first side itself, so that the gap is of another motion."""
-    return bool(trial.moved and trial.worst is not None and trial.way != "none")
-
-
-def title(factor: str) -> str:
-    """A factor in words."""
-    return FACTORS[factor].title if factor in FACTORS else factor

@@ -1,0 +1,80 @@
+"""What made two runs, and what of the model is emulated."""
+
+from __future__ import annotations
+
+from ..compare import Comparison
+from ..comparison.text import listed, milliseconds, numbers
+from ..page import Block, Section, Table, TableCell, Text
+from ..traces import Header
+
+# Of the promises that a backend may emulate, those that move the arm, in plain words.
+PHYSICS = {
+    "position servo": "servos with the gains of the model",
+    "armature": "armature",
+    "joint damping": "damping",
+    "dry friction": "dry friction",
+    "joint limits": "joint limits",
+}
+
+
+def emulated(comparison: Comparison) -> list[Block]:
+    """What of the model a backend keeps instead of its engine."""
+    blocks: list[Block] = []
+    labels = set()
+    for side in (comparison.one, comparison.two):
+        kept = side.provenance.emulated
+        if not kept or side.defaults != "model" or side.label in labels:
+            continue
+        labels.add(side.label)
+        moving = [PHYSICS[name] for name in kept if name in PHYSICS]
+        rest = [name for name in kept if name not in PHYSICS]
+        if moving:
+            blocks.append(
+                Text(
+                    f"Computed around {side.label}, which lacks what the model asks for: "
+                    f"{listed(moving)}. The engine as its own users meet it: --defaults engine."
+                )
+            )
+        if rest:
+            told = f"What else is kept around {side.label}"
+            text = "Promises of this library, and conventions of its states and forces: "
+            text += f"{'; '.join(rest)}."
+            blocks.append(Section("", told, [Text(text)], folded=True, detail=True))
+    return blocks
+
+
+def provenance(headers: tuple[Header, Header], comparison: Comparison) -> Table:
+    """What made both sides."""
+    rows: list[tuple[str, ...]] = []
+
+    def row(name: str, *values: str) -> None:
+        if any(values):
+            rows.append((name, *values))
+
+    a, b = (header.provenance for header in headers)
+    row(
+        "ran as", *("recorded, opened here" if h.recorded else "run for this page" for h in headers)
+    )
+    for engine in dict.fromkeys([*a.versions, *b.versions]):
+        row(engine, a.versions.get(engine, "–"), b.versions.get(engine, "–"))
+    row("model", a.model_file, b.model_file)
+    row("its SHA-256", *(TableCell(p.model_sha256, code=True) for p in (a, b)))
+    row("defaults", *(header.defaults for header in headers))
+    row("options", *(_options(header) for header in headers))
+    row("starts in", *(h.keyframe or "the default state" for h in headers))
+    row("timestep", *(milliseconds(h.timestep) + _substeps(h) for h in headers))
+    row("gravity", *(numbers(h.gravity) + " m/s²" for h in headers))
+    row("rows", f"{comparison.one.rows}", f"{comparison.two.rows}")
+    row("seed", *("none drawn" if p.seed is None else f"{p.seed}" for p in (a, b)))
+    row("energies by", *(header.energy_by or "–" for header in headers))
+    row("made again by", *(TableCell(h.command, code=True) if h.command else "–" for h in headers))
+    labels = comparison.one.label, comparison.two.label
+    return Table(("", *labels), rows, "What made the two runs", words=frozenset({0, 1, 2}))
+
+
+def _options(header: Header) -> str:
+    return ", ".join(f"{name} {value}" for name, value in header.options.items()) or "none"
+
+
+def _substeps(header: Header) -> str:
+    return f" in {header.substeps} substeps" if header.substeps > 1 else ""
