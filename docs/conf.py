@@ -1,6 +1,7 @@
 """The documentation: pages by hand, and the path's stations made from runs."""
 
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -15,7 +16,12 @@ project = "statemachine"
 author = "statemachine contributors"
 copyright = author
 release = version = statemachine.__version__
-extensions = ["myst_parser"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+default_role = "code"
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
 myst_enable_extensions = ["colon_fence"]
 html_theme = "furo"
 html_title = f"statemachine {version}"
@@ -51,7 +57,24 @@ def _link(_app, _name: str, source: list[str]) -> None:
         source[0] = source[0].replace(f"]({path})", f"](reference/{name}.md)")
 
 
+def _attributes(_app, _what, _name, _thing, _options, lines: list[str]) -> None:
+    """The attributes of a class as a list, in which two names may share a line."""
+    inside = False
+    for k, line in enumerate(lines):
+        if inside and line and not line.startswith("    "):
+            inside = False
+        if inside and (entry := re.match(r" {4}(\w+(?:, \w+)*): (.*)", line)):
+            names = ", ".join(f"``{name}``" for name in entry[1].split(", "))
+            lines[k] = f"* {names}: {entry[2]}"
+        elif inside and line:
+            lines[k] = f"  {line.lstrip()}"
+        if line == "Attributes:":
+            inside, lines[k] = True, "**Attributes**\n"
+    lines[:] = [part for line in lines for part in line.split("\n")]
+
+
 def setup(app) -> None:
     """Make the generated pages before the others are read."""
+    app.connect("autodoc-process-docstring", _attributes, priority=400)  # before napoleon
     app.connect("builder-inited", _make_pages)
     app.connect("source-read", _link)

@@ -28,7 +28,7 @@ from statemachine.errors import StateMachineError
 from statemachine.lessons import LESSONS, STATIONS, module
 from statemachine.lessons.in_turns import Ratio
 from statemachine.lessons.records import Session
-from statemachine.lessons.session import Play, Taken, Watch, load_line, page_of_lesson, take
+from statemachine.lessons.session import CodeRun, CodeWatch, Taken, load_line, page_of_lesson, take
 from statemachine.page import Code, Heading, Page, Printed, Question, Table, Text, Verdict
 from statemachine.report import progress as bar
 from statemachine.report import quiz
@@ -102,7 +102,7 @@ def test_what_is_shown_is_what_a_student_would_see(name: str, tmp_path: Path) ->
 
 def test_an_error_in_the_code_ends_the_lesson() -> None:
     code = "import statemachine as sm\nprint(1)\nsm.step(1, 2)\nprint(2)\n"
-    with Play(code, sm.load("so101")) as play, pytest.raises(TypeError):
+    with CodeRun(code, sm.load("so101")) as play, pytest.raises(TypeError):
         play()
     assert play.printed == "1\n"
 
@@ -114,7 +114,7 @@ def test_a_lesson_sees_the_lines_of_its_code_and_each_step(backend: str) -> None
         "data.ctrl[1] = 0.1\nsm.step(model, data, 3)\nprint(data.time)\n"
     )
 
-    class Seen(Watch):
+    class Seen(CodeWatch):
         def __init__(self) -> None:
             self.lines: list[str] = []
             self.times: list[float] = []
@@ -126,7 +126,7 @@ def test_a_lesson_sees_the_lines_of_its_code_and_each_step(backend: str) -> None
             self.lines.append(source)
 
     seen = Seen()
-    with Play(code, model) as watched, Play(code, model) as alone:
+    with CodeRun(code, model) as watched, CodeRun(code, model) as alone:
         watched(seen)
         alone()
         assert seen.lines == code.splitlines()
@@ -144,13 +144,13 @@ def test_the_run_of_a_lesson_is_the_one_that_is_seen(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     played: list[str] = []
-    play = Play.__call__
+    play = CodeRun.__call__
 
-    def once(self: Play, watch: Watch | None = None) -> Mapping[str, Any]:
+    def once(self: CodeRun, watch: CodeWatch | None = None) -> Mapping[str, Any]:
         played.append(self._code)
         return play(self, watch)
 
-    monkeypatch.setattr(Play, "__call__", once)
+    monkeypatch.setattr(CodeRun, "__call__", once)
     _, taken = _take(name, "mujoco")
     assert played.count(taken.code) == 1
 

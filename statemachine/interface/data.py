@@ -42,17 +42,10 @@ if TYPE_CHECKING:
 class Data(ABC):
     """Everything that changes: the state, the command, and what follows from them.
 
-    Inputs, writable in place, the same arrays for the whole life of the Data
-    (`data.ctrl = x` copies in):
-        qpos: (nq,) positions [rad or m]; quaternions wxyz.
-        qvel: (nv,) velocities [rad/s or m/s]; of a free joint, linear in world axes,
-            then angular in body axes.
-        ctrl: (nu,) commands [unit of the actuator]. A step clamps each to its range,
-            an infinite one too, and leaves the array as it is; `forward` and `get_state`
-            refuse what is not finite.
-        time: simulated time [s].
-    An assignment is checked before anything changes. NumPy's in-place operators
-    (`data.ctrl *= x`) write first: what they leave is checked then, and by the verbs.
+    The inputs `qpos`, `qvel` and `ctrl` are writable in place, and the same arrays for the whole
+    life of the Data; `data.ctrl = x` copies in. An assignment is checked before anything changes.
+    NumPy's in-place operators (`data.ctrl *= x`) write first: what they leave is checked then,
+    and by the verbs.
 
     All else is derived and read-only. It belongs to the state before the last engine
     step, or to that of the last `forward`; a write to an input changes none of it.
@@ -63,6 +56,15 @@ class Data(ABC):
     threads. A verb or a derived attribute refuses a Data that another thread is using just
     then (BusyDataError). Reading and writing the arrays of the inputs, and all that is
     done to `raw`, is not guarded: there a lock of the caller's has to keep threads apart.
+
+    Attributes:
+        qpos: (nq,) positions [rad or m]; quaternions wxyz.
+        qvel: (nv,) velocities [rad/s or m/s]; of a free joint, linear in world axes,
+            then angular in body axes.
+        ctrl: (nu,) commands [unit of the actuator]. A step clamps each to its range,
+            an infinite one too, and leaves the array as it is; `forward` and `get_state`
+            refuse what is not finite.
+        time: Simulated time [s].
     """
 
     __slots__ = _SLOTS

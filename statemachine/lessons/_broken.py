@@ -16,7 +16,7 @@ from ..page import Table, Text, Traces
 from ..scenarios.robot import body_pairs
 from ..scenarios.runs import Progress
 from ._words import where
-from .session import Watch
+from .session import CodeWatch
 
 BREAKS = ("extra-step", "late-ctrl")
 _STEPS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 300, 600, 1000, 2000, 5000, 10_000, 20_000)
@@ -27,7 +27,7 @@ BROKEN = {
 }
 
 
-class Paths(Watch):
+class Paths(CodeWatch):
     """Where the two runs go, step by step, and what touches in the first.
 
     Attributes:

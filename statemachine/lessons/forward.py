@@ -28,7 +28,7 @@ from ._stages import (
 )
 from ._words import differences, emulation, page_of, sentence, typed, where
 from .records import Session
-from .session import Play, Watch
+from .session import CodeRun, CodeWatch
 
 _SECONDS = 2.0  # under a command, long enough to touch something
 _INSIDE = 1e-3  # metres; less is how engines press things together
@@ -97,7 +97,7 @@ class Forward:
     provenance: Provenance
 
 
-def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Forward:
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Forward:
     """Read the fingertip at each print; then what else was asked for."""
     model, joint, value = play.model, options["joint"], options["value"]
     place, _ = scalar_joint(model, joint)
@@ -137,7 +137,7 @@ def _steps(model: Model, options: Mapping[str, Any]) -> int:
     return steps_in(model, seconds)
 
 
-class _Readings(Watch):
+class _Readings(CodeWatch):
     """The fingertip and the time at each print, and, if wanted, every array."""
 
     def __init__(self, tip: int, arrays: bool) -> None:

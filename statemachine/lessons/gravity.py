@@ -22,7 +22,7 @@ from ..scenarios.runs import Progress, part_of, steps_in
 from ._fall import Droop, Falling, Gravity, longer, longer_apart, milestones
 from ._words import differences, emulation, page_of, spans, typed, where
 from .records import Session
-from .session import Play, Watch
+from .session import CodeRun, CodeWatch
 
 _PARTS = (
     ("gravity (−bias)", "bias"),
@@ -61,7 +61,7 @@ for each in (model, limp):
 """
 
 
-def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Gravity:
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Gravity:
     """Watch both runs; then the servos off for longer, with and without anything to touch."""
     model, joint, seconds = play.model, options["joint"], options["seconds"]
     limp = model.replace(**SCENARIOS["gravity"].options)
@@ -94,7 +94,7 @@ def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Gravity:
     )
 
 
-class _Both(Watch):
+class _Both(CodeWatch):
     """The joint in each Data, step by step, and what touches."""
 
     def __init__(self, joint: str, seconds: float, progress: Progress) -> None:

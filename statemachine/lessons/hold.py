@@ -19,7 +19,7 @@ from ..scenarios.robot import command, is_slide, moved_by_actuators, scalar_join
 from ..scenarios.runs import Progress, steps_in
 from ._words import differences, page_of, spans, typed, where
 from .records import Session
-from .session import Play, Watch
+from .session import CodeRun, CodeWatch
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
 _PRINTED = (0.1, 0.2, 0.3, 0.4)  # s; and at the end
@@ -93,7 +93,7 @@ class Hold:
         return np.abs(self.qpos - self.goal).max(axis=1)
 
 
-def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Hold:
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Hold:
     """Watch the way to the command; then the same with nothing to touch."""
     model = play.model
     names = [model.joint_names[i] if i >= 0 else "" for i in model.actuator_jntid]
@@ -124,7 +124,7 @@ def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Hold:
     )
 
 
-class _Way(Watch):
+class _Way(CodeWatch):
     """Where the joints are after each step, and what the robot touched."""
 
     def __init__(self, model: Model, places: Ints, total: int, progress: Progress) -> None:

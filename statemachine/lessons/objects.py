@@ -20,7 +20,7 @@ from ..scenarios.provenance import Provenance, provenance
 from ..scenarios.runs import Progress
 from ._words import WORDS, differences, page_of, sentence, typed, where
 from .records import Session
-from .session import Play
+from .session import CodeRun
 
 _CHEAP = 5  # times; a Data that is not cheaper than that is no bargain
 _TIMES = 5  # repetitions; the median counts
@@ -85,7 +85,7 @@ class Objects:
         return self.loading / self.stepping
 
 
-def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Objects:
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Objects:
     """Time the parts, then let several Data of the Model step in turn."""
     model, worlds = play.model, _worlds(options)
     before = _arrays(model)

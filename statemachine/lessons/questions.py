@@ -14,7 +14,7 @@ from ..scenarios.runs import Progress, part_of
 from . import LESSONS, forward, gravity, objects, replay, state, time
 from ._words import page_of, where
 from .records import Session
-from .session import Play, take
+from .session import CodeRun, take
 
 # What is asked, what the run says, and whether that bears out the right choice.
 _Answered = tuple[Question, str, bool]
@@ -47,7 +47,7 @@ def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     return ""
 
 
-def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Answers:
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Answers:
     """Take each of the lessons that answer."""
     play()
     model, answers = play.model, {}

@@ -67,7 +67,7 @@ class Module(Protocol):
         ...
 
     def run(self, play: Any, options: Mapping[str, Any], progress: Any) -> Any:
-        """What is run: `play` (a `session.Play`) is called once, and is the code's own run.
+        """What is run: `play` (a `session.CodeRun`) is called once, and is the code's own run.
 
         What else the lesson compares that run with is run here, too.
         """

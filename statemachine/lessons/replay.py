@@ -23,7 +23,7 @@ from ._broken import BREAKS, BROKEN, Broken, Paths, course, growth, in_short, tr
 from ._ways import of_its_own, through_us, ways_back
 from ._words import differences, page_of, sentence, typed, where
 from .records import Session
-from .session import Play
+from .session import CodeRun
 
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
@@ -131,7 +131,7 @@ class Replay:
     provenance: Provenance
 
 
-def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Replay:
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Replay:
     """Watch both runs; then play the code that breaks them, and theirs with half the timestep."""
     model, nstep, way = play.model, options["steps"], options["break"]
     shares = [part_of(progress, k / 3, 1 / 3) for k in range(3)]
@@ -142,7 +142,7 @@ def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Replay:
     if way is None:
         for each, share in zip(BREAKS, shares[1:], strict=True):
             watch = Paths(nstep, share)
-            with Play(code(model, {**options, "break": each}, "sm.load()"), model) as other:
+            with CodeRun(code(model, {**options, "break": each}, "sm.load()"), model) as other:
                 other(watch)
             broken.append(Broken.of(each, *watch.both()))
         finer = _finer(model, options, first[-1])
@@ -181,7 +181,7 @@ def _finer(model: Model, options: Mapping[str, Any], end: Array) -> Finer | None
     except UnsupportedError:
         return None
     twice = {**options, "steps": 2 * options["steps"]}
-    with Play(code(finer, twice, "sm.load()"), finer) as play:
+    with CodeRun(code(finer, twice, "sm.load()"), finer) as play:
         ends = play()
     apart = float(np.abs(ends["one"] - end).max())
     return Finer(finer.timestep, bool(np.array_equal(ends["one"], ends["two"])), apart)

@@ -18,7 +18,7 @@ from ..scenarios.runs import Progress
 from ._bytes import read_derived, read_stored
 from ._words import differences, emulation, page_of, sentence, typed, where
 from .records import Session
-from .session import Play, Watch
+from .session import CodeRun, CodeWatch
 
 _STEPS = 100  # before the reset, and after it
 _WATCHED = 600  # steps under the keyframe's own ctrl
@@ -100,7 +100,7 @@ class Reset:
     provenance: Provenance
 
 
-def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Reset:
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Reset:
     """Look at the Data after each line; go on with it from each keyframe, and after a reset."""
     model = play.model
     lines = _Lines()
@@ -135,7 +135,7 @@ def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Reset:
     )
 
 
-class _Lines(Watch):
+class _Lines(CodeWatch):
     """The bytes of the Data after each line, stored and derived."""
 
     def __init__(self) -> None:

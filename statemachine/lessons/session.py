@@ -20,7 +20,7 @@ from . import module
 from .records import Lesson, Session
 
 
-class Watch:
+class CodeWatch:
     """What looks on while the code of a lesson runs; a lesson overrides what it needs."""
 
     def before_step(self, model: Model, data: Data) -> None:
@@ -33,10 +33,10 @@ class Watch:
         """A statement of the code is over; `names` are the variables of the code."""
 
 
-class Play:
+class CodeRun:
     """The code of a lesson on one Model, to be run once.
 
-        with Play(code, model) as play:
+        with CodeRun(code, model) as play:
             play(watch)
             play.worlds[0]  # the first Data that the code made; open until the end of the block
 
@@ -54,7 +54,7 @@ class Play:
         self._code = code
         self._out = io.StringIO()
 
-    def __enter__(self) -> Play:
+    def __enter__(self) -> CodeRun:
         return self
 
     def __exit__(self, *exc: object) -> None:
@@ -66,7 +66,7 @@ class Play:
         """What the code printed."""
         return self._out.getvalue()
 
-    def __call__(self, watch: Watch | None = None) -> Mapping[str, Any]:
+    def __call__(self, watch: CodeWatch | None = None) -> Mapping[str, Any]:
         """Run the code; its variables.
 
         Args:
@@ -76,7 +76,7 @@ class Play:
         Raises:
             Exception: Whatever the code raised.
         """
-        watch = watch or Watch()
+        watch = watch or CodeWatch()
         facade = self._facade(watch)
 
         def imported(name: str, *args: Any, **kwargs: Any) -> Any:
@@ -92,7 +92,7 @@ class Play:
                 watch.after_line(source, self.names)
         return self.names
 
-    def _facade(self, watch: Watch) -> ModuleType:
+    def _facade(self, watch: CodeWatch) -> ModuleType:
         """The package as the code imports it: its Model is given, its steps are looked at."""
 
         def make(model: Model) -> Data:
@@ -107,7 +107,7 @@ class Play:
                 watch.after_step(model, data)
 
         looks = type(watch).before_step, type(watch).after_step
-        one_call = looks == (Watch.before_step, Watch.after_step)
+        one_call = looks == (CodeWatch.before_step, CodeWatch.after_step)
         facade = ModuleType(statemachine.__name__)
         vars(facade).update(vars(statemachine))
         vars(facade).update(
@@ -160,7 +160,7 @@ def take(
     values = {option.key: option.default for option in lesson.options} | dict(options or {})
     station = module(lesson.name)
     code = station.code(model, values, load_line(name or lesson.model, backend, menagerie))
-    with Play(code, model) as play:
+    with CodeRun(code, model) as play:
         result = station.run(play, values, progress)
     engine = backend_engine(backend) or backend
     if not calls or engine not in recorded_engines():

@@ -17,7 +17,7 @@ from ..scenarios.runs import Progress
 from ._words import differences, page_of, sentence, typed
 from .in_turns import FEWEST, Ratio, in_turns
 from .records import Session
-from .session import Play
+from .session import CodeRun
 
 _ROUNDS = 20
 _MOST = 20_000  # steps of a round; between rounds the progress moves and Ctrl-C is heard
@@ -95,7 +95,7 @@ class Speed:
         return self.loop.differs_from(self.null)
 
 
-def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Speed:
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Speed:
     """Measure the same steps again with the code's own functions, in rounds, the ways in turns."""
     model, total = play.model, options["steps"]
     names = play()

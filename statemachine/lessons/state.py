@@ -14,7 +14,7 @@ from ..scenarios.provenance import Provenance, provenance
 from ..scenarios.runs import Progress
 from ._words import differences, page_of, typed
 from .records import Session
-from .session import Play
+from .session import CodeRun
 
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
@@ -64,7 +64,7 @@ class Layout:
     provenance: Provenance
 
 
-def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Layout:
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Layout:
     """Read the layout off the Model, and the time off a Data at keyframe 0."""
     play()
     model = play.model

@@ -17,7 +17,7 @@ from ..scenarios.provenance import Provenance, provenance
 from ..scenarios.runs import Progress, steps_in
 from ._words import page_of, typed, where
 from .records import Session
-from .session import Play, Watch
+from .session import CodeRun, CodeWatch
 
 _BEFORE = "A simulation, a pause of the program, and the time on the simulator's own clock."
 _BRIEF, _WATCHED = 0.5, 4.0  # simulated seconds, without and with --realtime
@@ -111,11 +111,11 @@ class Pace:
         return self.simulated / self.paced
 
 
-def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Pace:
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Pace:
     """Watch the loop that is typed, and the other of the two on another Data."""
     model, total = play.model, _steps(play.model, options)
     also = (_free if options["realtime"] else _paced)(total, "sm.load()")
-    with Play(also, model) as second:
+    with CodeRun(also, model) as second:
         free, paced = (second, play) if options["realtime"] else (play, second)
         nap, waiting = _Nap(), _Waiting(paced.names, total, progress)
         play(waiting if play is paced else nap)
@@ -138,7 +138,7 @@ def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Pace:
         )
 
 
-class _Nap(Watch):
+class _Nap(CodeWatch):
     """What the steps of the code that does not wait take, and what happens while it sleeps."""
 
     stepping = length = passed = 0.0
@@ -161,7 +161,7 @@ class _Nap(Watch):
         self._line_over = time.perf_counter()
 
 
-class _Waiting(Watch):
+class _Waiting(CodeWatch):
     """How long the loop that waits does so, and how late its steps are."""
 
     def __init__(self, names: Mapping[str, Any], total: int, progress: Progress) -> None:

@@ -30,7 +30,7 @@ from ..scenarios.runs import Progress
 from ._bytes import read_derived
 from ._words import emulation, page_of, sentence, typed, where
 from .records import Session
-from .session import Play, Watch
+from .session import CodeRun, CodeWatch
 
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
@@ -89,7 +89,7 @@ class Write:
     provenance: Provenance
 
 
-def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Write:
+def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Write:
     """Look who notices the write; then go on with the Data that was written."""
     model, joint = play.model, options["joint"]
     place, dof = scalar_joint(model, joint)
@@ -136,7 +136,7 @@ def run(play: Play, options: Mapping[str, Any], progress: Progress) -> Write:
     )
 
 
-class _Looks(Watch):
+class _Looks(CodeWatch):
     """The derived arrays after each line from the copy on: that, the write, the print."""
 
     def __init__(self) -> None:

@@ -30,6 +30,8 @@ _PACKAGE = str(Path(os.path.abspath(__file__)).parent.parent) + os.sep
 def watch_freshness(model: Model, data: Data, raise_on_stale: bool = False) -> Watch:
     """Watch a Data: count writes and steps, and note or refuse stale reads.
 
+    For example::
+
         with sm.watch_freshness(model, data) as watch:
             controller(model, data)
         print(watch)  # which line read what, how often, of which moment, how far off

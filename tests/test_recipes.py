@@ -1,0 +1,159 @@
+"""The recipes of CONTRIBUTING are followed, in a copy of the package."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from .conftest import ROOT, need_engine
+
+RECIPES = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+# Where a recipe says "in QUANTITIES": how the line of the file begins after which its lines go.
+PLACES = {
+    "statemachine/lessons/__init__.py, in LESSONS": "    for lesson in (",
+    "statemachine/comparison/quantities.py, in QUANTITIES": '        Quantity("force"',
+    "statemachine/comparison/quantities.py, in _SUFFIXES": "_SUFFIXES = (",
+    "statemachine/compare/series.py, in series": "            found += _joint(",
+    "statemachine/compare/tolerances.py, in tolerance_for": "        return Tolerance(given[",
+    "statemachine/conventions/__init__.py, in QUESTIONS": '    "timestep",',
+}
+
+
+def recipe(title: str) -> str:
+    """One section of CONTRIBUTING."""
+    return RECIPES.split(f"## {title}\n")[1].split("\n## ")[0]
+
+
+def code(text: str) -> list[str]:
+    """Its blocks of Python."""
+    found = re.findall(r"^( *)```python\n(.*?)^ *```", text, re.DOTALL | re.MULTILINE)
+    return [textwrap.dedent(block) for _, block in found]
+
+
+class Copy:
+    """A copy of the package, to be changed."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        ignored = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / "statemachine", folder / "statemachine", ignore=ignored)
+        shutil.copy(ROOT / "statemachine_sim.py", folder)
+        (folder / "models").symlink_to(ROOT / "models")
+
+    def follow(self, title: str) -> None:
+        """Put each block of a recipe where its first line says."""
+        for block in code(recipe(title)):
+            head, _, body = block.partition("\n")
+            place = head.removeprefix("# ")
+            path, _, where = place.partition(", ")
+            file = self.folder / path
+            if not where:
+                assert not file.exists()
+                file.write_text(body)
+            elif where == "at the end":
+                file.write_text(f"{file.read_text()}\n\n{body}")
+            else:
+                lines = file.read_text().splitlines()
+                (at,) = [k for k, line in enumerate(lines) if line.startswith(PLACES[place])]
+                body = (
+                    f"{body.rstrip()}," if where.removeprefix("in ").isupper() else body
+                )  # an entry of a table
+                lines[at + 1 : at + 1] = textwrap.indent(body, " " * 4).splitlines()
+                file.write_text("\n".join(lines) + "\n")
+
+    def run(self, *words: str, code: int = 0) -> str:
+        """A command of the copy; what it prints."""
+        done = subprocess.run(
+            [sys.executable, "-m", "statemachine", *words],
+            capture_output=True,
+            text=True,
+            cwd=self.folder,
+            env={**os.environ, "PYTHONPATH": str(self.folder), "PYTHONUTF8": "1"},
+            check=False,
+        )
+        assert done.returncode == code, done.stderr
+        return done.stdout
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Copy:
+    """Of the package as it is."""
+    return Copy(tmp_path)
+
+
+@pytest.mark.slow
+def test_a_lesson(copy: Copy) -> None:
+    copy.follow("Add a lesson")
+    found = json.loads(copy.run("lesson", "coast", "--json"))["mujoco"]
+    assert 0 < found["angle"] < 1
+    assert "A push and nothing else" in copy.run()
+    need_engine("pybullet")
+    text = copy.run("lesson", "coast", "--backend", "all")
+    assert text.count("and stands still") == 2
+    assert "✗" not in text
+
+
+@pytest.mark.slow
+def test_a_quantity(copy: Copy) -> None:
+    need_engine("pybullet")
+    copy.follow("Add a compared quantity")
+    text = copy.run("compare", "hold", "--seconds", "0.5", code=1)
+    assert "elbow_flex, speed" in text
+    assert "joint speeds" in text
+    given = ("--tolerance", "joint-speed=100rad/s", "--json")
+    found = json.loads(copy.run("compare", "hold", "--seconds", "0.5", *given, code=1))
+    verdicts = [
+        a["verdict"] for a in found["comparison"]["agreements"] if a["kind"] == "joint speed"
+    ]
+    assert verdicts == ["agrees"] * 6
+    copy.run("compare", "hold", "--seconds", "0.5", "--html", "hold.html", code=1)
+    assert "elbow_flex speed" in (copy.folder / "hold.html").read_text()
+
+
+@pytest.mark.slow
+def test_a_convention(copy: Copy) -> None:
+    need_engine("pybullet")
+    copy.follow("Add a convention")
+    found = copy.run("conventions", "precision")
+    assert "How precisely does the engine keep a position?" in found
+    assert found.count("double") >= 2
+
+
+@pytest.mark.slow
+def test_a_backend(copy: Copy) -> None:
+    package = copy.folder / "my_package"
+    package.mkdir()
+    text = (ROOT / "tests" / "hidden_world.py").read_text()
+    (package / "backend.py").write_text(text.replace('backend="hidden"', 'backend="mine"'))
+    (package / "__init__.py").write_text("")
+    shutil.copytree(ROOT / "tests" / "made_up", package / "room")
+    (register,) = code(recipe("Add a backend"))
+    done = subprocess.run(
+        [sys.executable, "-c", register],
+        capture_output=True,
+        text=True,
+        cwd=copy.folder,
+        check=True,
+    )
+    results = [line.split()[0] for line in done.stdout.splitlines()]
+    assert set(results) <= {"passed", "skipped"}
+    assert results.count("passed") > 40
+    (toml,) = re.findall(
+        r"^ *```toml\n(.*?)^ *```", recipe("Add a backend"), re.DOTALL | re.MULTILINE
+    )
+    information = copy.folder / "my_package-1.0.dist-info"  # as if it were installed
+    information.mkdir()
+    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: my-package\nVersion: 1.0\n")
+    entries = textwrap.dedent(toml).replace("project.entry-points.", "").replace('"', "")
+    (information / "entry_points.txt").write_text(entries)
+    assert "mine" in copy.run("lesson", "hold", "--backend", "mine")
+    words = ("compare", "hold", "--seconds", "0.3", "--backends", "mujoco", "mine")
+    assert "mine" in copy.run(*words)
