@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +82,23 @@ def test_what_is_a_submission(folder: Path) -> None:
         submissions([folder / "cy"])
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_a_pipe_is_not_waited_for(folder: Path) -> None:
+    os.mkfifo(folder / "ann" / "pipe.py")
+    found = {each.name: each.path for each in submissions([folder])}
+    assert found["ann"] == folder / "ann" / "my_solution.py"
+
+
+def test_a_huge_file_is_refused_unread(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    huge = tmp_path / "huge.py"
+    with huge.open("wb") as file:
+        file.truncate(10**9)
+    monkeypatch.setattr(Path, "read_bytes", lambda _: pytest.fail("it was read"))
+    (entry,) = judge_all([Submission("huge.py", huge)], "mujoco")
+    assert "far too large" in entry.refusal
+    assert entry.sha256 == ""
+
+
 def test_two_folders_may_have_files_of_one_name(tmp_path: Path, judged: list[str]) -> None:
     for name in ("monday", "tuesday"):
         (tmp_path / name).mkdir()
@@ -134,6 +152,17 @@ def test_the_table_is_safe_in_a_spreadsheet(tmp_path: Path, judged: list[str]) -
     (row,) = csv.DictReader(io.StringIO(as_csv(entries)))
     assert row["file"] == f"'{evil.name}"
     assert row["remarks"] == "it is refused"
+
+
+def test_a_table_that_a_spreadsheet_saved_is_resumed(
+    folder: Path, judged: list[str], tmp_path: Path
+) -> None:
+    table = tmp_path / "grades.csv"
+    judge_all(submissions([folder / "ann"]), "mujoco", table=table)
+    table.write_bytes(b"\xef\xbb\xbf" + table.read_bytes().replace(b"\n", b"\r\n"))
+    judged.clear()
+    judge_all(submissions([folder / "ann"]), "mujoco", table=table)
+    assert judged == []
 
 
 def test_jobs_must_be_some(folder: Path) -> None:

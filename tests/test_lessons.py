@@ -365,6 +365,26 @@ def test_what_keyframe_0_of_the_public_scene_is(cli: Cli, menagerie: Path) -> No
     assert "is mistaken" in said
 
 
+_SLIDE = """<mujoco><option timestep="0.001"/><worldbody><body><joint name="s" type="slide"/>
+    <geom size=".1"/></body></worldbody><keyframe><key time="2"/></keyframe></mujoco>"""
+
+
+def test_a_slide_is_printed_in_metres_and_a_reset_tells_its_own_time(tmp_path: Path) -> None:
+    file = tmp_path / "slide.xml"
+    file.write_text(_SLIDE)
+    model = sm.load(file)
+    options = {"joint": "s", "seconds": 0.5, "longer": 0}
+    taken = take(LESSONS["gravity"], model, "mujoco", options, str(file))
+    assert float(taken.printed.split()[0]) == round(taken.result.servos_on.position[-1], 4)
+    reset = {"mujoco": take(LESSONS["reset"], model, "mujoco", {}, str(file))}
+    page = page_of_lesson(LESSONS["reset"], reset)
+    assert any(isinstance(b, Text) and "0.1 s is simulated" in b.text for b in page.blocks)
+    (question,) = (block for block in page.blocks if isinstance(block, Question))
+    assert question.choices[1] == "0.1 s: as before"
+    both = page_of_lesson(LESSONS["reset"], {**reset, "other": reset["mujoco"]})
+    assert not any(isinstance(b, Table) and not b.rows for b in both.blocks)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "body",
@@ -707,9 +727,11 @@ def test_two_worst_joints_are_named() -> None:
         (("--from", "9", "hold"), "statemachine lesson --from time, or statemachine lesson hold"),
         (("--from", "hold", "questions"), "statemachine lesson questions"),
         (("time", "--seconds", "3"), "--seconds goes with --realtime"),
+        (("hold", "--target=nan,0,0,0,0,0"), "target[0] = nan is not a finite number"),
+        (("replay", "--ctrl=0,inf,0,0,0,0"), "ctrl[1] = inf is not a finite number"),
     ],
 )
-def test_an_option_that_would_be_ignored_is_refused(
+def test_an_option_that_would_be_ignored_or_is_none_is_refused(
     cli: Cli, words: tuple[str, ...], said: str
 ) -> None:
     done = cli("lesson", *words)

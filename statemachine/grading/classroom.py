@@ -120,6 +120,8 @@ def _in_entry(entry: Path) -> list[Submission]:
 
 def _has_a_function(file: Path) -> bool:
     try:
+        if not file.is_file():  # a pipe would wait for somebody to write
+            return False
         with file.open("rb") as content:
             start = content.read(_LARGEST)
     except OSError:
@@ -211,7 +213,9 @@ def _in_order(found: Sequence[Submission], entries: Mapping[str, ClassEntry]) ->
 
 def _digest(path: Path | None) -> str:
     try:
-        return "" if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
+        if path is None or path.stat().st_size > _LARGEST:  # which is refused
+            return ""
+        return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError:
         return ""
 
@@ -287,7 +291,7 @@ def _read(table: Path) -> dict[tuple[str, str], ClassEntry]:
         BadInputError: It is no such table, so that nothing of it is overwritten.
     """
     try:
-        with table.open(newline="", encoding="utf-8") as text:
+        with table.open(newline="", encoding="utf-8-sig") as text:  # as spreadsheets save it
             rows = list(csv.reader(text))
     except (OSError, UnicodeError, csv.Error) as error:
         raise BadInputError(f"{table.name} cannot be read: {error}") from None

@@ -230,7 +230,8 @@ def _python_file(path: Path) -> Path:
     if path.suffix != ".py":
         raise BadInputError(f"{path.name} is no Python file: its name does not end in .py")
     try:
-        content = path.read_bytes()
+        with path.open("rb") as file:
+            content = file.read(_LARGEST + 1)
     except OSError as error:
         raise BadInputError(f"{path.name} cannot be read: {error.strerror}") from None
     if len(content) > _LARGEST or b"\0" in content:

@@ -79,7 +79,7 @@ def differences(
         results: By backend.
         rows: What is compared, and the words for it from the first's result and another's.
     """
-    if len(results) < 2:
+    if len(results) < 2 or not rows:
         return []
     (name, first), *others = results.items()
     return [

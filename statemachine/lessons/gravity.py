@@ -45,9 +45,11 @@ def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     steps_in(model, options["seconds"])  # and this
     off = ", ".join(f"{name}={value}" for name, value in SCENARIOS["gravity"].options.items())
     loop, nstep = spans(model, milestones(options["seconds"]), options["seconds"])
+    at, numpy = "np.degrees(data.qpos[slot]).round(3)", "import numpy as np\n"
+    if is_slide(model, options["joint"]):  # metres
+        at, numpy = "data.qpos[slot].round(4)", ""
     return f"""\
-import numpy as np
-import statemachine as sm
+{numpy}import statemachine as sm
 
 model = {load}
 limp = model.replace({off})  # another Model: servos off
@@ -56,7 +58,7 @@ for each in (model, limp):
     data = sm.make_data(each)
     {loop}
         sm.step(each, data, {nstep})
-        print(np.degrees(data.qpos[slot]).round(3), end="  ")
+        print({at}, end="  ")
     print()
 """
 

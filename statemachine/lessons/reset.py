@@ -99,6 +99,11 @@ class Reset:
     scenes: tuple[KeyframeScene, ...]
     provenance: Provenance
 
+    @property
+    def simulated(self) -> float:
+        """Time that was simulated before the reset [s]."""
+        return self.steps * self.provenance.timestep
+
 
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Reset:
     """Look at the Data after each line; go on with it from each keyframe, and after a reset."""
@@ -201,8 +206,8 @@ def page(results: Mapping[str, Reset], session: Session) -> Page:
     first = next(iter(results.values()))
     blocks: list[Any] = [
         Text(
-            "Velocity and command are changed and half a second is simulated; then all is taken "
-            "back, and a state is taken from the file."
+            f"Velocity and command are changed and {first.simulated:g} s is simulated; then all is "
+            "taken back, and a state is taken from the file."
         ),
         *typed(session, _question(first)),
         Text(
@@ -247,7 +252,11 @@ def _question(first: Reset) -> Question | None:
         return None
     return Question(
         f"what is data.time after the reset to keyframe 0 ({frame.name!r})?",
-        ("0 s: a reset begins anew", "0.5 s: as before", f"{frame.time:g} s: what the file says"),
+        (
+            "0 s: a reset begins anew",
+            f"{first.simulated:g} s: as before",
+            f"{frame.time:g} s: what the file says",
+        ),
         2 if "time" in frame.exact else 0,
         "Time is a number of the state, and a keyframe has one of its own.",
     )

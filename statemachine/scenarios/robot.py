@@ -10,6 +10,7 @@ import numpy as np
 from ..comparison import ContactNames
 from ..errors import BadInputError
 from ..interface import Array, Contacts, JointType, Model
+from ..interface.checks import check_entries
 
 
 def is_slide(model: Model, joint: str) -> bool:
@@ -26,12 +27,13 @@ def scalar_joint(model: Model, name: str) -> tuple[int, int]:
 
 
 def command(model: Model, values: Iterable[float], name: str = "ctrl") -> Array:
-    """A full ctrl (nu,) from values; the error says how many there should be."""
+    """A full ctrl (nu,) from values; the error says how many there should be, or which is none."""
     array = np.array(list(values), dtype=np.float64)
     if array.shape != (model.nu,):
         raise BadInputError(
             f"{name} wants {model.nu} numbers, one for each actuator; got {array.size}"
         )
+    check_entries(array, name)
     return array
 
 
