@@ -141,7 +141,7 @@ def _cell(place: int, text: str, block: Table, signed: frozenset[int]) -> Html:
 
 def _content(text: str, signed: bool) -> object:
     if not isinstance(text, TableCell):
-        return kept(text)
+        return text
     if text.at is not None:  # the slider goes there when it is pressed
         return tag("button", str(text), type="button", class_="go", data_t=f"{text.at:.6f}")
     if text.verdict:
