@@ -65,13 +65,14 @@ def with_nan(array: Any, row: int) -> Any:
 def test_what_is_no_number_never_agrees(
     column: str, quantity: str, box: Trace, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    found = compare(box, changed(box, None, **{column: with_nan(box[column], 20)}))
+    other = changed(box, None, **{column: with_nan(box[column], 20)})
+    found = compare(box, other)
     assert not found.agrees
     assert named(found)[quantity].verdict == "differs"
     assert found.worst is not None
     assert found.worst.name == quantity
     assert any(note.startswith(f"{quantity}: no number at 1 of") for note in found.notes)
-    terminal.show(report.page(found))
+    terminal.show(report.page(found, box, other))
     assert "nan" not in capsys.readouterr().out
 
 
@@ -94,11 +95,12 @@ def test_a_rotation_that_is_none_differs(box: Trace) -> None:
 
 
 def test_who_ended_early_does_not_agree(box: Trace) -> None:
-    found = compare(box, cut(box, 5, ended="it diverged"))
+    other = cut(box, 5, ended="it diverged")
+    found = compare(box, other)
     assert {each.verdict for each in found.agreements} == {"agrees"}
     assert found.ended
     assert not found.agrees
-    page = report.page(found)
+    page = report.page(found, box, other)
     assert not page.holds
     assert any("0.02 s is not compared" in note for note in found.notes)
 
@@ -194,7 +196,7 @@ def test_a_header_is_refused_or_can_be_shown(box: Trace, tmp_path: Path) -> None
             except TraceError:
                 refused += 1
                 continue
-            terminal.show(report.page(compare(trace, trace)))
+            terminal.show(report.page(compare(trace, trace), trace, trace))
             trace.touches()
     assert refused > len(places) * len(_VALUES) / 2
 

@@ -120,7 +120,7 @@ def load(
     if defaults == "engine":
         raw.opt.gravity[:] = 0
         raw.opt.timestep = ENGINE_TIMESTEP
-    about = SimpleNamespace(
+    about: Any = SimpleNamespace(
         backend="pybullet", capabilities=_capabilities(defaults == "engine"), **facts(raw)
     )
     checked = checked_options(about, options)
