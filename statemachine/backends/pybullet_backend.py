@@ -124,8 +124,10 @@ def load(
         backend="pybullet", capabilities=_capabilities(defaults == "engine"), **facts(raw)
     )
     checked = checked_options(about, options)
-    raw, substeps = edited(raw, checked), checked.get("substeps", 1)
-    raw.opt.timestep = step_length(float(raw.opt.timestep), substeps, checked)
+    substeps = checked.get("substeps", 1)
+    if checked:
+        raw = edited(raw, checked)
+        raw.opt.timestep = step_length(float(raw.opt.timestep), substeps, checked)
     plan = Plan(raw)
     check(plan, "pybullet", Path(path))
     model = PybulletModel(plan, Path(path), substeps, defaults)
