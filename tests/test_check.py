@@ -217,7 +217,7 @@ def test_a_signal_leaves_nothing_behind(number: signal.Signals, tmp_path: Path) 
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(here)}
     with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE) as process:
         deadline = time.monotonic() + 60
-        while len(list(here.glob("*/*/1/scratch/begun"))) < len(JUDGES):
+        while len(list(here.glob("*/*/*/1/scratch/begun"))) < len(JUDGES):
             assert time.monotonic() < deadline
             time.sleep(0.05)
         assert len(_processes_in(here)) >= len(JUDGES)

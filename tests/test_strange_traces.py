@@ -5,8 +5,10 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import stat
 import subprocess
 import sys
+import threading
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -23,6 +25,7 @@ from statemachine.report import compare as report
 from statemachine.report import terminal
 from statemachine.scenarios import SCENARIOS
 from statemachine.traces import Trace, model_file, read, record, write
+from statemachine.traces.whole import check_place, replace_file
 
 from .conftest import Cli, need_engine
 
@@ -392,3 +395,26 @@ def test_a_picture_of_what_is_no_number(box: Trace, tmp_path: Path, cli: Cli) ->
     assert "Traceback" not in ran.stderr
     assert (tmp_path / "p.svg").is_file()
     assert (tmp_path / "p.html").is_file()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")
+def test_what_is_no_file_is_written_into_and_stays(tmp_path: Path) -> None:
+    """A rename would put a file in its place; as root, in that of /dev/null."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    got: list[bytes] = []
+    reader = threading.Thread(target=lambda: got.append(pipe.read_bytes()))
+    reader.start()
+    check_place(pipe)
+    replace_file(pipe, lambda out: out.write(b"whole"))
+    reader.join(20)
+    assert got == [b"whole"]
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    assert [each.name for each in tmp_path.iterdir()] == ["pipe"]
+    null = Path(os.devnull)
+    before = null.stat()
+    link = tmp_path / "link"
+    link.symlink_to(null)
+    replace_file(link, lambda out: out.write(b"x"))
+    assert link.is_symlink()
+    assert (null.stat().st_mode, null.stat().st_rdev) == (before.st_mode, before.st_rdev)
