@@ -441,9 +441,10 @@ def test_the_students_file_is_still_to_be_written(cli: Cli) -> None:
 def test_bad_input_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "picture.py").write_bytes(b"\x89PNG\0\0")
     (tmp_path / "notes.txt").write_text("hello")
+    (tmp_path / "empty").mkdir()
     for arguments, word in (
         (("nowhere.py",), "there is no file nowhere.py"),
-        ((str(tmp_path),), "is a folder"),
+        ((str(tmp_path / "empty"),), "no Python files in"),
         ((str(tmp_path / "picture.py"),), "no Python file"),
         ((str(tmp_path / "notes.txt"),), "does not end in .py"),
         ((str(STUDENT.with_name("test_arm.py")),), "did you mean statemachine check --mutants"),
