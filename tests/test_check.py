@@ -217,7 +217,7 @@ def test_a_signal_leaves_nothing_behind(number: signal.Signals, tmp_path: Path) 
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(here)}
     with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE) as process:
         deadline = time.monotonic() + 60
-        while len(list(here.glob("*/*/1/scratch/begun"))) < len(JUDGES):
+        while len(list(here.glob("*/*/*/1/scratch/begun"))) < len(JUDGES):
             assert time.monotonic() < deadline
             time.sleep(0.05)
         assert len(_processes_in(here)) >= len(JUDGES)
@@ -441,9 +441,10 @@ def test_the_students_file_is_still_to_be_written(cli: Cli) -> None:
 def test_bad_input_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "picture.py").write_bytes(b"\x89PNG\0\0")
     (tmp_path / "notes.txt").write_text("hello")
+    (tmp_path / "empty").mkdir()
     for arguments, word in (
         (("nowhere.py",), "there is no file nowhere.py"),
-        ((str(tmp_path),), "is a folder"),
+        ((str(tmp_path / "empty"),), "no Python files in"),
         ((str(tmp_path / "picture.py"),), "no Python file"),
         ((str(tmp_path / "notes.txt"),), "does not end in .py"),
         ((str(STUDENT.with_name("test_arm.py")),), "did you mean statemachine check --mutants"),

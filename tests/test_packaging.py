@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from statemachine import __version__
+
 from .conftest import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -96,6 +98,12 @@ def test_constraints_pin_every_dependency_without_addresses() -> None:
         asked += extra
     names = {re.split(r"[\[><=;\s]", line)[0].lower() for line in asked}
     assert names - {"statemachine-sim"} <= pinned
+
+
+def test_the_citation_names_this_version_and_the_contributors() -> None:
+    text = (ROOT / "CITATION.cff").read_text("utf-8")
+    assert re.findall(r"^version: (.+)$", text, re.MULTILINE) == [__version__]
+    assert re.findall(r"^  - name: (.+)$", text, re.MULTILINE) == ["statemachine contributors"]
 
 
 def test_no_machine_path_and_no_address_is_committed() -> None:

@@ -26,7 +26,18 @@ from statemachine.compare.why import Attribution, Deviation, FactorTrial, FirstT
 from statemachine.comparison.text import quantity
 from statemachine.drawing import drawing_of
 from statemachine.errors import BadInputError
-from statemachine.page import Block, Page, Section, Text, Verdict
+from statemachine.page import (
+    Block,
+    Headline,
+    Items,
+    Page,
+    Section,
+    Table,
+    TableCell,
+    Text,
+    Verdict,
+)
+from statemachine.report import terminal
 from statemachine.report.compare import page as compared
 from statemachine.report.contacts import contact_words
 from statemachine.report.events import events_of
@@ -36,6 +47,7 @@ from statemachine.report.html.between import shown_series
 from statemachine.report.html.charts import difference_chart, spread
 from statemachine.report.html.geometry import bones_of, mesh_of, octahedral
 from statemachine.report.html.timeline import frames_of
+from statemachine.report.markdown import markdown
 from statemachine.report.over_time import chart_of
 from statemachine.scenarios import SCENARIOS
 from statemachine.traces import Trace, record_scenario, shipped, write
@@ -1224,6 +1236,35 @@ def test_the_request_of_the_finding_is_not_needed() -> None:
     text = report(compared(compare(one, two), one, two, said=said))
     assert "no model was given" in text
     assert Parsed.of(text).unclosed == []
+
+
+def test_any_page_can_be_drawn(capsys: pytest.CaptureFixture[str]) -> None:
+    """One without runs has no slider and no script; a terminal leaves its details out."""
+    row = (TableCell("1.5", at=1.5), TableCell("differs", verdict="differs"), "<b>")
+    page = Page(
+        "A title",
+        "An origin",
+        [
+            Text("First."),
+            Section("more", "More", [Table(("at", "is", "b"), [row], "A table")]),
+            Section("deep", "Deep", [Items(["one", "two"], ordered=True)], detail=True),
+        ],
+        Headline("It differs", holds=False),
+    )
+    text = report(page)
+    assert Parsed.of(text).unclosed == []
+    assert "<script></script>" in text
+    for part in ("An origin", "First.", "● ", "&lt;b&gt;", "<li>two</li>", 'data-t="1.500000"'):
+        assert part.replace("● ", "●") in text
+    assert not page.holds
+    terminal.show(page)
+    said = capsys.readouterr().out
+    assert "DIFFERS" in said
+    assert said.rstrip().endswith("✗ It differs.")
+    assert "Deep" not in said
+    written = markdown(page, lambda _: "")
+    assert "## More" in written
+    assert "<details><summary>Deep</summary>" in written
 
 
 class Parsed(HTMLParser):

@@ -5,8 +5,10 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import stat
 import subprocess
 import sys
+import threading
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -23,6 +25,7 @@ from statemachine.report import compare as report
 from statemachine.report import terminal
 from statemachine.scenarios import SCENARIOS
 from statemachine.traces import Trace, model_file, read, record, write
+from statemachine.traces.whole import check_place, replace_file
 
 from .conftest import Cli, need_engine
 
@@ -65,13 +68,14 @@ def with_nan(array: Any, row: int) -> Any:
 def test_what_is_no_number_never_agrees(
     column: str, quantity: str, box: Trace, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    found = compare(box, changed(box, None, **{column: with_nan(box[column], 20)}))
+    other = changed(box, None, **{column: with_nan(box[column], 20)})
+    found = compare(box, other)
     assert not found.agrees
     assert named(found)[quantity].verdict == "differs"
     assert found.worst is not None
     assert found.worst.name == quantity
     assert any(note.startswith(f"{quantity}: no number at 1 of") for note in found.notes)
-    terminal.show(report.page(found))
+    terminal.show(report.page(found, box, other))
     assert "nan" not in capsys.readouterr().out
 
 
@@ -94,11 +98,12 @@ def test_a_rotation_that_is_none_differs(box: Trace) -> None:
 
 
 def test_who_ended_early_does_not_agree(box: Trace) -> None:
-    found = compare(box, cut(box, 5, ended="it diverged"))
+    other = cut(box, 5, ended="it diverged")
+    found = compare(box, other)
     assert {each.verdict for each in found.agreements} == {"agrees"}
     assert found.ended
     assert not found.agrees
-    page = report.page(found)
+    page = report.page(found, box, other)
     assert not page.holds
     assert any("0.02 s is not compared" in note for note in found.notes)
 
@@ -194,7 +199,7 @@ def test_a_header_is_refused_or_can_be_shown(box: Trace, tmp_path: Path) -> None
             except TraceError:
                 refused += 1
                 continue
-            terminal.show(report.page(compare(trace, trace)))
+            terminal.show(report.page(compare(trace, trace), trace, trace))
             trace.touches()
     assert refused > len(places) * len(_VALUES) / 2
 
@@ -390,3 +395,26 @@ def test_a_picture_of_what_is_no_number(box: Trace, tmp_path: Path, cli: Cli) ->
     assert "Traceback" not in ran.stderr
     assert (tmp_path / "p.svg").is_file()
     assert (tmp_path / "p.html").is_file()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")
+def test_what_is_no_file_is_written_into_and_stays(tmp_path: Path) -> None:
+    """A rename would put a file in its place; as root, in that of /dev/null."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    got: list[bytes] = []
+    reader = threading.Thread(target=lambda: got.append(pipe.read_bytes()))
+    reader.start()
+    check_place(pipe)
+    replace_file(pipe, lambda out: out.write(b"whole"))
+    reader.join(20)
+    assert got == [b"whole"]
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    assert [each.name for each in tmp_path.iterdir()] == ["pipe"]
+    null = Path(os.devnull)
+    before = null.stat()
+    link = tmp_path / "link"
+    link.symlink_to(null)
+    replace_file(link, lambda out: out.write(b"x"))
+    assert link.is_symlink()
+    assert (null.stat().st_mode, null.stat().st_rdev) == (before.st_mode, before.st_rdev)

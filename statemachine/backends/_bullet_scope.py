@@ -106,7 +106,7 @@ def ignored(raw: mujoco.MjModel) -> list[str]:
                 f"{int(np.count_nonzero(margins))} geoms (the largest: "
                 f"{1e3 * margins[largest]:.3g} mm, {_name(raw, 'geom', largest)})"
             )
-        belts = np.linalg.norm(raw.geom_surfacevel[:, :3], axis=1) * touching
+        belts = np.sqrt((raw.geom_surfacevel[:, :3] ** 2).sum(axis=1)) * touching
         if belts.any():
             found.append(f"surfacevel has no effect ({_list(raw, 'geom', belts)})")
     return found

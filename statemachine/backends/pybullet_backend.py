@@ -120,12 +120,14 @@ def load(
     if defaults == "engine":
         raw.opt.gravity[:] = 0
         raw.opt.timestep = ENGINE_TIMESTEP
-    about = SimpleNamespace(
+    about: Any = SimpleNamespace(
         backend="pybullet", capabilities=_capabilities(defaults == "engine"), **facts(raw)
     )
     checked = checked_options(about, options)
-    raw, substeps = edited(raw, checked), checked.get("substeps", 1)
-    raw.opt.timestep = step_length(float(raw.opt.timestep), substeps, checked)
+    substeps = checked.get("substeps", 1)
+    if checked:
+        raw = edited(raw, checked)
+        raw.opt.timestep = step_length(float(raw.opt.timestep), substeps, checked)
     plan = Plan(raw)
     check(plan, "pybullet", Path(path))
     model = PybulletModel(plan, Path(path), substeps, defaults)

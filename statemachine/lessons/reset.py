@@ -280,19 +280,18 @@ def _finding(results: Mapping[str, Reset], name: str, number: int, file: str) ->
     scene = results[name].scenes[number]
     if scene.body is None:
         return sentence(results, name, "there is no free body in this scene.")
-    after = f"in {count(scene.nstep, 'step')} under the keyframe's own ctrl"
     moved = f"it {'rises' if scene.rise > 0 else 'sinks'} by {millimetres(abs(scene.rise))}"
-    steps = f"{scene.robot_steps} of {scene.nstep} steps"
+    steps = f"in {scene.robot_steps} of {scene.nstep} steps under the keyframe's own ctrl"
     if scene.held:
         return Verdict(
             f"{where(results, name)}the {scene.body} is held: it touches the robot and nothing "
-            f"else, then and in {steps} under the keyframe's own ctrl; {moved}",
+            f"else, then and {steps}; {moved}",
             True,
         )
     if scene.on_robot == 0 and scene.on_world:
         text = (
             f"the {scene.body} is not held: {count(scene.on_world, 'contact')} with what does not "
-            f"move, none with the robot; {after} the robot touches it in {steps}, and {moved}"
+            f"move, none with the robot; the robot touches it {steps}, and {moved}"
         )
         if number == 0 and file.startswith("robotstudio_so101"):
             text += ". A lesson that calls this a grasp with the box lifted is mistaken"
@@ -301,8 +300,7 @@ def _finding(results: Mapping[str, Reset], name: str, number: int, file: str) ->
         results,
         name,
         f"the {scene.body} has {count(scene.on_robot, 'contact')} with the robot and "
-        f"{scene.on_world} with what does not move; {after} the robot touches it in {steps}, "
-        f"and {moved}.",
+        f"{scene.on_world} with what does not move; the robot touches it {steps}, and {moved}.",
     )
 
 

@@ -225,7 +225,8 @@ def page(results: Mapping[str, Pace], session: Session) -> Page:
         prefix = where(results, name)
         blocks += [
             Verdict(
-                f"{prefix}{result.nap:.2f} s without a call: data.time and qpos are the same",
+                f"{prefix}after {result.nap:.2f} s in which nothing was called, data.time and "
+                "qpos are the same",
                 result.passed == 0 and not result.moved,
             ),
             Verdict(

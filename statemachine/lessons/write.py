@@ -196,7 +196,7 @@ def page(results: Mapping[str, Write], session: Session) -> Page:
         blocks.append(
             Verdict(
                 f"{prefix}qpos, qvel and ctrl are the same arrays after "
-                f"{', '.join(result.calls)}: a name once taken stays good",
+                f"{', '.join(result.calls)}: a name for one of them stays valid",
                 len(result.kept) == 3,
             )
         )
@@ -219,8 +219,8 @@ def page(results: Mapping[str, Write], session: Session) -> Page:
             )
         blocks.append(
             Verdict(
-                f"{prefix}nothing that is derived from qpos noticed: {_changed(result)} changed. "
-                "The next lesson is about that",
+                f"{prefix}the write alone changes nothing that is derived from qpos: "
+                f"{_changed(result)} changed. The next lesson is about that",
                 not result.changed,
             )
         )
@@ -228,9 +228,10 @@ def page(results: Mapping[str, Write], session: Session) -> Page:
             sentence(
                 results,
                 name,
-                f"the next step starts from what you wrote: it leaves {result.joint} at another "
-                f"speed than without the write, by {position(result.felt, result.slide, 1)}/s, and "
-                f"finds {count(result.found, 'contact')} where there would be {result.otherwise}.",
+                f"the next step starts from what you wrote. After it the speed of {result.joint} "
+                f"is off by {position(result.felt, result.slide, 1)}/s from that of a step without "
+                f"the write, and it finds {count(result.found, 'contact')} instead of "
+                f"{result.otherwise}.",
             )
         )
     blocks += emulation(results, "stale after a write")

@@ -192,9 +192,9 @@ def _figures(comparison: Comparison, witness: Witness | None) -> list[Block]:
         ),
         Text(
             f"Compared at {comparison.moments} moments over {comparison.until:g} s. Settled: the "
-            f"mean over {window(comparison)} (of forces: how far apart the means are). From: the "
-            "first moment beyond the tolerance. What is never beyond it agrees, what is settled "
-            "within it settles, the rest differs."
+            f"mean over {window(comparison)} (of forces: how far apart the means are). From: when "
+            "first beyond tolerance. What is never beyond it agrees, what is settled within it "
+            "settles, the rest differs."
         ),
         Table(
             ("quantities", "tolerance", "because"),

@@ -116,6 +116,8 @@ def _section(block: Section, picture: Callable[[Picture], str]) -> str:
     if not parts:
         return ""
     heading = _escaped(block.heading)
+    if not heading:
+        return "\n\n".join(parts)
     if block.folded or block.detail:
         inside = "\n\n".join(parts)
         return f"<details><summary>{heading}</summary>\n\n{inside}\n\n</details>"

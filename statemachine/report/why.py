@@ -130,8 +130,8 @@ def _brought(result: Attribution, trial: FactorTrial) -> str:
 
 def _star(result: Attribution) -> Text:
     text = (
-        f"* {result.names[0]} itself then moves otherwise than it did, so the gap is that of "
-        "another motion; a smaller one there is a hint, not a proof."
+        f"* With this change {result.names[0]} itself moves differently. The gap is that of "
+        "another motion, so a smaller gap is a hint and no proof."
     )
     return Text(text, small=True)
 
@@ -205,7 +205,8 @@ def _alone(result: Attribution, starred: bool, marked: bool) -> Section:
     given = [t.put_back for t in result.alone] + [t.worst for t in result.alone if not t.moved]
     if any(astray(result, gap) for gap in given) and not marked:
         notes.append(_astray(result))
-    notes += [Text(_meaning(result, set_back)), Text(f"The order above. {' '.join(result.order)}")]
+    order = f"How the order was chosen. {' '.join(result.order)}"
+    notes += [Text(_meaning(result, set_back)), Text(order)]
     heading = "Each by itself: what the gap becomes when one thing alone is changed"
     return Section("", heading, [table, *notes], folded=True)
 
@@ -214,8 +215,8 @@ def _meaning(result: Attribution, set_back: bool) -> str:
     """What the figures of one thing alone mean."""
     one, two = result.names
     lines = [
-        "These figures are no shares of an explanation, and need not add up: one setting can hide "
-        "another, and what is left out on both sides makes another motion."
+        "These figures are not shares of the gap and need not add up: one setting can hide "
+        "another, and leaving something out on both sides makes another motion."
     ]
     if set_back:
         lines.append("Put back: the gap when all settings are the same and this one is as it came.")

@@ -118,8 +118,8 @@ def conclusion(result: Attribution) -> list[str]:
     if contact is not None:
         found.append(
             f"Where all settings are the same, {one} and {two} are {amount(result, same)} apart "
-            f"with contacts, {amount(result, contact.worst)} without: what contact explains is "
-            "how each engine makes it."
+            f"with contacts and {amount(result, contact.worst)} without: the engines differ in how "
+            "they compute contact."
         )
         touch = result.touch
         if touch is not None and touch.before < _PROOF * result.gap:
@@ -127,8 +127,8 @@ def conclusion(result: Attribution) -> list[str]:
             named = [FACTORS[name].title for name in acting if name not in _AT_TOUCH]
             what = touch.what.split("; ", maxsplit=1)[0]
             found.append(
-                f"The motion as it comes says the same. Until {what}, at "
-                f"{short_time(touch.time)}, the two are {amount(result, touch.before)} apart, "
+                f"The run itself says the same: before the first contact, {what} at "
+                f"{short_time(touch.time)}, the two are only {amount(result, touch.before)} apart, "
                 f"though {listed(named)} act from the start."
             )
         elif touch is None and not settings:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import glob
 import os
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -30,6 +31,10 @@ def check_place(target: Path) -> None:
     folder = target.parent
     if target.is_dir():
         raise BadInputError(f"{target} is a folder; name a file in it")
+    if _special(target):
+        if not os.access(target, os.W_OK):
+            raise BadInputError(f"{target} cannot be written: it is read-only for you")
+        return
     if not folder.is_dir():
         raise BadInputError(f"{target} cannot be written: there is no folder {folder}")
     if not os.access(folder, os.W_OK | os.X_OK):
@@ -46,15 +51,25 @@ def beside(*targets: Path) -> Iterator[list[str]]:
     companion, and never one with the companion of another.
 
     What a killed process has left of an earlier attempt is removed, where files can be locked:
-    not on Windows.
+    not on Windows. What is no file, as /dev/null, is written into and stays what it is.
     """
     with ExitStack() as stack:
         names = [stack.enter_context(_part_of(target)) for target in targets]
         yield names
         for target in targets[1:]:
-            target.unlink(missing_ok=True)
+            if not _special(target):
+                target.unlink(missing_ok=True)
         for name, target in zip(names, targets, strict=True):
-            os.replace(name, target)
+            if _special(target):
+                with open(name, "rb") as made, open(target, "wb") as out:
+                    shutil.copyfileobj(made, out)
+            else:
+                os.replace(name, target)
+
+
+def _special(target: Path) -> bool:
+    """Whether it is there and no file: a device, a pipe."""
+    return target.exists() and not target.is_file() and not target.is_dir()
 
 
 def replace_file(target: Path, fill: Callable[[BinaryIO], object]) -> None:
@@ -72,6 +87,8 @@ def fill_file(name: str, fill: Callable[[BinaryIO], object]) -> None:
 @contextmanager
 def _part_of(target: Path) -> Iterator[str]:
     """A new file beside a place; gone at the end unless it was renamed."""
+    if _special(target):
+        target = Path(tempfile.gettempdir(), target.name)
     _remove_abandoned(target)
     handle, name = _new_part(target)
     try:

@@ -25,12 +25,12 @@ _MOST, _MOVES = 0.5, 0.1
 _ROUNDING = {"rad": 1e-8, "m": 1e-9}
 
 ORDER = (
-    "First what is set differently: {two} is brought to what {one} has, and {one} moves as "
-    "before. Gravity and the clock come first, then the robot: its damping before the servo "
+    "First the settings that differ: {two} gets those of {one}, and {one} moves as "
+    "before. Gravity and the timestep come first, then the robot: its damping before the servo "
     "law, its armature after it.",
-    "Then what is set alike and is each engine's own doing: it is left out on both, what acts "
-    "now and then first. That makes another motion, so it counts only where it takes away more "
-    "than half of what was left.",
+    "Then what is set alike but computed by each engine in its own way: it is left out on both "
+    "sides, and what acts only at times is left out first. That is another motion, so it counts "
+    "only where it removes more than half of the gap that was left.",
 )
 
 
