@@ -27,15 +27,37 @@ def wheel(folder: Path) -> Path:
 
 def student_kit(built: Path) -> dict[str, bytes]:
     """What a student needs, by name in the zip."""
+    exercises = {name: _template(name) for name in ("step_loop.py", "test_arm.py")}
     start = (HERE / "START.md").read_text(encoding="utf-8").replace("WHEEL", built.name)
     return {
         built.name: built.read_bytes(),
         "README.md": start.encode(),
         "constraints.txt": (ROOT / "constraints.txt").read_bytes(),
         "path.ipynb": (ROOT / "notebooks" / "path.ipynb").read_bytes(),
-        "step_loop.py": (ROOT / "exercises" / "step_loop.py").read_bytes(),
-        "test_arm.py": (ROOT / "exercises" / "test_arm.py").read_bytes(),
+        **{f"exercises/{name}": content for name, content in exercises.items()},
     }
+
+
+def _template(name: str) -> bytes:
+    """A student's file as it is handed out.
+
+    Raises:
+        SystemExit: Somebody has worked in it.
+    """
+    content = (ROOT / "exercises" / name).read_bytes()
+    unwritten = content.count(b"raise NotImplementedError(")
+    if (name == "step_loop.py" and unwritten != 4) or _changed(ROOT / "exercises" / name):
+        raise SystemExit(f"exercises/{name} is not as it is handed out: restore it first")
+    return content
+
+
+def _changed(file: Path) -> bool:
+    """Whether a file differs from the one that is committed; False outside a repository."""
+    command = ["git", "-C", str(ROOT), "diff", "--quiet", "HEAD", "--", str(file)]
+    try:
+        return subprocess.run(command, capture_output=True, check=False).returncode == 1
+    except OSError:
+        return False
 
 
 def autograder(built: Path) -> dict[str, bytes]:

@@ -12,11 +12,18 @@ from typing import Any
 import pytest
 
 from statemachine.errors import BadInputError
-from statemachine.grading import classroom
-from statemachine.grading.classroom import Submission, as_csv, judge_all, submissions
+from statemachine.grading.classroom import (
+    Submission,
+    as_csv,
+    judge_all,
+    not_looked_at,
+    submissions,
+)
 from statemachine.grading.exercise import ExerciseJudge, Grade, Judgement
 from statemachine.grading.judges import JUDGES
+from statemachine.page import Text
 from statemachine.report import gradescope
+from statemachine.report.classroom import page
 
 from .conftest import ROOT, Cli
 
@@ -59,8 +66,7 @@ def judged(monkeypatch: pytest.MonkeyPatch) -> list[str]:
             Judgement(name, written, written and passed, (f"because: of {name}", "and so on"))
             for name in JUDGES
         )
-        digest = classroom._digest(Path(file))
-        return Grade(Path(file).name, digest, self.backend, self.versions, marks)
+        return Grade(Path(file).name, "0", self.backend, self.versions, marks)
 
     monkeypatch.setattr(ExerciseJudge, "judge", judge)
     return seen
@@ -99,6 +105,22 @@ def test_a_huge_file_is_refused_unread(tmp_path: Path, monkeypatch: pytest.Monke
     assert entry.sha256 == ""
 
 
+def test_what_is_not_looked_at_is_told(folder: Path, judged: list[str]) -> None:
+    for name in ("gus.ipynb", "hal.zip", ".hidden"):
+        (folder / name).write_text("")
+    (folder / "IDA.PY").write_text("return 1\n")
+    (folder / "__MACOSX").mkdir()
+    found = submissions([folder])
+    assert "IDA.PY" in [each.name for each in found]
+    assert "__MACOSX" not in [each.name for each in found]
+    ignored = not_looked_at([folder])
+    assert ignored == ["grades.txt", "gus.ipynb", "hal.zip"]
+    texts = [
+        b.text for b in page(judge_all(found, "mujoco"), ignored).blocks if isinstance(b, Text)
+    ]
+    assert "No Python files, and not looked at: grades.txt, gus.ipynb, hal.zip." in texts
+
+
 def test_two_folders_may_have_files_of_one_name(tmp_path: Path, judged: list[str]) -> None:
     for name in ("monday", "tuesday"):
         (tmp_path / name).mkdir()
@@ -122,6 +144,7 @@ def test_a_table_is_resumed(folder: Path, judged: list[str], tmp_path: Path) -> 
     first = judge_all(submissions([folder]), "mujoco", table=table)
     assert sorted(judged) == ["eve.py", "fay.py", "my_solution.py", "step_loop.py"]
     text = table.read_text()
+    assert text.startswith("\ufefffile,right")  # by which a spreadsheet knows UTF-8
     judged.clear()
     again = judge_all(submissions([folder]), "mujoco", table=table)
     assert judged == []
@@ -133,6 +156,18 @@ def test_a_table_is_resumed(folder: Path, judged: list[str], tmp_path: Path) -> 
     assert judged == ["eve.py"]
     judge_all(submissions([folder]), "mujoco", table=table, time_limit=7.0)
     assert len(judged) == 5
+    # A helper that a student's file may import is a part of what was judged.
+    (folder / "ann" / "helper.py").write_text("X = 2\n")
+    judged.clear()
+    judge_all(submissions([folder]), "mujoco", table=table, time_limit=7.0)
+    assert judged == ["my_solution.py"]
+    # A spreadsheet may have written it with semicolons.
+    rewritten = io.StringIO()
+    csv.writer(rewritten, delimiter=";").writerows(csv.reader(io.StringIO(table.read_text())))
+    table.write_text(rewritten.getvalue())
+    judged.clear()
+    judge_all(submissions([folder]), "mujoco", table=table, time_limit=7.0)
+    assert judged == []
     # A table that ended in the middle of a file is one with fewer rows.
     rows = text.splitlines(keepends=True)
     table.write_text("".join(rows[:2]))
@@ -140,7 +175,7 @@ def test_a_table_is_resumed(folder: Path, judged: list[str], tmp_path: Path) -> 
     assert judge_all(submissions([folder]), "mujoco", table=table)
     assert judged
     table.write_text("name,mark\nann,1\n")
-    with pytest.raises(BadInputError, match="no table of grades"):
+    with pytest.raises(BadInputError, match="not the columns of a table of grades"):
         judge_all(submissions([folder]), "mujoco", table=table)
     assert table.read_text() == "name,mark\nann,1\n"
 
@@ -159,10 +194,13 @@ def test_a_table_that_a_spreadsheet_saved_is_resumed(
 ) -> None:
     table = tmp_path / "grades.csv"
     judge_all(submissions([folder / "ann"]), "mujoco", table=table)
-    table.write_bytes(b"\xef\xbb\xbf" + table.read_bytes().replace(b"\n", b"\r\n"))
-    judged.clear()
-    judge_all(submissions([folder / "ann"]), "mujoco", table=table)
-    assert judged == []
+    saved = table.read_bytes().replace(b"\n", b"\r\n")
+    assert saved.startswith(b"\xef\xbb\xbf")
+    for content in (saved, saved[3:]):  # with the mark of UTF-8 and without
+        table.write_bytes(content)
+        judged.clear()
+        judge_all(submissions([folder / "ann"]), "mujoco", table=table)
+        assert judged == []
 
 
 def test_jobs_must_be_some(folder: Path) -> None:
@@ -201,14 +239,17 @@ def test_a_folder_from_the_command_line(cli: Cli, folder: Path, tmp_path: Path) 
     command = ("check", str(folder), "--csv", str(table), "--time-limit", "2")
     done = cli(*command)
     assert done.returncode == 0, done.stderr
-    rows = {row["file"]: row for row in csv.DictReader(table.read_text().splitlines())}
+    rows = {
+        row["file"]: row
+        for row in csv.DictReader(table.read_text(encoding="utf-8-sig").splitlines())
+    }
     assert [rows[name]["right"] for name in rows] == ["4", "0", "0", "4", "0"]
     assert rows["bob"]["demo_gravity"] == "not written"
     assert rows["fay.py"]["same_as"] == "ann"
     text = " ".join(table.read_text().split())
     assert "a loop that does not end?" in text
     assert "invalid syntax" in text
-    assert "2 of 5 files have all functions right." in done.stdout
+    assert "All functions are right in 2 of 5 files." in done.stdout
     again = cli(*command, "--json")
     passed = [sum(f["passed"] for f in e["functions"]) for e in json.loads(again.stdout)]
     assert passed == [4, 0, 0, 4, 0]

@@ -20,7 +20,7 @@ NONE = Question("which?", ("x", "y"), None, "neither")
 
 
 def test_the_first_answer_counts_and_a_session_is_gone_on_with(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "mine.json"
     typed = iter(["", "a", "b", "b"])
@@ -31,7 +31,10 @@ def test_the_first_answer_counts_and_a_session_is_gone_on_with(
     assert json.loads(file.read_text())["of"] == 0
     assert reader.ask(ONE) == 0
     again = RecordedReader(file, "state")
+    capsys.readouterr()
     assert again.ask(ONE) == 1  # now right, but the first counts
+    assert "your first answer counts: 1" in capsys.readouterr().out
+    assert again.summary == "mine.json: 0 of 1 predictions right"
     again.lesson = "reset"
     assert again.ask(NONE) == 1
     record = json.loads(file.read_text())
@@ -68,6 +71,7 @@ def test_a_station_at_a_terminal_is_recorded(tmp_path: Path) -> None:
     typed = [("Your prediction", "c\n")]
     seen = _at_a_terminal("lesson", "state", "--record", str(file), typed=typed)
     assert "as you said" in seen
+    assert "mine.json: 1 of 1 predictions right" in seen
     record = json.loads(file.read_text())
     assert (record["score"], record["of"]) == (1, 1)
     assert record["answers"][0]["predicted"] == "12"

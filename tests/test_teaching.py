@@ -50,7 +50,7 @@ def test_the_students_kit_has_no_solution(built: Path, tmp_path: Path) -> None:
             ]
         )
         whole = b"".join(kit.read(name) for name in kit.namelist())
-        assert kit.read("step_loop.py").count(b"raise NotImplementedError(") == 4
+        assert kit.read("exercises/step_loop.py").count(b"raise NotImplementedError(") == 4
         assert built.name in kit.read("README.md").decode()
     with zipfile.ZipFile(built) as wheel:
         whole += b"".join(wheel.read(name) for name in wheel.namelist())
@@ -100,6 +100,23 @@ def test_the_autograder_grades_a_submission(built: Path, tmp_path: Path) -> None
         results = json.loads((home / "results" / "results.json").read_text())
         assert sum(test["score"] for test in results["tests"]) == score
         assert words in json.dumps(results, ensure_ascii=False)
+
+
+def test_a_kit_is_not_made_of_files_that_were_worked_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "exercises").mkdir()
+    text = (ROOT / "exercises" / "step_loop.py").read_text()
+    solved = text.replace("raise NotImplementedError(", "return (", 1)
+    for content, fine in ((text, True), (solved, False)):
+        (tmp_path / "exercises" / "step_loop.py").write_text(content)
+        monkeypatch.setattr(make_kits, "ROOT", tmp_path)
+        monkeypatch.setattr(make_kits, "_changed", lambda _: False)
+        if fine:
+            assert make_kits._template("step_loop.py") == text.encode()
+        else:
+            with pytest.raises(SystemExit, match="restore it first"):
+                make_kits._template("step_loop.py")
 
 
 def _zip(folder: Path, built: Path) -> Path:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from . import _mutants
-from ._common import SAYS_NO, add_backend, add_json, show
+from ._common import SAYS_NO, add_backend, add_json, complain, show
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -70,7 +70,8 @@ def run(options: argparse.Namespace) -> int:
     several = len(options.files) > 1 or (folder and not options.gradescope)
     if (options.mutants is not None or several) and options.gradescope:
         options.parser.error("--gradescope goes with one FILE, or one FOLDER")
-    if not several and (options.csv or options.jobs is not None):
+    there = all(Path(file).exists() for file in options.files)
+    if not several and there and (options.csv or options.jobs is not None):
         options.parser.error("--csv and --jobs go with several files, or a folder")
     if options.mutants is not None:
         return _mutants.run(options)
@@ -116,14 +117,19 @@ def _class(options: argparse.Namespace) -> int:
     from ..report.progress import progress
 
     found = classroom.submissions(options.files)
-    with progress(f"{len(found)} files") as report:
-        entries = classroom.judge_all(
-            found,
-            options.backend,
-            time_limit=options.time_limit,
-            jobs=options.jobs,
-            table=Path(options.csv) if options.csv else None,
-            progress=report,
-        )
-    show(words.page(entries), entries, options.json)
+    try:
+        with progress(f"{len(found)} files") as report:
+            entries = classroom.judge_all(
+                found,
+                options.backend,
+                time_limit=options.time_limit,
+                jobs=options.jobs,
+                table=Path(options.csv) if options.csv else None,
+                progress=report,
+            )
+    except KeyboardInterrupt:
+        if options.csv:
+            complain(f"stopped; {options.csv} has what was judged. Type the same to go on", 130)
+        raise
+    show(words.page(entries, classroom.not_looked_at(options.files)), entries, options.json)
     return 0 if all(entry.judged for entry in entries) else SAYS_NO

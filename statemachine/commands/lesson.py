@@ -35,7 +35,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         choices=[lesson.name for lesson in STATIONS],
         default=None,
         metavar="STATION",
-        help="of the whole parser: where to begin, if not at the first",
+        help="of the whole path: where to begin, if not at the first",
     )
     parser.add_argument(
         "--stopped",
@@ -159,6 +159,9 @@ def run(options: argparse.Namespace) -> int:
         return show(page, results, options.json, f"Next: {following}", reader)
     except Stopped:
         return 0
+    finally:
+        if options.record:
+            print(reader.summary)
 
 
 _AFTER = f"Check yourself: {PROGRAM} lesson questions. Then: python exercises/step_loop.py"
@@ -166,10 +169,19 @@ _AFTER = f"Check yourself: {PROGRAM} lesson questions. Then: python exercises/st
 
 def run_path(options: argparse.Namespace) -> int:
     """All stations, one after the other."""
+    reader = _reader(options, STATIONS[0])
+    try:
+        return _path(options, reader)
+    finally:
+        if options.record:
+            print(reader.summary)
+
+
+def _path(options: argparse.Namespace, reader: Any) -> int:
     from ..report import terminal
     from ..report.quiz import Stopped
 
-    reader, code, everything = _reader(options, STATIONS[0]), 0, {}
+    code, everything = 0, {}
     names = [lesson.name for lesson in STATIONS]
     first = names.index(options.start) if options.start else 0
     for number, lesson in enumerate(STATIONS[first:], start=first + 1):

@@ -27,11 +27,13 @@ class Submission:
     """A student's file: what it is called in the table, and where it is.
 
     `path` is None where a student's folder has no file that could be judged, or several.
+    `folder` is that folder; what else is in it may be imported.
     """
 
     name: str
     path: Path | None
     refusal: str = ""
+    folder: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,8 @@ class ClassEntry:
 
     Attributes:
         name: As in the table.
-        sha256: The digest of its content; "" without a file.
+        sha256: The digest of its content, of its folder's Python files if it has one; "" without
+            a file.
         functions: One after the other; empty where the file could not be judged.
         refusal: Why it could not.
         made_with: Backend, versions and limit that the verdict comes from.
@@ -79,7 +82,7 @@ def submissions(paths: Sequence[str | os.PathLike[str]]) -> list[Submission]:
         if each.is_dir():
             before = "" if len(paths) == 1 else f"{each.as_posix()}/"
             for entry in sorted(each.iterdir()):
-                if not entry.name.startswith("."):
+                if not _skipped(entry):
                     for one in _in_entry(entry):
                         found.setdefault(entry, replace(one, name=before + one.name))
         elif each.is_file():
@@ -89,6 +92,22 @@ def submissions(paths: Sequence[str | os.PathLike[str]]) -> list[Submission]:
     if not found:
         raise BadInputError(f"no Python files in {', '.join(map(str, paths))}")
     return list(found.values())
+
+
+def not_looked_at(paths: Sequence[str | os.PathLike[str]]) -> list[str]:
+    """Names of the files in class folders that are no Python files."""
+    folders = [each for each in map(Path, paths) if each.is_dir()]
+    return [
+        entry.name
+        for folder in folders
+        for entry in sorted(folder.iterdir())
+        if entry.is_file() and not _skipped(entry) and entry.suffix.lower() != ".py"
+    ]
+
+
+def _skipped(entry: Path) -> bool:
+    """What systems leave in folders."""
+    return entry.name.startswith(".") or entry.name in ("__pycache__", "__MACOSX")
 
 
 def submission_in(folder: Path) -> Path:
@@ -105,12 +124,12 @@ def submission_in(folder: Path) -> Path:
 
 def _in_entry(entry: Path) -> list[Submission]:
     if entry.is_file():
-        return [Submission(entry.name, entry)] if entry.suffix == ".py" else []
-    if not entry.is_dir() or entry.name == "__pycache__":
+        return [Submission(entry.name, entry)] if entry.suffix.lower() == ".py" else []
+    if not entry.is_dir():
         return []
     files = [file for file in sorted(entry.rglob("*.py")) if _has_a_function(file)]
     if len(files) == 1:
-        return [Submission(entry.name, files[0])]
+        return [Submission(entry.name, files[0], folder=entry)]
     text = "no Python file in it has one of the functions"
     if files:
         names = ", ".join(file.relative_to(entry).as_posix() for file in files[:3])
@@ -165,7 +184,7 @@ def judge_all(
         try:
             waiting: dict[Future[ClassEntry], str] = {}
             for each in found:
-                known = before.get((_digest(each.path), made_with))
+                known = before.get((_digest(each), made_with))
                 if known is not None and known.judged:
                     entries[each.name] = replace(known, name=each.name)
                 else:
@@ -186,14 +205,14 @@ def judge_all(
 
 
 def _entry(judge: ExerciseJudge, submission: Submission, made_with: str) -> ClassEntry:
-    digest = _digest(submission.path)
+    digest = _digest(submission)
     if submission.path is None:
         return ClassEntry(submission.name, digest, (), submission.refusal, made_with)
     try:
         grade: Grade = judge.judge(submission.path)
     except BadInputError as error:
         return ClassEntry(submission.name, digest, (), str(error), made_with)
-    return ClassEntry(submission.name, grade.sha256, grade.functions, "", made_with)
+    return ClassEntry(submission.name, digest, grade.functions, "", made_with)
 
 
 def _in_order(found: Sequence[Submission], entries: Mapping[str, ClassEntry]) -> list[ClassEntry]:
@@ -211,11 +230,26 @@ def _in_order(found: Sequence[Submission], entries: Mapping[str, ClassEntry]) ->
     return done
 
 
-def _digest(path: Path | None) -> str:
+def _digest(submission: Submission) -> str:
+    """Of the file, and of what it may import out of the student's folder.
+
+    "" where there is none, or where it is too large to be judged.
+    """
+    if submission.path is None:
+        return ""
+    folder = submission.folder
     try:
-        if path is None or path.stat().st_size > _LARGEST:  # which is refused
-            return ""
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        files = [submission.path] if folder is None else sorted(folder.rglob("*.py"))
+        whole = hashlib.sha256()
+        for file in files:
+            if not file.is_file() or file.stat().st_size > _LARGEST:
+                if file == submission.path:
+                    return ""
+                continue
+            name = b"" if folder is None else os.fsencode(file.relative_to(folder))
+            content = file.read_bytes()
+            whole.update(b"%d %d " % (len(name), len(content)) + name + content)
+        return whole.hexdigest()
     except OSError:
         return ""
 
@@ -251,9 +285,11 @@ def as_csv(entries: Iterable[ClassEntry]) -> str:
     for entry in entries:
         words = {each.function: verdict_word(each) for each in entry.functions}
         remarks = [f"{each.function}: {text}" for each in entry.functions for text in each.remarks]
+        if len(entry.functions) > 1 and len({each.remarks for each in entry.functions}) == 1:
+            remarks = list(entry.functions[0].remarks)  # of the file, and not of a function
         row = (
             entry.name,
-            entry.right,
+            entry.right if entry.judged else "",
             len(JUDGES),
             *(words.get(name, "not judged") for name in JUDGES),
             "\n".join([entry.refusal] if entry.refusal else remarks),
@@ -280,7 +316,8 @@ def verdict_word(judgement: Judgement) -> str:
 
 
 def _write(table: Path, entries: Iterable[ClassEntry]) -> None:
-    text = as_csv(entries).encode("utf-8", errors="replace")
+    # With the mark by which a spreadsheet knows UTF-8.
+    text = as_csv(entries).encode("utf-8-sig", errors="replace")
     replace_file(table, lambda out: out.write(text))
 
 
@@ -292,12 +329,15 @@ def _read(table: Path) -> dict[tuple[str, str], ClassEntry]:
     """
     try:
         with table.open(newline="", encoding="utf-8-sig") as text:  # as spreadsheets save it
-            rows = list(csv.reader(text))
+            head = text.readline()
+            text.seek(0)
+            rows = list(csv.reader(text, delimiter=";" if head.startswith("file;") else ","))
     except (OSError, UnicodeError, csv.Error) as error:
         raise BadInputError(f"{table.name} cannot be read: {error}") from None
     if rows and tuple(rows[0]) != _HEAD:
         raise BadInputError(
-            f"{table.name} is there and is no table of grades: name another file, or remove it"
+            f"{table.name} is there and has not the columns of a table of grades "
+            f"({', '.join(_HEAD)}): name another file, or remove it"
         )
     found = {}
     for row in rows[1:]:
@@ -312,10 +352,11 @@ def _read(table: Path) -> dict[tuple[str, str], ClassEntry]:
 
 def _judgements(cells: Mapping[str, str]) -> tuple[Judgement, ...]:
     remarks: dict[str, list[str]] = {name: [] for name in JUDGES}
-    for line in cells["remarks"].split("\n"):
-        name, _, text = line.removeprefix("'").partition(": ")
-        if name in remarks:
-            remarks[name].append(text)
+    for cell in cells["remarks"].split("\n"):
+        line = cell.removeprefix("'")
+        name, _, text = line.partition(": ")
+        for each in [name] if name in remarks else remarks if line else ():
+            remarks[each].append(text if each == name else line)
     return tuple(
         Judgement(
             name,

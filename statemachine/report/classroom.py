@@ -12,8 +12,13 @@ from ..page import Page, Table, Text, Verdict
 _SHORT = {"right": "right", "wrong": "WRONG", "not written": "–", "not judged": "?"}
 
 
-def page(entries: Sequence[ClassEntry]) -> Page:
-    """A row a file, and what a teacher should look at."""
+def page(entries: Sequence[ClassEntry], ignored: Sequence[str] = ()) -> Page:
+    """A row a file, and what a teacher should look at.
+
+    Args:
+        entries: What became of each submission.
+        ignored: Names of files that were not looked at.
+    """
     rows = []
     for entry in entries:
         words = {each.function: verdict_word(each) for each in entry.functions}
@@ -21,7 +26,7 @@ def page(entries: Sequence[ClassEntry]) -> Page:
             (
                 entry.name,
                 *(_SHORT[words.get(name, "not judged")] for name in JUDGES),
-                f"{entry.right} of {len(JUDGES)}",
+                f"{entry.right} of {len(JUDGES)}" if entry.judged else "?",
             )
         )
     headers = [name.removeprefix("demo_") for name in JUDGES]
@@ -29,7 +34,9 @@ def page(entries: Sequence[ClassEntry]) -> Page:
         Table(("file", *headers, "right"), rows, words=frozenset(range(len(JUDGES) + 1)))
     ]
     solved = sum(entry.right == len(JUDGES) for entry in entries)
-    blocks.append(Text(f"{solved} of {count(len(entries), 'file')} have all functions right."))
+    blocks.append(Text(f"All functions are right in {solved} of {count(len(entries), 'file')}."))
+    if ignored:
+        blocks.append(Text(f"No Python files, and not looked at: {', '.join(ignored)}."))
     for entry in entries:
         if entry.same_as:
             blocks.append(Text(f"{entry.name} has the same code as {entry.same_as}."))

@@ -42,19 +42,27 @@ class RecordedReader(Reader):
         choice = super().ask(question)
         if choice is not None:
             key = f"{self.lesson}: {question.text}"
-            right = question.right
-            self._answers.setdefault(
+            right, predicted = question.right, question.choices[choice]
+            first = self._answers.setdefault(
                 key,
                 {
                     "lesson": self.lesson,
                     "question": question.text,
-                    "predicted": question.choices[choice],
+                    "predicted": predicted,
                     "found": None if right is None else question.choices[right],
                     "right": choice == right,
                 },
             )
             self._write()
+            if first["predicted"] != predicted:
+                print(f"(In {self._file.name} your first answer counts: {first['predicted']}.)")
         return choice
+
+    @property
+    def summary(self) -> str:
+        """What the file says by now, in a line."""
+        right = sum(bool(answer["right"]) for answer in self._answers.values())
+        return f"{self._file.name}: {right} of {len(self._answers)} predictions right"
 
     def _write(self) -> None:
         answers = list(self._answers.values())
