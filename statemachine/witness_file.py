@@ -106,12 +106,27 @@ def _refuse_misread(root: ElementTree.Element, path: Path) -> None:
                     f"{path.name} gives {placed[0]} of a {element.tag} in a <default>, which "
                     "Pinocchio's parser does not read: write it where it is used"
                 )
+    _refuse_slides_with_ref(root, path)
     roots = [body.get("name", "?") for body in root.findall("worldbody/body")]
     if len(roots) != 1 or len(root.findall("worldbody")) != 1:
         raise ModelError(
             f"{path.name} has {len(roots)} root bodies ({', '.join(roots) or 'none'}), and "
             "Pinocchio reads exactly one: put the robot in a file of its own"
         )
+
+
+def _refuse_slides_with_ref(root: ElementTree.Element, path: Path) -> None:
+    """Pinocchio reads the ref of a hinge and passes over that of a slide."""
+    presets = [joint for default in root.iter("default") for joint in default.findall("joint")]
+    kinds = {joint.get("type") for joint in presets}
+    preset = any(float(joint.get("ref", 0)) for joint in presets)
+    for joint in root.iterfind(".//worldbody//joint"):
+        kind = joint.get("type") or ("slide" if "slide" in kinds else "hinge")
+        if kind == "slide" and (preset or float(joint.get("ref", 0))):
+            raise ModelError(
+                f"{path.name} gives the slide {joint.get('name', '?')!r} a ref, which Pinocchio's "
+                "parser does not read"
+            )
 
 
 def _still_body(parent: ElementTree.Element, name: str) -> ElementTree.Element:

@@ -239,6 +239,14 @@ TRAPS = {
     ),
     "another order of euler angles": _robot("euler='10 20 30'", top="<compiler eulerseq='ZYX'/>"),
     "a joint with a ref": _robot(joint='<joint name="j" axis="0 0 1" ref="30"/>'),
+    "a slide with a ref": _robot(joint='<joint name="j" type="slide" axis="0 0 1" ref="0.3"/>'),
+    "a slide with a ref from a default": _robot(
+        joint='<joint name="j" type="slide" axis="0 0 1"/>',
+        top="<default><joint ref='0.3'/></default>",
+    ),
+    "a hinge with a ref from a default": _robot(
+        joint='<joint name="j" axis="0 0 1"/>', top="<default><joint ref='30'/></default>"
+    ),
     "a site by zaxis": _robot(site='<site name="s" zaxis="1 1 0"/>'),
     "a site by xyaxes": _robot(site='<site name="s" xyaxes="0 1 0 0 0 1"/>'),
     "a hinge without a name": _robot(joint="<joint axis='0 0 1'/>"),
@@ -267,8 +275,9 @@ def test_what_could_be_misread_agrees_or_is_refused(tmp_path: Path, trap: str) -
                 continue
             assert pose < 1e-12
             assert jacobian < 1e-12
-    if trap.startswith(("a root", "axisangle in rad", "an axis", "joint axis")):
+    if trap.startswith(("a root", "axisangle in rad", "an axis", "joint axis", "a hinge with")):
         assert not refused
+    assert refused or not trap.startswith("a slide with a ref")
 
 
 def test_sites_of_the_world_and_of_the_base(tmp_path: Path) -> None:
