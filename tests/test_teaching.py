@@ -44,8 +44,8 @@ def test_the_students_kit_has_no_solution(built: Path, tmp_path: Path) -> None:
                 "README.md",
                 "constraints.txt",
                 "path.ipynb",
-                "step_loop.py",
-                "test_arm.py",
+                "exercises/step_loop.py",
+                "exercises/test_arm.py",
                 built.name,
             ]
         )
