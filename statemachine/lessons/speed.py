@@ -20,13 +20,15 @@ from .records import Session
 from .session import CodeRun
 
 _ROUNDS = 20
-_MOST = 20_000  # steps of a round; between rounds the progress moves and Ctrl-C is heard
+_MOST = 20_000  # steps of a call or a round; between two the progress moves and Ctrl-C is heard
 _BULK, _AGAIN, _LOOP, _OWN = "in bulk", "in bulk again", "step by step", "as it comes"
 
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """The same steps by the clock, both ways, once."""
     steps = as_count(options["steps"], "steps")
+    whole, rest = divmod(steps, _MOST)
+    bulk = f"[{steps}]" if not whole else f"[{_MOST}] * {whole}" + f" + [{rest}]" * bool(rest)
     return f"""\
 import time
 import statemachine as sm
@@ -39,15 +41,15 @@ def start(model):
         sm.reset(model, data, keyframe=0)
     return data
 
-def wall(model, data, calls, nstep):
+def wall(model, data, calls):
     began = time.perf_counter()
-    for _ in range(calls):
+    for nstep in calls:
         sm.step(model, data, nstep)
     return time.perf_counter() - began
 
 for name, seconds in (
-    ("in bulk", wall(model, start(model), calls=1, nstep={steps})),
-    ("step by step", wall(model, start(model), calls={steps}, nstep=1)),
+    ("in bulk", wall(model, start(model), {bulk})),
+    ("step by step", wall(model, start(model), [1] * {steps})),
 ):
     factor = {steps} * model.timestep / seconds
     print(f"{{name}}: {{seconds:.3f}} s, {{factor:.0f}} times real time")
@@ -131,7 +133,7 @@ def _way(
 
     def advance() -> None:
         size = next(remaining)
-        wall(model, data, *((1, size) if bulk else (size, 1)))
+        wall(model, data, [size] if bulk else [1] * size)
 
     return advance
 
