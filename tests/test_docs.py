@@ -177,6 +177,7 @@ def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
     assert "--realtime" in (tmp_path / "o" / "path" / "09-time.html").read_text()
 
 
+@pytest.mark.slow
 def test_a_page_that_is_the_same_is_left_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

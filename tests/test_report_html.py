@@ -644,6 +644,7 @@ def test_it_reads_without_a_script(page: Path) -> None:
 # What moves.
 
 
+@pytest.mark.slow
 def test_the_slider_moves_both_arms_the_cursors_and_the_figures(page: Path, hold: Made) -> None:
     with browser(height=1000) as tab:
         open_page(tab, page)

@@ -542,6 +542,7 @@ def test_the_command_records_plays_shows_and_exports(cli: Cli, tmp_path: Path) -
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_command_draws(cli: Cli, tmp_path: Path) -> None:
     write(traced("hold", seconds=0.2), tmp_path / "hold.npz")
     pytest.importorskip("matplotlib")
