@@ -144,6 +144,8 @@ def test_every_call_is_recorded(engine: str) -> None:
     assert recorded.pop("MjModel.__copy__") == 1
     if engine == "mujoco":
         assert recorded.pop("mj_step") == 1 + 5 + 1 + 1
+    if sys.version_info[:2] == (3, 12):  # its account lacks methods of objects, too
+        recorded = Counter({name: recorded[name] for name in recorded if name in seen})
     assert recorded == seen
     assert sum(seen.values()) > 20
 

@@ -261,8 +261,10 @@ def test_what_cannot_be_told_apart_is_said_so() -> None:
         assert any(said in b.text for b in page.blocks if isinstance(b, Text))
     # The code measures the steps that the table does.
     page, taken = _take("speed", "mujoco", steps=123)
-    assert "nstep=123" in taken.code
-    assert "calls=123" in taken.code
+    assert "wall(model, start(model), [123])" in taken.code
+    assert "wall(model, start(model), [1] * 123)" in taken.code
+    long = module("speed").code(sm.load("so101"), {"steps": 50_001}, "…")
+    assert "wall(model, start(model), [20000] * 2 + [10001])" in long  # Ctrl-C is heard between
     assert any("123 steps" in b.text for b in page.blocks if isinstance(b, Text))
 
 
