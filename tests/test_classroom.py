@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 
 from statemachine.errors import BadInputError
+from statemachine.grading.class_table import as_csv
 from statemachine.grading.classroom import (
     Submission,
-    as_csv,
     judge_all,
     not_looked_at,
     submissions,

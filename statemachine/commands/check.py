@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from . import _mutants
 from ._common import SAYS_NO, add_backend, add_json, complain, show
@@ -102,12 +103,11 @@ def _one(options: argparse.Namespace) -> int:
     return show(words.page(grade), grade, options.json)
 
 
-def _gradescope(target: str, grade: object, refusal: str) -> None:
+def _gradescope(target: str, grade: Any, refusal: str) -> None:
     from ..report import gradescope
-    from ..traces.whole import replace_file
+    from ..traces.whole import replace_text
 
-    text = gradescope.results(grade, refusal).encode("utf-8", errors="replace")  # pyright: ignore
-    replace_file(Path(target), lambda out: out.write(text))
+    replace_text(Path(target), gradescope.results(grade, refusal))
 
 
 def _class(options: argparse.Namespace) -> int:

@@ -1,25 +1,20 @@
-"""The files of a class: which there are, all judged in parallel, a table that is resumed."""
+"""The files of a class: which there are, and all judged in parallel."""
 
 from __future__ import annotations
 
 import ast
-import csv
 import hashlib
-import io
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 from ..errors import BadInputError
-from ..traces.whole import replace_file
-from .exercise import TIME_LIMIT, ExerciseJudge, Grade, Judgement
+from .class_table import ClassEntry, read, write
+from .exercise import LARGEST, TIME_LIMIT, ExerciseJudge, Grade
 from .judges import JUDGES
-
-_HEAD = ("file", "right", "of", *JUDGES, "remarks", "same_as", "sha256", "made_with")
-_WORDS = {"right", "wrong", "not written", "not judged"}
-_LARGEST = 1_000_000  # bytes of a file that is looked into
 
 
 @dataclass(frozen=True)
@@ -34,38 +29,6 @@ class Submission:
     path: Path | None
     refusal: str = ""
     folder: Path | None = None
-
-
-@dataclass(frozen=True)
-class ClassEntry:
-    """What became of one submission.
-
-    Attributes:
-        name: As in the table.
-        sha256: The digest of its content, of its folder's Python files if it has one; "" without
-            a file.
-        functions: One after the other; empty where the file could not be judged.
-        refusal: Why it could not.
-        made_with: Backend, versions and limit that the verdict comes from.
-        same_as: The first submission whose code is the same, comments and layout aside.
-    """
-
-    name: str
-    sha256: str
-    functions: tuple[Judgement, ...]
-    refusal: str
-    made_with: str
-    same_as: str = ""
-
-    @property
-    def right(self) -> int:
-        """How many functions do what they should."""
-        return sum(judgement.passed for judgement in self.functions)
-
-    @property
-    def judged(self) -> bool:
-        """Whether there is a verdict on each function."""
-        return bool(self.functions) and all(each.judged for each in self.functions)
 
 
 def submissions(paths: Sequence[str | os.PathLike[str]]) -> list[Submission]:
@@ -142,7 +105,7 @@ def _has_a_function(file: Path) -> bool:
         if not file.is_file():  # a pipe would wait for somebody to write
             return False
         with file.open("rb") as content:
-            start = content.read(_LARGEST)
+            start = content.read(LARGEST)
     except OSError:
         return False
     return any(f"def {name}".encode() in start for name in JUDGES)
@@ -157,7 +120,7 @@ def judge_all(
     table: Path | None = None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> list[ClassEntry]:
-    """ExerciseJudge every submission, several at once.
+    """Judge every submission, several at once.
 
     Args:
         found: What to judge.
@@ -176,36 +139,37 @@ def judge_all(
     jobs = max(1, (os.cpu_count() or 1) // 2) if jobs is None else jobs
     if jobs < 1:
         raise BadInputError(f"jobs must be at least 1; got {jobs}")
-    before = _read(table) if table is not None and table.exists() else {}
+    before = read(table) if table is not None and table.exists() else {}
     entries: dict[str, ClassEntry] = {}
+    code_of = cache(_code)  # the table is written after each file, and asks for all of them
     with ExerciseJudge(backend, time_limit) as judge, ThreadPoolExecutor(jobs) as pool:
         versions = " ".join(f"{name} {version}" for name, version in judge.versions.items())
         made_with = f"{backend}, {versions}, {time_limit:g} s"
         try:
             waiting: dict[Future[ClassEntry], str] = {}
             for each in found:
-                known = before.get((_digest(each), made_with))
+                digest = _digest(each)
+                known = before.get((digest, made_with))
                 if known is not None and known.judged:
                     entries[each.name] = replace(known, name=each.name)
                 else:
-                    waiting[pool.submit(_entry, judge, each, made_with)] = each.name
+                    waiting[pool.submit(_entry, judge, each, digest, made_with)] = each.name
             while waiting:
                 for future in wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED).done:
                     entries[waiting.pop(future)] = future.result()
                     if table is not None:
-                        _write(table, _in_order(found, entries))
+                        write(table, _in_order(found, entries, code_of))
                 progress(1 - len(waiting) / len(found))
         finally:
             judge.stop.set()
             pool.shutdown(wait=False, cancel_futures=True)
-    done = _in_order(found, entries)
+    done = _in_order(found, entries, code_of)
     if table is not None:
-        _write(table, done)
+        write(table, done)
     return done
 
 
-def _entry(judge: ExerciseJudge, submission: Submission, made_with: str) -> ClassEntry:
-    digest = _digest(submission)
+def _entry(judge: ExerciseJudge, submission: Submission, digest: str, made_with: str) -> ClassEntry:
     if submission.path is None:
         return ClassEntry(submission.name, digest, (), submission.refusal, made_with)
     try:
@@ -215,7 +179,11 @@ def _entry(judge: ExerciseJudge, submission: Submission, made_with: str) -> Clas
     return ClassEntry(submission.name, digest, grade.functions, "", made_with)
 
 
-def _in_order(found: Sequence[Submission], entries: Mapping[str, ClassEntry]) -> list[ClassEntry]:
+def _in_order(
+    found: Sequence[Submission],
+    entries: Mapping[str, ClassEntry],
+    code_of: Callable[[Path | None], str],
+) -> list[ClassEntry]:
     """The entries in the order of the submissions, each told which earlier one it equals."""
     done = []
     first: dict[str, str] = {}
@@ -224,7 +192,7 @@ def _in_order(found: Sequence[Submission], entries: Mapping[str, ClassEntry]) ->
             continue
         entry, same = entries[each.name], ""
         if any(judgement.written for judgement in entry.functions):
-            code = _code(each.path)
+            code = code_of(each.path)
             same = first.setdefault(code, each.name) if code else ""
         done.append(replace(entry, same_as="" if same == each.name else same))
     return done
@@ -242,7 +210,7 @@ def _digest(submission: Submission) -> str:
         files = [submission.path] if folder is None else sorted(folder.rglob("*.py"))
         whole = hashlib.sha256()
         for file in files:
-            if not file.is_file() or file.stat().st_size > _LARGEST:
+            if not file.is_file() or file.stat().st_size > LARGEST:
                 if file == submission.path:
                     return ""
                 continue
@@ -272,98 +240,3 @@ def _code(path: Path | None) -> str:
         return hashlib.sha256(ast.dump(tree).encode(errors="replace")).hexdigest()
     except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):
         return ""
-
-
-# The table --------------------------------------------------------------------------------
-
-
-def as_csv(entries: Iterable[ClassEntry]) -> str:
-    """The table as text: a row a submission; remarks have a line each."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(_HEAD)
-    for entry in entries:
-        words = {each.function: verdict_word(each) for each in entry.functions}
-        remarks = [f"{each.function}: {text}" for each in entry.functions for text in each.remarks]
-        if len(entry.functions) > 1 and len({each.remarks for each in entry.functions}) == 1:
-            remarks = list(entry.functions[0].remarks)  # of the file, and not of a function
-        row = (
-            entry.name,
-            entry.right if entry.judged else "",
-            len(JUDGES),
-            *(words.get(name, "not judged") for name in JUDGES),
-            "\n".join([entry.refusal] if entry.refusal else remarks),
-            entry.same_as,
-            entry.sha256,
-            entry.made_with,
-        )
-        writer.writerow([_safe(cell) for cell in row])
-    return out.getvalue()
-
-
-def _safe(cell: object) -> object:
-    """No formula: a spreadsheet would run what a student wrote, or named the file."""
-    return f"'{cell}" if isinstance(cell, str) and cell[:1] in "=+-@\t\r" and cell else cell
-
-
-def verdict_word(judgement: Judgement) -> str:
-    """A judgement in a word of the table."""
-    if not judgement.judged:
-        return "not judged"
-    if not judgement.written:
-        return "not written"
-    return "right" if judgement.passed else "wrong"
-
-
-def _write(table: Path, entries: Iterable[ClassEntry]) -> None:
-    # With the mark by which a spreadsheet knows UTF-8.
-    text = as_csv(entries).encode("utf-8-sig", errors="replace")
-    replace_file(table, lambda out: out.write(text))
-
-
-def _read(table: Path) -> dict[tuple[str, str], ClassEntry]:
-    """What a table says, by digest and by what it was made with.
-
-    Raises:
-        BadInputError: It is no such table, so that nothing of it is overwritten.
-    """
-    try:
-        with table.open(newline="", encoding="utf-8-sig") as text:  # as spreadsheets save it
-            head = text.readline()
-            text.seek(0)
-            rows = list(csv.reader(text, delimiter=";" if head.startswith("file;") else ","))
-    except (OSError, UnicodeError, csv.Error) as error:
-        raise BadInputError(f"{table.name} cannot be read: {error}") from None
-    if rows and tuple(rows[0]) != _HEAD:
-        raise BadInputError(
-            f"{table.name} is there and has not the columns of a table of grades "
-            f"({', '.join(_HEAD)}): name another file, or remove it"
-        )
-    found = {}
-    for row in rows[1:]:
-        cells = dict(zip(_HEAD, row, strict=False))
-        if len(row) != len(_HEAD) or any(cells[name] not in _WORDS for name in JUDGES):
-            continue  # judged again
-        entry = ClassEntry(cells["file"], cells["sha256"], _judgements(cells), "",
-                           cells["made_with"])  # fmt: skip
-        found[entry.sha256, entry.made_with] = entry
-    return found
-
-
-def _judgements(cells: Mapping[str, str]) -> tuple[Judgement, ...]:
-    remarks: dict[str, list[str]] = {name: [] for name in JUDGES}
-    for cell in cells["remarks"].split("\n"):
-        line = cell.removeprefix("'")
-        name, _, text = line.partition(": ")
-        for each in [name] if name in remarks else remarks if line else ():
-            remarks[each].append(text if each == name else line)
-    return tuple(
-        Judgement(
-            name,
-            written=cells[name] != "not written",
-            passed=cells[name] == "right",
-            remarks=tuple(remarks[name]),
-            judged=cells[name] != "not judged",
-        )
-        for name in JUDGES
-    )

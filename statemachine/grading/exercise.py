@@ -37,7 +37,7 @@ from .worlds import ExerciseWorld, Scenes
 TIME_LIMIT = 5.0  # [s] of computing for a function, from when its worlds are ready
 WALL_LIMIT = 120.0  # [s] on the clock for it, which a busy machine may need too
 _TIMES = 4  # a busy machine needs longer on the clock: so many times what may be computed, at least
-_LARGEST = 1_000_000  # bytes of a student's file
+LARGEST = 1_000_000  # bytes of a student's file
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def run(
     progress: Callable[[float], None] = lambda _: None,
     wall_limit: float = WALL_LIMIT,
 ) -> Grade:
-    """ExerciseJudge each function of a student's file.
+    """Judge each function of a student's file.
 
     Args:
         file: A Python file; nothing of it runs in this process.
@@ -161,7 +161,7 @@ class ExerciseJudge:
     def judge(
         self, file: str | os.PathLike[str], progress: Callable[[float], None] = lambda _: None
     ) -> Grade:
-        """ExerciseJudge each function of a student's file.
+        """Judge each function of a student's file.
 
         Args:
             file: A Python file; nothing of it runs in this process.
@@ -231,10 +231,10 @@ def _python_file(path: Path) -> Path:
         raise BadInputError(f"{path.name} is no Python file: its name does not end in .py")
     try:
         with path.open("rb") as file:
-            content = file.read(_LARGEST + 1)
+            content = file.read(LARGEST + 1)
     except OSError as error:
         raise BadInputError(f"{path.name} cannot be read: {error.strerror}") from None
-    if len(content) > _LARGEST or b"\0" in content:
+    if len(content) > LARGEST or b"\0" in content:
         raise BadInputError(f"{path.name} is no Python file, or far too large for one")
     if re.search(rb"^def test_", content, re.M) and not re.search(rb"demo_\w+", content):
         raise BadInputError(

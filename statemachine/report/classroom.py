@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..comparison.text import count
-from ..grading.classroom import ClassEntry, verdict_word
+from ..grading.class_table import ClassEntry, verdict_word
 from ..grading.judges import JUDGES
 from ..page import Page, Table, Text, Verdict
 

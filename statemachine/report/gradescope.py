@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 
-from ..grading.classroom import verdict_word
+from ..grading.class_table import verdict_word
 from ..grading.exercise import Grade
 from ..grading.judges import JUDGES
 

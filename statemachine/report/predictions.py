@@ -10,7 +10,7 @@ from typing import Any
 from .. import __version__
 from ..errors import BadInputError
 from ..page import Question
-from ..traces.whole import replace_file
+from ..traces.whole import replace_text
 from .quiz import Reader
 
 _KIND = "statemachine predictions"
@@ -75,7 +75,7 @@ class RecordedReader(Reader):
             "answers": answers,
         }
         text = json.dumps(record, indent=1, ensure_ascii=False) + "\n"
-        replace_file(self._file, lambda out: out.write(text.encode("utf-8", errors="replace")))
+        replace_text(self._file, text)
 
 
 def _read(file: Path) -> dict[str, dict[str, Any]]:

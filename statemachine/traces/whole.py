@@ -78,6 +78,12 @@ def replace_file(target: Path, fill: Callable[[BinaryIO], object]) -> None:
         fill_file(name, fill)
 
 
+def replace_text(target: Path, text: str, encoding: str = "utf-8") -> None:
+    """The same of text; what the encoding lacks, as half of a pair of characters, is a "?"."""
+    content = text.encode(encoding, errors="replace")
+    replace_file(target, lambda out: out.write(content))
+
+
 def fill_file(name: str, fill: Callable[[BinaryIO], object]) -> None:
     """Open a file that `beside` named, let it be filled, and close it."""
     with open(name, "wb") as out:
