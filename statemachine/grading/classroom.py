@@ -16,6 +16,8 @@ from .class_table import ClassEntry, read, write
 from .exercise import LARGEST, TIME_LIMIT, ExerciseJudge, Grade
 from .judges import JUDGES
 
+_NAMES = ("step_loop.py", "test_arm.py")  # of the exercise's own files
+
 
 @dataclass(frozen=True)
 class Submission:
@@ -35,14 +37,17 @@ def submissions(paths: Sequence[str | os.PathLike[str]]) -> list[Submission]:
     """The submissions among files and folders.
 
     In a folder each Python file is one, and each folder with one Python file that has at least
-    one of the functions of the exercise.
+    one of the functions of the exercise. One student's folder is one submission.
 
     Raises:
         BadInputError: A path is not there, or nothing is found at all.
     """
     found: dict[Path, Submission] = {}
     for each in map(Path, paths):
-        if each.is_dir():
+        if is_one_students(each):
+            name = each.resolve().name if len(paths) == 1 else each.as_posix()
+            found[each] = replace(_in_entry(each)[0], name=name)
+        elif each.is_dir():
             before = "" if len(paths) == 1 else f"{each.as_posix()}/"
             for entry in sorted(each.iterdir()):
                 if not _skipped(entry):
@@ -59,13 +64,28 @@ def submissions(paths: Sequence[str | os.PathLike[str]]) -> list[Submission]:
 
 def not_looked_at(paths: Sequence[str | os.PathLike[str]]) -> list[str]:
     """Names of the files in class folders that are no Python files."""
-    folders = [each for each in map(Path, paths) if each.is_dir()]
+    folders = [each for each in map(Path, paths) if each.is_dir() and not is_one_students(each)]
     return [
         entry.name
         for folder in folders
         for entry in sorted(folder.iterdir())
         if entry.is_file() and not _skipped(entry) and entry.suffix.lower() != ".py"
     ]
+
+
+def is_one_students(folder: Path) -> bool:
+    """Whether a folder is what one student works in, and not that of a class.
+
+    It holds one of the exercise's files under its own name, and nobody else's.
+    """
+    if not any((folder / name).is_file() for name in _NAMES):
+        return False
+    return not any(
+        _has_a_function(file)
+        for entry in folder.iterdir()
+        if not _skipped(entry) and entry.name not in _NAMES
+        for file in (entry.rglob("*.py") if entry.is_dir() else [entry])
+    )
 
 
 def _skipped(entry: Path) -> bool:
@@ -75,6 +95,8 @@ def _skipped(entry: Path) -> bool:
 
 def submission_in(folder: Path) -> Path:
     """The one file in a student's folder that has functions of the exercise.
+
+    Where there are several it is the one that is called `step_loop.py`.
 
     Raises:
         BadInputError: There is none, or more than one.
@@ -91,9 +113,12 @@ def _in_entry(entry: Path) -> list[Submission]:
     if not entry.is_dir():
         return []
     files = [file for file in sorted(entry.rglob("*.py")) if _has_a_function(file)]
+    files = [file for file in files if file.name == _NAMES[0]] or files
     if len(files) == 1:
         return [Submission(entry.name, files[0], folder=entry)]
     text = "no Python file in it has one of the functions"
+    if (tests := entry / _NAMES[1]).is_file():
+        text += f". Did you mean statemachine check --mutants {tests.as_posix()}?"
     if files:
         names = ", ".join(file.relative_to(entry).as_posix() for file in files[:3])
         text = f"{len(files)} files in it have the functions: {names}"
