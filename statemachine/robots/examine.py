@@ -78,7 +78,7 @@ class _Examination:
         with self._part("witness"), suppress(MissingEngineError):
             require(WITNESS)
             model = self._any().get(DEFAULT)
-            if model is not None:
+            if model is not None and model.nv:
                 self.row = replace(self.row, witness=witness_row(model, self.seed))
         self._gaps()
         if not quick:
