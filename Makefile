@@ -15,7 +15,7 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13 python3.14; 
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null \
 	&& { echo $$p; break; }; done)
 
-.PHONY: help lesson test test-slow test-pythons test-newest check format hooks bench fuzz picture extras report urdf traces docs notebook student-kit autograder clean
+.PHONY: help lesson test test-slow test-pythons test-newest check format hooks bench fuzz picture extras report robots urdf traces docs notebook student-kit autograder clean
 
 help:
 	@sed -n 's/^# make /  make /p' Makefile
@@ -98,6 +98,11 @@ report: $(VENV)/run.stamp
 	@# 1: they differ, which is what the page is about.
 	@$(BIN)/statemachine compare hold --html hold.html >/dev/null || [ $$? -eq 1 ]
 	@echo "hold.html: open it in a browser"
+
+# make robots       a table of the models in DIR: what each does on every engine (DIR=models)
+DIR ?= models
+robots: $(VENV)/run.stamp
+	@$(BIN)/statemachine robots $(DIR)
 
 # make traces       record on PyBullet anew what the package brings for where it has no wheel
 traces: $(VENV)/run.stamp

@@ -6,15 +6,15 @@ import ast
 import hashlib
 import os
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 from ..errors import BadInputError
 from .class_table import ClassEntry, read, write
 from .exercise import LARGEST, TIME_LIMIT, ExerciseJudge, Grade
 from .judges import JUDGES
+from .parallel import checked_jobs, in_parallel
 
 _NAMES = ("step_loop.py", "test_arm.py")  # of the exercise's own files
 
@@ -161,33 +161,34 @@ def judge_all(
         BadInputError: `jobs` is less than 1, or `table` is there and no such table.
         MissingEngineError: The backend's engine is not installed here.
     """
-    jobs = max(1, (os.cpu_count() or 1) // 2) if jobs is None else jobs
-    if jobs < 1:
-        raise BadInputError(f"jobs must be at least 1; got {jobs}")
+    jobs = checked_jobs(jobs, processors=2)
     before = read(table) if table is not None and table.exists() else {}
     entries: dict[str, ClassEntry] = {}
     code_of = cache(_code)  # the table is written after each file, and asks for all of them
-    with ExerciseJudge(backend, time_limit) as judge, ThreadPoolExecutor(jobs) as pool:
+    with ExerciseJudge(backend, time_limit) as judge:
         versions = " ".join(f"{name} {version}" for name, version in judge.versions.items())
         made_with = f"{backend}, {versions}, {time_limit:g} s"
-        try:
-            waiting: dict[Future[ClassEntry], str] = {}
-            for each in found:
-                digest = _digest(each)
-                known = before.get((digest, made_with))
-                if known is not None and known.judged:
-                    entries[each.name] = replace(known, name=each.name)
-                else:
-                    waiting[pool.submit(_entry, judge, each, digest, made_with)] = each.name
-            while waiting:
-                for future in wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED).done:
-                    entries[waiting.pop(future)] = future.result()
-                    if table is not None:
-                        write(table, _in_order(found, entries, code_of))
-                progress(1 - len(waiting) / len(found))
-        finally:
-            judge.stop.set()
-            pool.shutdown(wait=False, cancel_futures=True)
+        work: dict[str, Callable[[], ClassEntry]] = {}
+        for each in found:
+            digest = _digest(each)
+            known = before.get((digest, made_with))
+            if known is not None and known.judged:
+                entries[each.name] = replace(known, name=each.name)
+            else:
+                work[each.name] = partial(_entry, judge, each, digest, made_with)
+
+        def ended(name: str, entry: ClassEntry) -> None:
+            entries[name] = entry
+            if table is not None:
+                write(table, _in_order(found, entries, code_of))
+
+        in_parallel(
+            work,
+            jobs,
+            ended,
+            stop=judge.stop.set,
+            progress=lambda waiting: progress(1 - waiting / len(found)),
+        )
     done = _in_order(found, entries, code_of)
     if table is not None:
         write(table, done)
