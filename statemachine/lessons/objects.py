@@ -17,7 +17,7 @@ from ..interface import Array, Data, Model, make_data, step
 from ..interface.checks import as_count
 from ..page import Page, Question, Table, Text, Verdict
 from ..scenarios.provenance import Provenance, provenance
-from ..scenarios.runs import Progress
+from ..scenarios.runs import Progress, part_of
 from ._words import WORDS, differences, page_of, sentence, typed, where
 from .records import Session
 from .session import CodeRun
@@ -107,8 +107,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Object
                 step(model, data)
             singly.append(data.qpos.copy())
         progress(0.5 + 0.25 * (k + 1) / worlds)
-    together = _in_turn(model, worlds)
-    progress(1.0)
+    together = _in_turn(model, worlds, part_of(progress, 0.75, 0.25))
     after = _arrays(model)
     return Objects(
         loading=loading,
@@ -125,15 +124,16 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Object
     )
 
 
-def _in_turn(model: Model, count: int) -> list[Array]:
+def _in_turn(model: Model, count: int, progress: Progress) -> list[Array]:
     """Where each of several Data ends if they take their steps in turn."""
     worlds = [make_data(model) for _ in range(count)]
     try:
         for k, data in enumerate(worlds):
             _command(model, data, k, count)
-        for _ in range(_STEPS):
+        for number in range(_STEPS):
             for data in worlds:
                 step(model, data)
+            progress((number + 1) / _STEPS)
         return [data.qpos.copy() for data in worlds]
     finally:
         for data in worlds:
