@@ -11,7 +11,6 @@ import weakref
 from collections.abc import Iterator
 from typing import Any, Literal
 
-import mujoco
 import numpy as np
 
 from ..errors import ModelError
@@ -25,7 +24,7 @@ from ._bullet_plan import Plan, floats
 from ._bullet_surfaces import Solid
 from .compiled import gravity
 
-_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+_PARTS = 0.05  # of an overlap that a step undoes; by the engine's 0.2 meshes that overlap fly apart
 _AWAY = 1000.0  # [m] between bodies that a reset has set apart
 _TILT = 5e-4  # half the angle [rad] by which it tilts a free body to find its contacts
 _REST = math.sqrt(1 - 2 * _TILT**2)
@@ -115,7 +114,10 @@ class World:
             return
         if kind == "stepped":
             pb.setPhysicsEngineParameter(
-                deterministicOverlappingPairs=1, physicsClientId=self.client
+                deterministicOverlappingPairs=1,
+                globalCFM=plan.softness,
+                contactERP=_PARTS,
+                physicsClientId=self.client,
             )
         pb.setTimeStep(raw.opt.timestep, self.client)
         self._add_planes()
@@ -154,7 +156,7 @@ class World:
             | pb.URDF_USE_SELF_COLLISION_INCLUDE_PARENT  # which pairs meet, _take_surfaces says
             | pb.URDF_USE_IMPLICIT_CYLINDER  # else a polygon, and a millimetre too large
         )
-        with as_file(text) as name, silence() as said:
+        with as_file(text, self._plan.beside(root, kind)) as name, silence() as said:
             try:
                 body = pb.loadURDF(
                     name,
@@ -210,10 +212,8 @@ class World:
         """Friction of links, and which of them meet."""
         known = self._surfaces
         links = []
-        for k, (body, link, solid) in enumerate(self.solids()):
+        for k, (body, link, _) in enumerate(self.solids()):
             links.append((body, link))
-            if (self._raw.geom_type[list(solid.geoms)] == _MESH).any():  # else 1 mm too large
-                pb.changeDynamics(body, link, collisionMargin=0, physicsClientId=self.client)
             pb.changeDynamics(
                 body,
                 link,
