@@ -4,8 +4,8 @@ MuJoCo collides a mesh as its convex hull, which the compiled model has. So PyBu
 that hull, whatever file the mesh came from, if any. An ellipsoid becomes a hull as well.
 
 PyBullet puts a margin of 1 mm around each hull, and takes it off again (`collisionMargin=0`) only
-where the hull is all that a free body has, and is not turned in it. So hulls are made smaller by it:
-their faces are then where they belong, and their edges are rounded.
+where the hull is all that a free body has, and is not turned in it. So hulls are made smaller by
+it: their faces are then where they belong, and their edges are rounded.
 """
 
 from __future__ import annotations

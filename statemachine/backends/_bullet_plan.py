@@ -18,6 +18,8 @@ _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 # which it grips soon and the eigenvalue of `_padding` is 0.97 at most.
 _SHARE, _BEARABLE, _SAMPLE = 3 / 28, 1.5, 20
 _YIELDS = 0.01
+# PyBullet has room for 128 numbers of a tree, and goes on without a word beyond it.
+MOST_PARTS = 120
 
 
 class Plan:
@@ -80,6 +82,11 @@ class Plan:
             }
         return self._hulls[root, kind]
 
+    def _room_for_tips(self, root: int) -> bool:
+        raw = self.raw
+        sites = np.count_nonzero(raw.body_rootid[raw.site_bodyid] == root)
+        return urdf.parts(raw, root) + sites <= MOST_PARTS
+
     def _hull_geoms(self, kind: str) -> frozenset[int]:
         """Geoms that touch and are read as hulls; as it comes, meshes come from their files."""
         raw, found = self.raw, set[int]()
@@ -99,6 +106,7 @@ class Plan:
             dynamics=kind == "engine",
             anchored=bool(root) and not floats(self.raw, root),
             padding=self.padding if kind == "stepped" else None,
+            tips=kind != "stepped" and self._room_for_tips(root),
             hulls=self._hull_geoms(kind),
         )
         return urdf.write(self.raw, root, dialect, self.names)

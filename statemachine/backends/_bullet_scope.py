@@ -11,12 +11,10 @@ import numpy as np
 from ..errors import UnsupportedError
 from ..interface import Array, JointType
 from ._bullet_hulls import ELLIPSOID, HULLS, MARGIN, allowance, roughness
-from ._bullet_plan import Plan
+from ._bullet_plan import MOST_PARTS, Plan
 from ._bullet_surfaces import NO_CONTACT, PLANE
-from ._bullet_urdf import axes, tree
+from ._bullet_urdf import axes, parts, tree
 
-# PyBullet has room for 128 numbers of a tree, and goes on without a word beyond it.
-_MOST = 120
 _FREE, _BALL = int(JointType.FREE), int(JointType.BALL)
 _SOLIDS = [
     int(kind)
@@ -168,14 +166,11 @@ def _bodies(raw: mujoco.MjModel) -> Found:
         if raw.body_mocapid[b] >= 0:
             yield "mocap body", f"body {name} is one"
         if not raw.body_parentid[b]:
-            bodies = tree(raw, b)
-            joints = sum(len(axes(raw, each)) for each in bodies)
-            sites = int(np.isin(raw.site_bodyid, bodies).sum())
-            if len(bodies) + joints + sites > _MOST:
+            count = parts(raw, b)
+            if count > MOST_PARTS:
                 yield (
                     "a tree of so many parts",
-                    f"{name} has {len(bodies)} bodies, {joints} joints and {sites} sites: "
-                    f"more than {_MOST} together",
+                    f"{name} has {count} bodies and joints: more than {MOST_PARTS}",
                 )
         if not raw.body_parentid[b] and raw.body_jntnum[b] and not axes(raw, b):
             rest = len(tree(raw, b)) - 1

@@ -41,6 +41,7 @@ class Dialect:
         anchored: Fix the root to a massless link "world", at its place. PyBullet's
             inverse dynamics takes gravity in the principal axes of a fixed base, which
             is gravity in another direction unless the base has no mass.
+        tips: Write a link for each site.
         hulls: Geoms that are read from a file of their own, see `hull_file`.
         padding: (nv,) J of each degree of freedom. The link that a hinge carries gets
             J times `padding_shape` [kg m²] more inertia about its centre of mass, the
@@ -54,6 +55,7 @@ class Dialect:
     dynamics: bool = True
     anchored: bool = False
     padding: Array | None = None
+    tips: bool = True
     hulls: frozenset[int] = frozenset()
 
 
@@ -72,6 +74,12 @@ def axes(raw: mujoco.MjModel, body: int) -> list[int]:
     start = int(raw.body_jntadr[body])
     joints = range(start, start + int(raw.body_jntnum[body]))
     return [j for j in joints if raw.jnt_type[j] in (int(JointType.HINGE), int(JointType.SLIDE))]
+
+
+def parts(raw: mujoco.MjModel, root: int) -> int:
+    """How many bodies and joints a tree has."""
+    bodies = tree(raw, root)
+    return len(bodies) + sum(len(axes(raw, body)) for body in bodies)
 
 
 def write(
@@ -97,7 +105,7 @@ def write(
         lines += _link(raw, body, dialect, names)
         if body != root or on_world:
             lines += _joints(raw, body, root, dialect, names)
-    for site in range(raw.nsite):
+    for site in range(raw.nsite if dialect.tips else 0):
         if raw.body_rootid[raw.site_bodyid[site]] == root and root:
             lines += _tip(raw, site, names)
     return "\n".join([*lines, "</robot>", ""])

@@ -41,7 +41,7 @@ class Tree:
         dofs: Their degrees of freedom; of a free joint, its first.
         qpos, qvel: What of these arrays is the tree's: a slice where that is enough.
         links: PyBullet's index of each body's link; -1 is the base.
-        tips: PyBullet's index of each site's link.
+        tips: PyBullet's index of each site's link, where it has one.
     """
 
     def __init__(self, plan: Plan, root: int, body: int, client: int) -> None:
@@ -55,7 +55,7 @@ class Tree:
         sites = [
             s for s in range(raw.nsite) if root and raw.body_rootid[raw.site_bodyid[s]] == root
         ]
-        self.tips = {s: indices[names.tips[s]] for s in sites}
+        self.tips = {s: indices[names.tips[s]] for s in sites if names.tips[s] in indices}
         by_name = {names.joints[j]: j for b in bodies for j in urdf.axes(raw, b)}
         moving = [(info[0], by_name[info[1].decode()]) for info in infos if info[3] >= 0]
         ids = [joint for _, joint in moving] or [int(raw.body_jntadr[root])] * self.free
@@ -79,6 +79,7 @@ class World:
     Attributes:
         client: What PyBullet's functions want as `physicsClientId`.
         trees: The trees of the model, the world's own geoms first.
+        geoms_of_links: By PyBullet's body and link, MuJoCo's body and its geoms that touch.
     """
 
     def __init__(self, plan: Plan, kind: Literal["stepped", "ghost", "engine"]) -> None:
@@ -123,7 +124,10 @@ class World:
         self._add_planes()
         if kind == "stepped":
             self._take_surfaces()
-        self._solid_links = [(body, link) for body, link, _ in self.solids()]
+        self.geoms_of_links = {
+            (body, link): (solid.body, solid.geoms) for body, link, solid in self.solids()
+        }
+        self._solid_links = list(self.geoms_of_links)
         self._homes = [
             (body, pb.getBasePositionAndOrientation(body, self.client))
             for body in (*(tree.body for tree in self.trees), *self._planes.values())
