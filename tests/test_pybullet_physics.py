@@ -361,6 +361,13 @@ def test_the_force_limit_of_a_joint(tmp_path: Path) -> None:
     assert apart(models, 100, 0.0, ctrl=-1.0) < 1e-9
 
 
+def test_a_servo_beyond_the_force_limit_of_its_joint_has_no_damping(tmp_path: Path) -> None:
+    """Its kv is then no part of the implicit inertia: it would slow a joint that is held."""
+    servo = '<actuator><position joint="j0" kp="50" kv="3"/></actuator>'
+    text = chain('actuatorfrcrange="-.1 .1" armature=".01"')
+    assert apart(both(tmp_path, text, rest=servo), 300, 0.0, ctrl=1.5) < 1e-9
+
+
 def test_a_joint_on_its_limit_is_no_slower(tmp_path: Path) -> None:
     """Counted, not timed: friction and limit of one joint are found in a few solutions."""
     from statemachine.backends import _bullet_law
