@@ -23,7 +23,11 @@ PACKAGES = {
     "robosuite": "robosuite",
 }
 TARGET = Path(__file__).parent / "robots_packages.md"
-_HEAD = """# The models of some packages
+_HEAD = """---
+orphan: true
+---
+
+# The models of some packages
 
 Made by `docs/make_robots.py`, for [any folder of models](robots.md), where the columns are
 explained. A file that a package does not ship, as a mesh, makes MuJoCo refuse the model.

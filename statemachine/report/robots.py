@@ -218,6 +218,7 @@ def _one(survey: Survey, row: ExaminedModel) -> Page:
             [_NOTHING if cost is None else f"{cost:.3g} ×" for cost in costs],
         )
     )
+    lines = [(what, cells) for what, cells in lines if set(cells) != {_NOTHING}]
     table = Table(
         ("", *names), [(what, *cells) for what, cells in lines], words=frozenset(range(9))
     )
@@ -226,7 +227,9 @@ def _one(survey: Survey, row: ExaminedModel) -> Page:
         for when, text in (("", found.refusal), (" with contacts off", found.refusal_without)):
             if text and not (when and text == found.refusal):
                 blocks.append(Text(f"{name} refuses it{when}: {text}"))
-        blocks += [Text(f"{name} warns: {text}") for text in found.warnings]
+        blocks += [
+            Text(f"{name} warns: {text}") for text in found.warnings or found.warnings_without
+        ]
         refused = dict.fromkeys(word for word in found.scenarios.values() if word != RUNS)
         for reason in refused:
             which = [scenario for scenario, word in found.scenarios.items() if word == reason]
