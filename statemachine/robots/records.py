@@ -111,7 +111,7 @@ class WitnessRow:
 
     Attributes:
         grade: "own reading" or "same reading"; "" where it refuses.
-        refusal: Why.
+        refusal: Why; of a same reading, why it has none of its own.
         frames: How many bodies or sites were compared.
         gap: The largest distance between the engine's and its own [m].
     """
