@@ -52,6 +52,7 @@ def check(plan: Plan, backend: str) -> None:
         backend=backend,
         feature=feature,
         reason=reason,
+        features=tuple(dict.fromkeys(what for what, _ in found)),
     )
 
 
