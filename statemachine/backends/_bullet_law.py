@@ -95,7 +95,9 @@ class Law:
         self._rub_weight = weight + self._rub_r
 
         limited = raw.jnt_limited[joints].astype(bool) & (not (off["limit"] or off["constraint"]))
-        self._low, self._high = _range(raw.jnt_range[joints], limited)
+        # A limit acts from its margin on, and as if it were there.
+        margin = raw.jnt_margin[joints][:, None] * [1.0, -1.0]
+        self._low, self._high = _range(raw.jnt_range[joints] + margin, limited)
         self._ranges = list(zip(self._low.tolist(), self._high.tolist(), strict=True))
         self._solimp, self._weight = raw.jnt_solimp[joints], weight
         self._stop_b, self._stop_k = _spring(raw.jnt_solref[joints], self._solimp, floor)
