@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import weakref
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -281,6 +281,16 @@ class World:
                     physicsClientId=self.client,
                 )
 
+    def put_joints(self, qpos: Array) -> None:
+        """Set the positions of joints, in a world that is never stepped."""
+        for tree in self.trees:
+            pb.resetJointStatesMultiDof(
+                tree.body,
+                tree.joints,
+                [[q] for q in qpos[tree.qpos].tolist()],
+                physicsClientId=self.client,
+            )
+
     def _put_free(self, tree: Tree, qpos: Array, qvel: Array) -> None:
         body, qpos, qvel = tree.body, qpos[tree.qpos], qvel[tree.qvel]
         centre, axes = self._frames[body]
@@ -324,13 +334,14 @@ class World:
         spin = turned((-x, -y, -z, w), spin)
         return [px, py, pz, w, x, y, z], [vx, vy, vz, *spin]
 
-    def link_states(self, tree: Tree) -> list[Any]:
-        """Centre of mass, and its axes (x, y, z, w), of a tree's bodies, then of its sites."""
-        links = [*tree.links.values(), *tree.tips.values()]
+    def link_states(self, tree: Tree, links: Mapping[int, int]) -> tuple[Array, Array]:
+        """Centres of mass (n, 3), and their axes (n, 4) (x, y, z, w), of a tree's links."""
+        if not links:
+            return np.empty((0, 3)), np.empty((0, 4))
         found = pb.getLinkStates(
-            tree.body, links, computeForwardKinematics=1, physicsClientId=self.client
+            tree.body, list(links.values()), computeForwardKinematics=1, physicsClientId=self.client
         )
-        return [state[:2] for state in found]
+        return np.array([state[0] for state in found]), np.array([state[1] for state in found])
 
     def contact_points(self) -> list[Any]:
         """PyBullet's contact points of the last collision detection."""
