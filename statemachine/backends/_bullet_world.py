@@ -24,7 +24,6 @@ from ._bullet_plan import Plan, floats
 from ._bullet_surfaces import Solid
 from .compiled import gravity
 
-_PARTS = 0.05  # of an overlap that a step undoes; by the engine's 0.2 meshes that overlap fly apart
 _AWAY = 1000.0  # [m] between bodies that a reset has set apart
 _TILT = 5e-4  # half the angle [rad] by which it tilts a free body to find its contacts
 _REST = math.sqrt(1 - 2 * _TILT**2)
@@ -115,10 +114,7 @@ class World:
             return
         if kind == "stepped":
             pb.setPhysicsEngineParameter(
-                deterministicOverlappingPairs=1,
-                globalCFM=plan.softness,
-                contactERP=_PARTS,
-                physicsClientId=self.client,
+                deterministicOverlappingPairs=1, physicsClientId=self.client
             )
         pb.setTimeStep(raw.opt.timestep, self.client)
         self._add_planes()
@@ -212,8 +208,13 @@ class World:
             body, link = (self._planes[solid.geoms[0]], -1) if solid.plane else links[solid.body]
             yield body, link, solid
 
+    def soften(self) -> None:
+        """Let contacts yield to their own force, by the model's `softness`."""
+        pb.setPhysicsEngineParameter(globalCFM=self._plan.softness, physicsClientId=self.client)
+
     def _take_surfaces(self) -> None:
-        """Friction of links, and which of them meet."""
+        """Softness and friction of links, and which of them meet."""
+        self.soften()
         known = self._surfaces
         links = []
         for k, (body, link, _) in enumerate(self.solids()):
