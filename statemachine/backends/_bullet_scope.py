@@ -56,6 +56,7 @@ def check(plan: Plan, backend: str, path: Path | None) -> None:
         backend=backend,
         feature=feature,
         reason=reason,
+        features=tuple(dict.fromkeys(what for what, _ in found)),
     )
 
 
