@@ -23,7 +23,11 @@ PACKAGES = {
     "robosuite": "robosuite",
 }
 TARGET = Path(__file__).parent / "robots_packages.md"
-_HEAD = """# The models of some packages
+_HEAD = """---
+orphan: true
+---
+
+# The models of some packages
 
 Made by `docs/make_robots.py`, for [any folder of models](robots.md), where the columns are
 explained. A file that a package does not ship, as a mesh, makes MuJoCo refuse the model.
@@ -41,7 +45,7 @@ def main(folder: str) -> None:
         table = Path(folder).with_name(f"robots-{module}.json")
         survey = examine_all(find([root]), table=table)
         parts.append(f"## {name} {versions[name]}")
-        parts += [part for part in body(page(survey), lambda _: "") if part]
+        parts += [part for part in body(page(survey, widest=80), lambda _: "") if part]
     text = "\n\n".join(part.strip() for part in parts) + "\n"
     TARGET.write_text(text.replace(folder, "…"), "utf-8")
 

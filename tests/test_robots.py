@@ -213,7 +213,7 @@ ROW = ExaminedModel(
             equals_engine=True, restores=True, scenarios={"hold": "runs", "droop": "-"}, cost=1.01
         ),
         "pybullet": BackendRow(
-            "it has a tendon", "", ("tendon",), ("RK4",), None, False,
+            "it has a tendon", "", ("tendon",), ("RK4",), ("RK4",), None, False,
             RunGap(400, 4e-4, None, 2.5e-17, 0.0, 1.0, 3.0, "", 2.0), None,
         ),
     },
@@ -250,10 +250,12 @@ def test_what_is_wrong() -> None:
     far = RunGap(400, 1e-3, moved=1.0)
     assert not wrong()
     assert "two restores" in " ".join(ROW.wrong("mujoco"))
-    assert "nothing accounts for" in wrong(without_contacts=far, warnings=())
-    assert not wrong(without_contacts=far, warnings=("RK4 acts as Euler",))
-    assert not wrong(without_contacts=replace(far, shrinks=2.0), warnings=())
-    assert "nothing accounts" in wrong(without_contacts=replace(far, shrinks=1.0), warnings=())
+    assert "nothing accounts for" in wrong(without_contacts=far, warnings_without=())
+    assert not wrong(without_contacts=far, warnings_without=("RK4 acts as Euler",))
+    assert not wrong(without_contacts=replace(far, shrinks=2.0), warnings_without=())
+    assert "nothing accounts" in wrong(
+        without_contacts=replace(far, shrinks=1.0), warnings_without=()
+    )
     assert "stopped" in wrong(without_contacts=replace(far, ended="pybullet stopped"))
     assert "explodes" in wrong(with_contacts=replace(far, hinge=1e10))
     assert not wrong(with_contacts=replace(far, hinge=3.0))  # contacts may part

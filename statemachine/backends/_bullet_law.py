@@ -95,7 +95,9 @@ class Law:
         self._rub_weight = weight + self._rub_r
 
         limited = raw.jnt_limited[joints].astype(bool) & (not (off["limit"] or off["constraint"]))
-        self._low, self._high = _range(raw.jnt_range[joints], limited)
+        # A limit acts from its margin on, and as if it were there.
+        margin = raw.jnt_margin[joints][:, None] * [1.0, -1.0]
+        self._low, self._high = _range(raw.jnt_range[joints] + margin, limited)
         self._ranges = list(zip(self._low.tolist(), self._high.tolist(), strict=True))
         self._solimp, self._weight = raw.jnt_solimp[joints], weight
         self._stop_b, self._stop_k = _spring(raw.jnt_solref[joints], self._solimp, floor)
@@ -173,11 +175,16 @@ class Law:
         passive, damped, wanted = linear[:n], linear[n : 2 * n], linear[2 * n :] + aim
         force = np.minimum(np.maximum(wanted, self._low_force), self._high_force)
         actuator = force if self._straight else dense.times(self._gear, force)
-        if self._fence is not None:
-            actuator = np.minimum(np.maximum(actuator, self._fence[0]), self._fence[1])
         inertia = self._unsaturated
         if force.tobytes() != wanted.tobytes():
             inertia = self._with_slope(force == wanted)
+        if self._fence is not None:  # of whole joints: what drives one beyond it has no slope
+            within = np.minimum(np.maximum(actuator, self._fence[0]), self._fence[1])
+            if within.tobytes() != actuator.tobytes():
+                beyond = np.asarray(within != actuator, dtype=np.float64)
+                held = dense.times(np.abs(self._gear.T), beyond) > 0
+                inertia = self._with_slope((force == wanted) & ~held)
+                actuator = within
         explicit, implicit = mass + inertia
         dense.factored(explicit)
         dense.factored(implicit)

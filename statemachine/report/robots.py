@@ -16,14 +16,19 @@ _WIDEST = 28  # characters of a name
 _LISTED = 20  # of what is wrong, and of features
 
 
-def page(survey: Survey) -> Page:
-    """The table; of one model alone, all that was found of it."""
+def page(survey: Survey, widest: int = _WIDEST) -> Page:
+    """The table; of one model alone, all that was found of it.
+
+    Args:
+        survey: What was found.
+        widest: Characters of a model's name.
+    """
     if len(survey.models) == 1 and not survey.parts:
         return _one(survey, survey.models[0])
     others = _others(survey)
     headers = ["model", "bits", *_headers(others), "witness", "runs", "cost"]
     words = frozenset({0, 1, len(headers) - 3, len(headers) - 2})
-    rows = [_row(survey, row, others) for row in survey.models]
+    rows = [[_short(row.file, widest), *_row(survey, row, others)] for row in survey.models]
     blocks: list[Block] = [
         Table(headers, rows, words=words, wide=frozenset({len(headers) - 1})),
         Text(_legend(survey), small=True),
@@ -64,12 +69,12 @@ def _row(survey: Survey, row: ExaminedModel, others: Sequence[str]) -> list[str]
             _gap(row, other, without=False),
         )
     ]
-    return [_short(row.file), _bits(survey, row), *gaps, _witness(row), _runs(row), _cost(row)]
+    return [_bits(survey, row), *gaps, _witness(row), _runs(row), _cost(row)]
 
 
-def _short(name: str) -> str:
+def _short(name: str, widest: int) -> str:
     """The end of a long name, which tells more than its beginning."""
-    return name if len(name) <= _WIDEST else f"…{name[-_WIDEST + 1 :]}"
+    return name if len(name) <= widest else f"…{name[1 - widest :]}"
 
 
 def _bits(survey: Survey, row: ExaminedModel) -> str:
@@ -218,6 +223,7 @@ def _one(survey: Survey, row: ExaminedModel) -> Page:
             [_NOTHING if cost is None else f"{cost:.3g} ×" for cost in costs],
         )
     )
+    lines = [(what, cells) for what, cells in lines if set(cells) != {_NOTHING}]
     table = Table(
         ("", *names), [(what, *cells) for what, cells in lines], words=frozenset(range(9))
     )
@@ -226,7 +232,9 @@ def _one(survey: Survey, row: ExaminedModel) -> Page:
         for when, text in (("", found.refusal), (" with contacts off", found.refusal_without)):
             if text and not (when and text == found.refusal):
                 blocks.append(Text(f"{name} refuses it{when}: {text}"))
-        blocks += [Text(f"{name} warns: {text}") for text in found.warnings]
+        blocks += [
+            Text(f"{name} warns: {text}") for text in found.warnings or found.warnings_without
+        ]
         refused = dict.fromkeys(word for word in found.scenarios.values() if word != RUNS)
         for reason in refused:
             which = [scenario for scenario, word in found.scenarios.items() if word == reason]
@@ -274,7 +282,10 @@ def _witness_words(row: ExaminedModel) -> str:
     assert witness is not None
     if witness.gap is None:
         return f"The witness refuses it: {sentence(witness.refusal)}"
-    return (
+    text = (
         f"The witness, by its {witness.grade}, places {count(witness.frames, 'frame')} within "
         f"{rough(witness.gap)} m of the engine."
     )
+    if witness.refusal:
+        text += f" It has no reading of its own: {sentence(witness.refusal)}"
+    return text

@@ -7,7 +7,7 @@ crashes leaves what was found before it.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -114,7 +114,7 @@ class _Examination:
         self.tell(self.row, f"loading, {backend}")
         refusals: dict[bool, str] = {}
         features: tuple[str, ...] = ()
-        told: list[str] = []
+        told: dict[bool, tuple[str, ...]] = {}
         for contacts, kept in ((True, self.models), (False, self.without)):
             options: dict[str, Any] = {} if contacts else {"contacts": False}
             with warnings.catch_warnings(record=True) as caught:
@@ -132,18 +132,30 @@ class _Examination:
                     refusals[contacts] = " ".join(words.split())
                     fault = f"loading, {backend}: {refusals[contacts]}"
                     self.row = replace(self.row, faults=(*self.row.faults, fault[:300]))
-            told += [
-                " ".join(str(each.message).split())
-                for each in caught
-                if issubclass(each.category, EngineWarning)
-            ]
+            told[contacts] = self._of_its_own(backend, caught)
         self._put(
             backend,
             refusal=refusals[True],
             refusal_without=refusals[False],
             features=features,
-            warnings=tuple(dict.fromkeys(told)),
+            warnings=told[True],
+            warnings_without=told[False],
         )
+
+    def _of_its_own(
+        self, backend: str, caught: Sequence[warnings.WarningMessage]
+    ) -> tuple[str, ...]:
+        """Warnings of a backend that the default one did not give, too, each once."""
+        texts = [
+            " ".join(str(each.message).split())
+            for each in caught
+            if issubclass(each.category, EngineWarning)
+        ]
+        first = self.row.backends.get(DEFAULT)
+        if first is not None and backend != DEFAULT:
+            known = [text.partition(": ")[2] for text in first.warnings]
+            texts = [text for text in texts if not any(text.endswith(each) for each in known)]
+        return tuple(dict.fromkeys(texts))
 
     def _sizes(self, model: Model) -> None:
         sizes = {name: int(getattr(model, name)) for name in ("nq", "nv", "nu", "nbody", "ngeom")}

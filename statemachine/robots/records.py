@@ -63,7 +63,8 @@ class BackendRow:
         refusal: Why it does not load; "" if it does.
         refusal_without: The same with contacts off.
         features: What of the model is refused, each in a few words.
-        warnings: What was told when it was loaded.
+        warnings: What was told when it was loaded, and the default backend did not tell.
+        warnings_without: The same with contacts off.
         equals_engine: Whether a run has the bits of the engine without us; None if not asked.
         restores: Whether two futures of one State are the same bits, and, where the backend
             promises it, those of the run itself; None if not asked.
@@ -77,6 +78,7 @@ class BackendRow:
     refusal_without: str = ""
     features: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    warnings_without: tuple[str, ...] = ()
     equals_engine: bool | None = None
     restores: bool | None = None
     without_contacts: RunGap | None = None
@@ -99,7 +101,7 @@ class BackendRow:
         gap = self.without_contacts
         if gap is None:
             return False
-        beyond = gap.largest > TOLERANCE and not gap.first_order and not self.warnings
+        beyond = gap.largest > TOLERANCE and not gap.first_order and not self.warnings_without
         return beyond or bool(gap.ended)
 
 
@@ -109,7 +111,7 @@ class WitnessRow:
 
     Attributes:
         grade: "own reading" or "same reading"; "" where it refuses.
-        refusal: Why.
+        refusal: Why; of a same reading, why it has none of its own.
         frames: How many bodies or sites were compared.
         gap: The largest distance between the engine's and its own [m].
     """
