@@ -205,7 +205,7 @@ def longer(results: Mapping[str, Gravity]) -> list[Any]:
     blocks: list[Any] = [
         Text(
             "What caught it? Here are two longer runs with the servos off: one as before, and "
-            "one in which nothing can touch anything."
+            "one with contacts switched off."
         ),
         Table(
             ("time", *(name.replace(": ", "\n") for name in columns)),

@@ -54,10 +54,10 @@ def code(model: Model, options: Mapping[str, Any], load: str) -> str:
 model = {load}
 limp = model.replace({off})  # another Model: servos off
 slot = model.jnt_qposadr[model.joint_id({options["joint"]!r})]
-for each in (model, limp):
-    data = sm.make_data(each)
+for variant in (model, limp):
+    data = sm.make_data(variant)
     {loop}
-        sm.step(each, data, {nstep})
+        sm.step(variant, data, {nstep})
         print({at}, end="  ")
     print()
 """
@@ -276,8 +276,8 @@ def _introduction(first: Gravity) -> str:
         text += "; it is zero, at the end too"
     if first.servo:
         return text + (
-            ". To a position servo zero is a target like any other: there is no fixed value "
-            "that means nothing. The second run has the servos switched off."
+            ". To a position servo zero is a target like any other: no value of ctrl means "
+            '"no command". The second run has the servos switched off.'
         )
     return f"{text}. No position servo drives {first.joint}."
 
