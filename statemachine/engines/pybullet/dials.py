@@ -31,6 +31,7 @@ from ..parts import Setting
 # What a fresh body has: a single-precision literal in the engine.
 BODY_DAMPING = float(np.float32(0.04))
 FRICTION = 0.5
+CONTACT_ERP = 0.08
 _FASTEST, _UNCLAMPED = 100.0, 1e9  # [rad/s]
 _WIDE = 1e6  # [rad or m] a range that no joint leaves
 _CLOSE = 1e-6  # relative: the engine reports some figures in single precision
@@ -294,8 +295,10 @@ def _rub(world: World, body: int, link: int, wanted: list[float]) -> None:
 
 
 def _harden(world: World) -> None:
-    """Contacts that do not yield, as in a fresh world."""
-    pb.setPhysicsEngineParameter(globalCFM=0.0, physicsClientId=world.client)
+    """Contacts as they are in a fresh world: they do not yield."""
+    pb.setPhysicsEngineParameter(
+        globalCFM=0.0, contactERP=CONTACT_ERP, physicsClientId=world.client
+    )
 
 
 def _fresh_surfaces(world: World, plan: Plan) -> None:
