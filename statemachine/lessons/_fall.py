@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison.text import apart, position
+from ..comparison.text import NONE, apart, position
 from ..engines.parts import LeftAlone
 from ..errors import UnsupportedError
 from ..interface import Array, Data, forward
@@ -111,7 +111,9 @@ class Droop:
     diverged: float | None = None
 
     def at(self, row: int, slide: bool, decimals: int = 2) -> str:
-        """A position of the joint as text."""
+        """A position of the joint as text; a slower engine's run may be shorter."""
+        if row >= len(self.position):
+            return NONE
         value = float(self.position[row])
         return "diverged" if np.isnan(value) else position(value, slide, decimals)
 
@@ -143,14 +145,12 @@ class Gravity:
     alone: tuple[LeftAlone, ...]
     provenance: Provenance
 
-    @property
     def runs(self) -> dict[str, Droop]:
         """Both runs by what is on; one where there is nothing to switch off."""
         if not self.drives:
             return {"nothing is driven": self.servos_off}
         return {f"{self.drives} on": self.servos_on, f"{self.drives} off": self.servos_off}
 
-    @property
     def off(self) -> str:
         """What is said of the longer runs."""
         return f"{self.drives} off" if self.drives else "nothing is driven"
@@ -264,7 +264,7 @@ def longer(results: Mapping[str, Gravity]) -> list[Any]:
     if not columns:
         return []
     first = next(iter(results.values()))
-    times = next(iter(columns.values())).time
+    times = max((run.time for run in columns.values()), key=len)
     what = f"with the {first.drives} off" if first.drives else "of the same"
     caught = "What caught it? " if first.servos_off.touching else ""
     several = (
@@ -279,7 +279,7 @@ def longer(results: Mapping[str, Gravity]) -> list[Any]:
                 (f"{time:.2f} s", *(run.at(k, first.slide) for run in columns.values()))
                 for k, time in enumerate(times)
             ],
-            title=f"{first.joint}, {first.off}, for longer",
+            title=f"{first.joint}, {first.off()}, for longer",
         ),
     ]
     for name, run in columns.items():
@@ -309,24 +309,28 @@ def longer(results: Mapping[str, Gravity]) -> list[Any]:
 
 
 def longer_apart(results: Mapping[str, Gravity]) -> list[tuple[str, Any]]:
-    """Rows of the differences: the ends of the longer runs."""
+    """Rows of the differences: the ends of the longer runs, as far as all of them go."""
     first = next(iter(results.values()))
+    rows = []
+    for label in first.longer:
+        runs = [each.longer[label] for each in results.values() if label in each.longer]
+        last = min(len(run.position) for run in runs) - 1
+        rows.append(
+            (f"{first.off()}, {label}, at {first.longer[label].time[last]:g} s", _gap(label, last))
+        )
+    return rows
 
-    def say(label: str) -> Any:
-        def gap(one: Gravity, two: Gravity) -> str:
-            if label not in one.longer or label not in two.longer:
-                return "–"
-            ends = [each.longer[label].position[-1] for each in (one, two)]
-            if not np.isfinite(ends).all():
-                return "one diverged"
-            return apart(abs(float(ends[0] - ends[1])), one.slide)
 
-        return gap
+def _gap(label: str, row: int) -> Any:
+    def say(one: Gravity, two: Gravity) -> str:
+        if label not in one.longer or label not in two.longer:
+            return NONE
+        ends = [each.longer[label].position[row] for each in (one, two)]
+        if not np.isfinite(ends).all():
+            return "one diverged"
+        return apart(abs(float(ends[0] - ends[1])), one.slide)
 
-    return [
-        (f"{first.off}, {label}, at {run.time[-1]:g} s", say(label))
-        for label, run in first.longer.items()
-    ]
+    return say
 
 
 def _caught(prefix: str, result: Gravity, floor: Droop, free: Droop) -> Text | Verdict:

@@ -62,17 +62,16 @@ class Hold:
     @property
     def error(self) -> Array:
         """(n+1,) the worst joint's distance to the goal [rad; of a slide, m]; NaN without one."""
-        away = np.abs(self.qpos - self.goal)[:, self.told]
+        away = np.abs(self.qpos - self.goal)[:, self.told()]
         return away.max(axis=1) if away.size else np.full(len(self.time), np.nan)
 
-    @property
     def told(self) -> list[int]:
         """Which of the joints have a goal."""
         return np.flatnonzero(np.isfinite(self.goal)).tolist()
 
 
 def question(first: Hold) -> Question | None:
-    if len(first.told) < len(first.joints):
+    if len(first.told()) < len(first.joints):
         return None
     gaps = np.abs(first.qpos[-1] - first.goal)
     away, (_, worst) = int((gaps > _THERE).sum()), largest(gaps)
@@ -101,7 +100,7 @@ def traces(results: Mapping[str, Hold]) -> list[Traces]:
             for name, result in results.items():
                 away = result.qpos - (result.goal if told else result.qpos[0])
                 for k, joint in enumerate(result.joints):
-                    if result.slides[k] is slide and (k in result.told) is told:
+                    if result.slides[k] is slide and (k in result.told()) is told:
                         path = (result.time.tolist(), (scale * away[:, k]).tolist())
                         curves[f"{where(results, name)}{joint}"] = path
             if curves:
@@ -154,7 +153,7 @@ def at_end(result: Hold) -> str:
         f"first at {result.first_contact:.3f} s: {together(result.touched)}; at the end: "
         f"{together(result.touching) or 'nothing'}"
     )
-    if not result.told:
+    if not result.told():
         return text + "."
     gaps = np.abs(result.qpos[-1] - result.goal)
     text += f". The joint farthest from its goal is then {_farthest(result, gaps)}"

@@ -65,6 +65,7 @@ class Stages:
             for bit what `forward` had computed before the step.
         of_after: And after how many it was what `forward` computes after it.
         site: Name of the fingertip: a site, or a body where there are none.
+        neither: Whether the model's integrator leaves what is derived from a stage of its own.
     """
 
     changes: tuple[Changes, ...]
@@ -74,6 +75,7 @@ class Stages:
     of_before: dict[str, int]
     of_after: dict[str, int]
     site: str
+    neither: bool
     provenance: Provenance
 
 
@@ -144,6 +146,7 @@ def find_stages(
                 fresh = now
                 if k % 50 == 0:
                     progress(k / steps)
+    stale = model.capabilities.behaviours["stale after a step"]
     return Stages(
         changes=changes,
         same=same,
@@ -152,6 +155,7 @@ def find_stages(
         of_before=of_before,
         of_after=of_after,
         site=tip.name,
+        neither=stale.support == "unsupported",
         provenance=provenance(model),
     )
 
@@ -290,9 +294,9 @@ def lag_section(
         left = [moved] + ["contacts"] * (stages.of_before["contacts"] == steps)
         if stages.of_after["contacts"] == steps:  # there were none
             left = [moved]
-        if stages.of_before[moved] == stages.of_after[moved] == 0:
+        if stages.neither:
             text = f"after a step {moved} is neither of the state before it nor of the one after: "
-            text += "an integrator of several stages, as RK4, leaves those of its last one."
+            text += "an integrator of several stages, as this RK4, leaves those of its last one."
             blocks.append(sentence(results, name, text))
             continue
         blocks.append(

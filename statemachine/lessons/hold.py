@@ -178,9 +178,9 @@ def page(results: Mapping[str, Hold], session: Session) -> Page:
             f" Each is a position servo: it pushes {law} {moves}. A script, a joystick and a "
             "trained policy all speak to the robot through this array."
         )
-    elif first.told:
+    elif first.told():
         text += (
-            f" {len(first.told)} of {first.actuators} are position servos: each pushes {law} "
+            f" {len(first.told())} of {first.actuators} are position servos: each pushes {law} "
             f"{moves}. To the others a number is no place: a motor takes it as a force, and has "
             "no goal."
         )
@@ -196,14 +196,14 @@ def page(results: Mapping[str, Hold], session: Session) -> Page:
         Text(text),
         *typed(session, question(first)),
     ]
-    for k in (k for k in first.told if first.goal[k] != first.target[k]):
+    for k in (k for k in first.told() if first.goal[k] != first.target[k]):
         blocks.append(
             Text(
                 f"{first.joints[k]} was asked for {at(first, first.target[k], k)}, beyond its "
                 f"range: the servo takes {at(first, first.goal[k], k)} for it."
             )
         )
-    if first.told:
+    if first.told():
         blocks.append(
             Table(
                 ("time", *results),
@@ -211,15 +211,17 @@ def page(results: Mapping[str, Hold], session: Session) -> Page:
                 title="The worst joint on the way: how far from its goal",
             )
         )
-    begins = len(first.told) < len(first.joints)  # of what has no goal the start is of interest
+    told = first.told()
+    begins = len(told) < len(first.joints)  # of what has no goal the start is of interest
     blocks.append(
         Table(
-            ("joint", *["start"] * begins, *["goal"] * bool(first.told), *results),
+            ("joint", *["start"] * begins, *["goal"] * bool(told), *results),
             [
                 (
                     joint,
                     *[at(first, first.qpos[0, k], k)] * begins,
-                    *[at(first, first.goal[k], k) if k in first.told else NONE] * bool(first.told),
+                    *[at(first, first.goal[k], k) if k in first.told() else NONE]
+                    * bool(first.told()),
                     *(at(result, result.qpos[-1, k], k) for result in results.values()),
                 )
                 for k, joint in enumerate(first.joints)
