@@ -15,27 +15,16 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13 python3.14; 
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null \
 	&& { echo $$p; break; }; done)
 
-.PHONY: help lesson test test-slow test-pythons test-newest check format hooks bench fuzz picture extras report urdf traces docs notebook student-kit autograder clean
+.PHONY: help lesson test test-slow test-pythons test-newest check format hooks bench fuzz picture extras report robots urdf traces docs notebook student-kit autograder clean
 
 help:
 	@sed -n 's/^# make /  make /p' Makefile
 
 lesson: $(VENV)/run.stamp
-	@# In a terminal it asks and waits; q ends it (9) at any prompt, and nothing follows.
+	@# In a terminal it asks and waits; q ends it at any prompt.
 	@# Both engines; one that cannot be had here is named in one line and left out.
-	@# 3: the witness cannot be had here; it has said so in one line.
-	@$(BIN)/statemachine lesson --stopped 9; code=$$?; \
-	if [ $$code -eq 9 ]; then echo "after: source $(BIN)/activate"; exit 0; fi; \
-	[ $$code -eq 0 ] || exit $$code; \
-	$(BIN)/statemachine fingertip --backend all || [ $$? -eq 3 ] || exit 1; \
-	echo "Where to go next:"; \
-	echo "  source $(BIN)/activate       makes statemachine a command of your shell"; \
-	echo "  statemachine                    everything that there is"; \
-	echo "  statemachine lesson gravity --backend all     on all engines, side by side"; \
-	echo "  statemachine lesson questions   check yourself"; \
-	echo "  python exercises/step_loop.py   then four functions for you to write"; \
-	echo "  statemachine compare hold --html hold.html     where two engines part, and why"; \
-	echo "  statemachine doctor             what this machine has, and what to do"
+	@$(BIN)/statemachine lesson --further
+	@echo "To make statemachine a command of your shell: source $(BIN)/activate"
 
 # worksteal: a process that has run its tests takes some of another's.
 PYTEST := python -m pytest -n auto --dist worksteal
@@ -109,6 +98,11 @@ report: $(VENV)/run.stamp
 	@# 1: they differ, which is what the page is about.
 	@$(BIN)/statemachine compare hold --html hold.html >/dev/null || [ $$? -eq 1 ]
 	@echo "hold.html: open it in a browser"
+
+# make robots       a table of the models in DIR: what each does on every engine (DIR=models)
+DIR ?= models
+robots: $(VENV)/run.stamp
+	@$(BIN)/statemachine robots $(DIR)
 
 # make traces       record on PyBullet anew what the package brings for where it has no wheel
 traces: $(VENV)/run.stamp

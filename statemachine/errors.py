@@ -79,7 +79,10 @@ class EngineError(StateMachineError, RuntimeError):
 
 
 class UnsupportedError(StateMachineError, NotImplementedError):
-    """A backend cannot do what was asked, and says so."""
+    """A backend cannot do what was asked, and says so.
+
+    `features` has every one that a model was refused for; `feature` is the first.
+    """
 
     backend: str
     feature: str

@@ -11,12 +11,15 @@ from typing import Any
 
 import pytest
 
+from statemachine.cli import main
 from statemachine.errors import BadInputError
 from statemachine.grading.class_table import as_csv
 from statemachine.grading.classroom import (
     Submission,
+    is_one_students,
     judge_all,
     not_looked_at,
+    submission_in,
     submissions,
 )
 from statemachine.grading.exercise import ExerciseJudge, Grade, Judgement
@@ -86,6 +89,41 @@ def test_what_is_a_submission(folder: Path) -> None:
         submissions([folder / "nobody"])
     with pytest.raises(BadInputError, match="no Python files in"):
         submissions([folder / "cy"])
+
+
+def test_the_folder_of_one_student_is_no_class(tmp_path: Path, judged: list[str]) -> None:
+    ida = tmp_path / "ida"
+    ida.mkdir()
+    (ida / "step_loop.py").write_text(SOLUTION.read_text())
+    (ida / "test_arm.py").write_text("def test_nothing(): ...\n")
+    (ida / "helper.py").write_text("X = 1\n")
+    assert is_one_students(ida)
+    (found,) = submissions([ida])
+    assert (found.name, found.path, found.folder) == ("ida", ida / "step_loop.py", ida)
+    assert [each.name for each in submissions([ida, tmp_path / "ida"])] == [ida.as_posix()]
+    assert not_looked_at([ida]) == []
+    (ida / "old").mkdir()
+    (ida / "old" / "step_loop.py").write_text(TEMPLATE.read_text())
+    assert not is_one_students(ida)  # whose is the other one?
+    assert not is_one_students(tmp_path)
+
+
+def test_a_class_beside_the_template_stays_a_class(folder: Path) -> None:
+    (folder / "step_loop.py").write_text(TEMPLATE.read_text())
+    assert not is_one_students(folder)
+    assert len(submissions([folder])) == 7
+
+
+def test_of_several_files_the_exercises_own_name_counts(tmp_path: Path) -> None:
+    for name in ("step_loop.py", "mine.py"):
+        (tmp_path / name).write_text(TEMPLATE.read_text())
+    assert submission_in(tmp_path) == tmp_path / "step_loop.py"
+
+
+def test_a_folder_with_nothing_but_tests(tmp_path: Path) -> None:
+    (tmp_path / "test_arm.py").write_text("def test_nothing(): ...\n")
+    with pytest.raises(BadInputError, match=r"Did you mean .* --mutants .*test_arm.py\?"):
+        submission_in(tmp_path)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
@@ -253,6 +291,42 @@ def test_a_folder_from_the_command_line(cli: Cli, folder: Path, tmp_path: Path) 
     again = cli(*command, "--json")
     passed = [sum(f["passed"] for f in e["functions"]) for e in json.loads(again.stdout)]
     assert passed == [4, 0, 0, 4, 0]
+
+
+def test_a_students_folder_from_the_command_line(tmp_path: Path, judged: list[str]) -> None:
+    (tmp_path / "step_loop.py").write_text(SOLUTION.read_text())
+    assert main(["check", str(tmp_path)]) == 0
+    assert judged == ["step_loop.py"]
+    table = tmp_path / "grades.csv"
+    assert main(["check", str(tmp_path), "--csv", str(table)]) == 0
+    (row,) = csv.DictReader(table.read_text(encoding="utf-8-sig").splitlines())
+    assert row["file"] == tmp_path.name
+
+
+@pytest.mark.parametrize("option", ["--csv", "--gradescope"])
+@pytest.mark.parametrize(
+    ("target", "says"),
+    [
+        ("/nope/x", "there is no folder"),
+        ("", "expected the name of a file"),
+        (str(ROOT), "is a folder; name a file in it"),
+    ],
+)
+def test_where_to_write_is_asked_before_anything_is_judged(
+    option: str,
+    target: str,
+    says: str,
+    judged: list[str],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    files = [str(SOLUTION)] if option == "--gradescope" else [str(SOLUTION), str(TEMPLATE)]
+    try:
+        code: object = main(["check", *files, option, target])
+    except SystemExit as refused:
+        code = refused.code
+    assert code == 2
+    assert says in capsys.readouterr().err
+    assert judged == []
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from rich.cells import cell_len
 
 from statemachine.lessons import LESSONS
 
-from .conftest import Cli, need_engine
+from .conftest import ROOT, Cli, need_engine
 
 QUICK = {
     "speed": ("--steps", "200"),
@@ -343,11 +344,22 @@ def test_a_terminal_without_unicode(cli: Cli) -> None:
 def test_doctor(cli: Cli) -> None:
     findings = {f["name"]: f for f in json.loads(cli("doctor", "--json").stdout)["findings"]}
     assert findings.keys() == {
-        "python", "mujoco", "pybullet", "pinocchio", "rendering", "import name",
+        "python", "mujoco", "pybullet", "pinocchio", "rendering", "viser", "import name",
     }  # fmt: skip
     assert findings["mujoco"]["works"]
+    assert findings["viser"]["optional"]
     page = cli("doctor").stdout
     assert max(map(len, page.splitlines())) <= 80
+
+
+def test_the_doctor_says_what_the_viewer_lacks(cli: Cli, tmp_path: Path) -> None:
+    (tmp_path / "viser.py").write_text("raise ImportError('gone')\n")
+    path = os.pathsep.join((str(tmp_path), str(ROOT)))
+    done = cli("doctor", "--json", PYTHONPATH=path)
+    assert done.returncode == 0  # the lessons need no viewer
+    (viewer,) = (f for f in json.loads(done.stdout)["findings"] if f["name"] == "viser")
+    assert not viewer["works"]
+    assert "pip install 'statemachine-sim[view]'" in viewer["found"]
 
 
 def test_version(cli: Cli) -> None:

@@ -257,12 +257,14 @@ def test_documentation_on_an_engine_that_is_missing(tmp_path: Path) -> None:
 
 def test_a_prediction_in_the_notebook_is_judged() -> None:
     right = station("state", prediction="c")._repr_markdown_()
-    assert "✓ as you said" in right
-    assert "✗ you said a; it is c" in station("state", prediction=" A ")._repr_markdown_()
+    assert "You predicted it: c." in right
+    wrong = station("state", prediction=" A ")._repr_markdown_()
+    assert "You predicted a; it is c." in wrong
+    assert "✗" not in wrong  # which marks a claim that does not hold
     assert "You made no prediction. The run says: c) 12" in station("state")._repr_markdown_()
-    for wrong in ("d", "cc", "1", "?"):
+    for letters in ("d", "cc", "1", "?"):
         with pytest.raises(BadInputError, match="a prediction is a letter"):
-            station("state", prediction=wrong)
+            station("state", prediction=letters)
 
 
 def test_the_notebook_asks_before_the_code_that_answers() -> None:

@@ -10,10 +10,12 @@ import os
 import pty
 import re
 import select
+import shutil
 import struct
 import subprocess
 import sys
 import termios
+import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -24,6 +26,8 @@ import pytest
 from rich.cells import cell_len
 
 import statemachine as sm
+from statemachine.cli import main
+from statemachine.commands import lesson as lesson_command
 from statemachine.errors import StateMachineError
 from statemachine.lessons import LESSONS, STATIONS, module
 from statemachine.lessons.in_turns import Ratio
@@ -506,12 +510,12 @@ def test_a_prediction_is_asked_for_before_the_answer() -> None:
     seen = _at_a_terminal("lesson", "state", typed=[("Your prediction", "c\n")])
     question, prompt = seen.index("How many has qvel?"), seen.index("Your prediction")
     assert question < prompt < seen.index("13 12 6")
-    assert "as you said" in seen
-    assert seen.index("as you said") > seen.index("13 12 6")
-    assert "you said a; it is c" in _at_a_terminal(
+    assert "You predicted it" in seen
+    assert seen.index("You predicted it") > seen.index("13 12 6")
+    assert "You predicted a; it is c" in _at_a_terminal(
         "lesson", "state", typed=[("Your prediction", "x\n"), ("Your prediction", "a\n")]
     )
-    assert "you said" not in _at_a_terminal(
+    assert "You predicted" not in _at_a_terminal(
         "lesson", "state", typed=[("Your prediction", "\n")]
     )  # passed
     assert "Your prediction" not in _at_a_terminal("lesson", "state", "--no-questions", typed=[])
@@ -567,7 +571,7 @@ def test_nothing_scrolls_away_unread(lesson: str, columns: int, lines: int) -> N
     typed = [("Your prediction", "a\n")] * (6 if lesson == "questions" else 1)
     seen = _at_a_terminal("lesson", lesson, typed=typed, columns=columns, lines=lines)
     assert max(_screens(seen, columns)) <= lines
-    assert re.search(r"you\s+said", seen)
+    assert re.search(r"You\s+predicted", seen)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
@@ -575,7 +579,7 @@ def test_it_waits_at_the_verdict_on_a_prediction() -> None:
     seen = _at_a_terminal("lesson", "state", typed=[("Your prediction", "a\n")], lines=200)
     assert seen.count(_MORE) == 1  # all the rest has room
     verdict, _, rest = seen.partition(_MORE)
-    assert "you said a; it is c" in verdict
+    assert "You predicted a; it is c" in verdict
     assert "Next:" not in verdict
     assert "Next:" in rest
     assert _MORE not in _at_a_terminal("lesson", "state", "--no-questions", typed=[], lines=9)
@@ -592,7 +596,7 @@ def test_q_ends_a_station_between_two_screens() -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 def test_the_six_questions_are_counted() -> None:
     seen = _at_a_terminal("lesson", "questions", typed=[("Your prediction", "a\n")] * 6)
-    right = seen.count("as you said")
+    right = seen.count("You predicted it")
     assert 0 < right < 6
     assert f"You had {right} of 6 right." in seen
     assert "Before you read on" not in seen
@@ -646,16 +650,13 @@ def test_answers_that_are_none(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_station_that_says_no_is_the_exit_code_of_the_path(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from statemachine.cli import main
-    from statemachine.commands import lesson as command
-
     ran = []
 
     def compute(options: Any, lesson: Any, model: str, values: Any) -> tuple[Page, dict[str, Any]]:
         ran.append(lesson.name)
         return Page("t", "o", [Verdict("v", lesson.name != "hold")]), {"mujoco": lesson.name}
 
-    monkeypatch.setattr(command, "_compute", compute)
+    monkeypatch.setattr(lesson_command, "_compute", compute)
     assert main(["lesson"]) == 1
     assert ran == [lesson.name for lesson in STATIONS]
     ran.clear()
@@ -664,22 +665,59 @@ def test_a_station_that_says_no_is_the_exit_code_of_the_path(
     assert '"gravity": {\n    "mujoco": "gravity"' in capsys.readouterr().out
 
 
-def test_a_script_can_tell_that_its_reader_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
-    from statemachine.cli import main
-    from statemachine.commands import lesson as command
+@pytest.fixture
+def short_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every station is one question, for somebody at a terminal."""
+    page = Page("t", "o", [Question("q", ("a", "b"), 0, "because")])
+    monkeypatch.setattr(lesson_command, "_compute", lambda *_: (page, {}))
+    monkeypatch.setattr(quiz, "can_ask", lambda: True)
 
+
+@pytest.mark.usefixtures("short_path")
+def test_nothing_follows_where_the_reader_stopped(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     def stop(_: str) -> str:
         raise quiz.Stopped
 
-    page = Page("t", "o", [Question("q", ("a", "b"), 0, "because")])
     monkeypatch.setattr("builtins.input", stop)
-    monkeypatch.setattr(command, "_compute", lambda *_: (page, {}))
-    monkeypatch.setattr(quiz, "can_ask", lambda: True)
-    assert main(["lesson"]) == 0
-    assert main(["lesson", "--stopped", "9"]) == 9
-    assert main(["lesson", "--stopped", "9", "--no-questions"]) == 0
-    makefile = (ROOT / "Makefile").read_text()
-    assert "lesson --stopped 9;" in makefile
+    assert main(["lesson", "--further"]) == 0
+    said = capsys.readouterr().out
+    assert "Go on later with: statemachine lesson --from objects" in said
+    assert "Where to go next" not in said
+
+
+@pytest.mark.usefixtures("short_path", "pinocchio")
+def test_what_follows_the_path_is_shown_a_screenful_at_a_time(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    prompts: list[str] = []
+    monkeypatch.setattr("builtins.input", lambda prompt: prompts.append(prompt) or "")
+    monkeypatch.setattr(shutil, "get_terminal_size", lambda: os.terminal_size((80, 24)))
+    assert main(["lesson", "--further", "--from", "10"]) == 0
+    said = capsys.readouterr().out
+    assert said.index("The fingertip, and an independent witness") < said.index("Where to go next")
+    after = prompts[1:]  # the station's own question comes first
+    assert "fingertip" in after[0]
+    assert after[1:] == ["Enter for more (q to stop) "] * len(after[1:])
+    assert len(after) > 1
+    assert "lesson --further\n" in (ROOT / "Makefile").read_text()
+
+
+def test_a_path_goes_no_further_where_a_station_is_named(cli: Cli) -> None:
+    assert "goes with the whole path" in cli("lesson", "--further", "time").stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
+def test_what_is_typed_before_a_question_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    ours, theirs = pty.openpty()
+    with open(theirs) as terminal:
+        monkeypatch.setattr(sys, "stdin", terminal)
+        monkeypatch.setattr("builtins.input", lambda _: terminal.readline())
+        os.write(ours, b"b\n")  # while the run computes
+        threading.Timer(0.5, os.write, (ours, b"a\n")).start()
+        assert quiz.Reader().ask(Question("?", ("x", "y"), 0, "")) == 0
+    os.close(ours)
 
 
 def test_answers_are_told_where_nobody_is_asked(cli: Cli) -> None:

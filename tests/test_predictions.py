@@ -70,7 +70,7 @@ def test_a_station_at_a_terminal_is_recorded(tmp_path: Path) -> None:
     file = tmp_path / "mine.json"
     typed = [("Your prediction", "c\n")]
     seen = _at_a_terminal("lesson", "state", "--record", str(file), typed=typed)
-    assert "as you said" in seen
+    assert "You predicted it" in seen
     assert "mine.json: 1 of 1 predictions right" in seen
     record = json.loads(file.read_text())
     assert (record["score"], record["of"]) == (1, 1)

@@ -491,9 +491,8 @@ REFUSED = {
     "armature of a free joint": _world(
         f'<body><joint name="f" type="free" armature="1"/>{_G}</body>'
     ),
-    "shape of a geom": _world(
-        '<body><joint/><geom name="egg" type="ellipsoid" size="0.1 0.2 0.3" mass="1"/></body>'
-    ),
+    "shape of a geom": '<asset><hfield name="h" nrow="2" ncol="2" size="1 1 1 1"/></asset>'
+    + _world(f'<geom name="hills" type="hfield" hfield="h"/><body><joint/>{_G}</body>'),
     "explicit contact pair": _world(
         '<body><joint/><geom name="a" size="0.1" mass="1"/></body><geom name="b" size="0.1"/>'
     )
@@ -507,7 +506,7 @@ NAMED = {
     "actuator transmission": "pull",
     "actuator of a free joint": "jet", "actuator dynamics": "lag", "actuator gain": "odd",
     "free body of several bodies": "top", "damping of a free joint": "joint f",
-    "armature of a free joint": "joint f", "shape of a geom": "egg",
+    "armature of a free joint": "joint f", "shape of a geom": "hills",
 }  # fmt: skip
 
 
@@ -540,11 +539,12 @@ def test_an_ellipsoid_that_touches_nothing_is_taken(tmp_path: Path) -> None:
 def test_all_problems_of_a_file_are_named(tmp_path: Path) -> None:
     both = (
         '<body><joint name="wrist" range="-1 1" margin="0.1"/>'
-        '<geom name="egg" type="ellipsoid" size="0.1 0.1 0.2" mass="1"/></body>'
+        '<geom mass="1" size="0.1"/></body><geom name="hills" type="hfield" hfield="h"/>'
     )
+    hills = '<asset><hfield name="h" nrow="2" ncol="2" size="1 1 1 1"/></asset>'
     with pytest.raises(UnsupportedError) as caught:
-        load(mjcf(tmp_path, f'<option viscosity="1"/>{_world(both)}'))
-    assert all(word in str(caught.value) for word in ("joint wrist", "geom egg", "fluid"))
+        load(mjcf(tmp_path, f'<option viscosity="1"/>{hills}{_world(both)}'))
+    assert all(word in str(caught.value) for word in ("joint wrist", "geom hills", "fluid"))
 
 
 _REFS = """<option timestep="0.002"/><worldbody>
@@ -630,7 +630,7 @@ def test_what_is_switched_off_at_load_is_not_refused(tmp_path: Path) -> None:
             data.qvel[0] = 1.0
             sm.step(each, data, 10)
             assert data.time == pytest.approx(0.1)
-    with pytest.raises(UnsupportedError, match="egg"):
+    with pytest.raises(UnsupportedError, match="hills"):
         model.replace(contacts=True)
     with pytest.raises(UnsupportedError, match="no option named 'contcts'"):
         sm.load(file, backend="pybullet", contcts=False)

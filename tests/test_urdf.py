@@ -238,4 +238,4 @@ def test_what_urdf_cannot_say_is_refused(tmp_path: Path, body: str, word: str) -
     file = tmp_path / "x.xml"
     file.write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
     with pytest.raises(UnsupportedError, match=word):
-        scope.check(Plan(sm.load(file).raw), "pybullet", file)
+        scope.check(Plan(sm.load(file).raw), "pybullet")

@@ -5,9 +5,10 @@ from __future__ import annotations
 import gc
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from ..errors import EngineError
@@ -70,9 +71,16 @@ def disconnect(client: int) -> None:
 
 
 @contextmanager
-def as_file(text: str) -> Iterator[str]:
-    """A name under which PyBullet can read a text; nothing is left when the process dies."""
-    if hasattr(os, "memfd_create"):
+def as_file(text: str, beside: Mapping[str, str] = MappingProxyType({})) -> Iterator[str]:
+    """A name under which PyBullet can read a text.
+
+    Nothing is left when the process dies, where nothing has to lie beside it.
+
+    Args:
+        text: The text.
+        beside: Further texts that it names, by the names of their files.
+    """
+    if hasattr(os, "memfd_create") and not beside:
         with open(os.memfd_create("urdf"), "wb") as file:
             file.write(text.encode())
             file.flush()
@@ -80,7 +88,8 @@ def as_file(text: str) -> Iterator[str]:
         return
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.urdf"
-        path.write_text(text, encoding="utf-8")
+        for name, content in {path.name: text, **beside}.items():
+            (path.parent / name).write_text(content, encoding="utf-8")
         yield str(path)
 
 

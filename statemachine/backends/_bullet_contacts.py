@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -16,7 +17,9 @@ from ._bullet_world import World
 _GEOM = mujoco.mjtGeom
 
 
-def contacts(raw: mujoco.MjModel, world: World, xpos: Array, xquat: Array) -> Contacts:
+def contacts(
+    raw: mujoco.MjModel, world: World, poses: Callable[[], tuple[Array, Array]]
+) -> Contacts:
     """The contacts that a world found at the beginning of its last step.
 
     PyBullet knows which links touch. A link may have several geoms: the one whose
@@ -25,15 +28,16 @@ def contacts(raw: mujoco.MjModel, world: World, xpos: Array, xquat: Array) -> Co
     Args:
         raw: The compiled model.
         world: The world; points that are apart and carry no force are left out.
-        xpos: (nbody, 3) where the bodies were then [m].
-        xquat: (nbody, 4) how they were turned, wxyz.
+        poses: Gives xpos (nbody, 3), where the bodies were then [m], and xquat (nbody, 4), how
+            they were turned, wxyz; asked for only where a link has several geoms.
     """
-    geoms = {(body, link): (s.body, s.geoms) for body, link, s in world.solids()}
+    geoms = world.geoms_of_links
 
     def geom_at(body: int, link: int, point: Array) -> int:
         b, candidates = geoms[body, link]
         if len(candidates) == 1:
             return candidates[0]
+        xpos, xquat = poses()
         local = dense.times(matrix_from_quat(xquat[b]).T, point - xpos[b])
         return min(candidates, key=lambda g: abs(_distance(raw, g, local)))
 

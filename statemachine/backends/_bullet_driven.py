@@ -142,14 +142,16 @@ class DrivenWorld(HiddenWorld):
         self.step(afresh=True)
         self.read()
 
-    def kinematics(self, qpos: Array) -> dict[str, Array]:
+    def kinematics(self, qpos: Array, name: str) -> dict[str, Array]:
         """By the engine's own, in a world that is never stepped."""
-        return self._shared.poses(qpos)
+        return self._shared.poses(qpos, name)
 
     def derive(self, name: str, moment: Moment, read: Read) -> dict[str, Any]:
         """Contacts, which the step found before it moved; or accelerations and forces."""
         if name == "contacts":
-            return {name: contacts(self._shared.raw, self.raw, read("xpos"), read("xquat"))}
+            return {
+                name: contacts(self._shared.raw, self.raw, lambda: (read("xpos"), read("xquat")))
+            }
         return self._forces(moment, read)
 
     def _forces(self, moment: Moment, read: Read) -> dict[str, Array]:

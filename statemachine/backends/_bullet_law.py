@@ -173,11 +173,16 @@ class Law:
         passive, damped, wanted = linear[:n], linear[n : 2 * n], linear[2 * n :] + aim
         force = np.minimum(np.maximum(wanted, self._low_force), self._high_force)
         actuator = force if self._straight else dense.times(self._gear, force)
-        if self._fence is not None:
-            actuator = np.minimum(np.maximum(actuator, self._fence[0]), self._fence[1])
         inertia = self._unsaturated
         if force.tobytes() != wanted.tobytes():
             inertia = self._with_slope(force == wanted)
+        if self._fence is not None:  # of whole joints: what drives one beyond it has no slope
+            within = np.minimum(np.maximum(actuator, self._fence[0]), self._fence[1])
+            if within.tobytes() != actuator.tobytes():
+                beyond = np.asarray(within != actuator, dtype=np.float64)
+                held = dense.times(np.abs(self._gear.T), beyond) > 0
+                inertia = self._with_slope((force == wanted) & ~held)
+                actuator = within
         explicit, implicit = mass + inertia
         dense.factored(explicit)
         dense.factored(implicit)

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from ..interface import Array
+from . import _bullet_hulls as hulls
 from . import _bullet_urdf as urdf
 from ._bullet_surfaces import Surfaces
 
@@ -16,6 +17,9 @@ _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 # Of the armature, as inertia of the stepped arm: 0.003 of the SO-101's 0.028 kg m², with
 # which it grips soon and the eigenvalue of `_padding` is 0.97 at most.
 _SHARE, _BEARABLE, _SAMPLE = 3 / 28, 1.5, 20
+_YIELDS = 0.01
+# PyBullet has room for 128 numbers of a tree, and goes on without a word beyond it.
+MOST_PARTS = 120
 
 
 class Plan:
@@ -32,6 +36,7 @@ class Plan:
         self.surfaces = Surfaces(raw)
         self.names = urdf.Names(raw)
         self._texts: dict[tuple[int, str], str] = {}
+        self._hulls: dict[tuple[int, str], dict[str, str]] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Plan, (self.raw,)
@@ -44,11 +49,54 @@ class Plan:
         """
         return _padding(self.raw)
 
+    @cached_property
+    def softness(self) -> float:
+        """By how much contacts yield to their own force: the engine's CFM [s/kg].
+
+        Where a contact pushes along what no joint can move, a hard one gets a force without
+        bound. MuJoCo's yield by (1 - d)/d of the inverse weight, about 5 % [manual, chapter
+        Computation, Constraint model]; these by 1 % of that of the tree they push, times the
+        timestep, which is too little to be seen where a joint can move.
+        """
+        raw = self.raw
+        bodies = raw.geom_bodyid[[geom for solid in self.surfaces.solids for geom in solid.geoms]]
+        masses = raw.body_subtreemass[raw.body_rootid[bodies[bodies > 0]]]
+        masses = masses[masses > 0]
+        return float(_YIELDS * raw.opt.timestep / np.median(masses)) if len(masses) else 0.0
+
     def described(self, root: int, kind: str) -> str:
         """URDF of a tree of bodies as a world of that kind reads it."""
         if (root, kind) not in self._texts:
             self._texts[root, kind] = self._write(root, kind)
         return self._texts[root, kind]
+
+    def beside(self, root: int, kind: str) -> dict[str, str]:
+        """The files that the URDF of a tree names: the hulls of its geoms."""
+        if (root, kind) not in self._hulls:
+            text, raw = self.described(root, kind), self.raw
+            names = {urdf.hull_file(geom): geom for geom in self._hull_geoms(kind)}
+            self._hulls[root, kind] = {
+                name: hulls.obj(raw, geom, kind == "stepped")
+                for name, geom in names.items()
+                if f'"{name}"' in text
+            }
+        return self._hulls[root, kind]
+
+    def _room_for_tips(self, root: int) -> bool:
+        raw = self.raw
+        sites = np.count_nonzero(raw.body_rootid[raw.site_bodyid] == root)
+        return urdf.parts(raw, root) + sites <= MOST_PARTS
+
+    def _hull_geoms(self, kind: str) -> frozenset[int]:
+        """Geoms that touch and are read as hulls; as it comes, meshes come from their files."""
+        raw, found = self.raw, set[int]()
+        for solid in self.surfaces.solids:
+            for geom in solid.geoms:
+                if int(raw.geom_type[geom]) in hulls.HULLS:
+                    mesh = int(raw.geom_dataid[geom])
+                    if kind == "stepped" or mesh < 0 or raw.mesh_pathadr[mesh] < 0:
+                        found.add(geom)
+        return frozenset(found)
 
     def _write(self, root: int, kind: str) -> str:
         dialect = urdf.Dialect(
@@ -58,6 +106,8 @@ class Plan:
             dynamics=kind == "engine",
             anchored=bool(root) and not floats(self.raw, root),
             padding=self.padding if kind == "stepped" else None,
+            tips=kind != "stepped" and self._room_for_tips(root),
+            hulls=self._hull_geoms(kind),
         )
         return urdf.write(self.raw, root, dialect, self.names)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -11,12 +10,11 @@ import numpy as np
 
 from ..errors import UnsupportedError
 from ..interface import Array, JointType
-from ._bullet_plan import Plan
+from ._bullet_hulls import ELLIPSOID, HULLS, MARGIN, allowance, roughness
+from ._bullet_plan import MOST_PARTS, Plan
 from ._bullet_surfaces import NO_CONTACT, PLANE
-from ._bullet_urdf import axes, tree
+from ._bullet_urdf import axes, parts, tree
 
-# PyBullet has room for 128 numbers of a tree, and goes on without a word beyond it.
-_MOST = 120
 _FREE, _BALL = int(JointType.FREE), int(JointType.BALL)
 _SOLIDS = [
     int(kind)
@@ -25,24 +23,22 @@ _SOLIDS = [
         mujoco.mjtGeom.mjGEOM_SPHERE,
         mujoco.mjtGeom.mjGEOM_CAPSULE,
         mujoco.mjtGeom.mjGEOM_CYLINDER,
-        mujoco.mjtGeom.mjGEOM_MESH,
         mujoco.mjtGeom.mjGEOM_PLANE,
     )
-]
+] + list(HULLS)
 
 
-def check(plan: Plan, backend: str, path: Path | None) -> None:
+def check(plan: Plan, backend: str) -> None:
     """Raise UnsupportedError, naming all that PyBullet cannot be told of a model.
 
     Args:
         plan: The compiled model and what can touch what in it.
         backend: For the message.
-        path: The file that it was compiled from; None for a variant of what was checked.
     """
     raw = plan.raw
     found = [*_parts(raw), *_joints(raw), *_bodies(raw), *_actuators(raw)]
     if not raw.opt.disableflags & NO_CONTACT:
-        found += [*_geoms(raw), *(_meshes(raw, path) if path else ())]
+        found += _geoms(raw)
         found += [
             ("contact masks within a body", f"of {pair} some geoms meet and some do not")
             for pair in plan.surfaces.mixed
@@ -56,6 +52,7 @@ def check(plan: Plan, backend: str, path: Path | None) -> None:
         backend=backend,
         feature=feature,
         reason=reason,
+        features=tuple(dict.fromkeys(what for what, _ in found)),
     )
 
 
@@ -106,9 +103,33 @@ def ignored(raw: mujoco.MjModel) -> list[str]:
                 f"{int(np.count_nonzero(margins))} geoms (the largest: "
                 f"{1e3 * margins[largest]:.3g} mm, {_name(raw, 'geom', largest)})"
             )
+        found += _hull_differences(raw, touching)
         belts = np.sqrt((raw.geom_surfacevel[:, :3] ** 2).sum(axis=1)) * touching
         if belts.any():
             found.append(f"surfacevel has no effect ({_list(raw, 'geom', belts)})")
+    return found
+
+
+def _hull_differences(raw: mujoco.MjModel, touching: Array) -> list[str]:
+    """Where a hull is not its shape: ellipsoids, and what is thinner than the engine's margin."""
+    found = []
+    rough = np.where(raw.geom_type == ELLIPSOID, raw.geom_size.max(axis=1), 0.0) * touching
+    if rough.any():
+        largest = int(rough.argmax())
+        size = 1e3 * roughness(raw.geom_size[largest])
+        found.append(
+            f"ellipsoids touch as hulls, which are up to {size:.2g} mm off "
+            f"({_name(raw, 'geom', largest)})"
+        )
+    solid = [int(g) for g in np.flatnonzero(touching) if int(raw.geom_type[g]) in HULLS]
+    excess = {geom: MARGIN - allowance(raw, geom) for geom in solid}
+    thin = [geom for geom in solid if excess[geom] > 1e-6]
+    if thin:
+        worst = max(thin, key=lambda geom: excess[geom])
+        found.append(
+            f"{len(thin)} hulls are too thin to be made smaller by the engine's margin: up to "
+            f"{1e3 * excess[worst]:.2g} mm too large ({_name(raw, 'geom', worst)})"
+        )
     return found
 
 
@@ -146,14 +167,11 @@ def _bodies(raw: mujoco.MjModel) -> Found:
         if raw.body_mocapid[b] >= 0:
             yield "mocap body", f"body {name} is one"
         if not raw.body_parentid[b]:
-            bodies = tree(raw, b)
-            joints = sum(len(axes(raw, each)) for each in bodies)
-            sites = int(np.isin(raw.site_bodyid, bodies).sum())
-            if len(bodies) + joints + sites > _MOST:
+            count = parts(raw, b)
+            if count > MOST_PARTS:
                 yield (
                     "a tree of so many parts",
-                    f"{name} has {len(bodies)} bodies, {joints} joints and {sites} sites: "
-                    f"more than {_MOST} together",
+                    f"{name} has {count} bodies and joints: more than {MOST_PARTS}",
                 )
         if not raw.body_parentid[b] and raw.body_jntnum[b] and not axes(raw, b):
             rest = len(tree(raw, b)) - 1
@@ -170,31 +188,6 @@ def _geoms(raw: mujoco.MjModel) -> Found:
             yield "shape of a geom", f"geom {name} is a {mujoco.mjtGeom(kind).name[7:].lower()}"
         elif kind == PLANE and raw.geom_bodyid[g]:
             yield "plane on a body", f"geom {name} is not the world's own"
-
-
-def _meshes(raw: mujoco.MjModel, path: Path) -> Found:
-    """Of meshes that touch, what their files do not say."""
-    touching = (raw.geom_contype | raw.geom_conaffinity).astype(bool)
-    solid = {
-        int(raw.geom_dataid[g])
-        for g in np.flatnonzero(touching)
-        if raw.geom_type[g] == int(mujoco.mjtGeom.mjGEOM_MESH)
-    }
-    moved = set[str]()
-    try:
-        known = mujoco.MjSpec.from_file(str(path)).meshes if solid else []
-    except (ValueError, mujoco.FatalError):
-        known = []
-        yield "a mesh that touches, in a binary model", "what moved it is not in the file"
-    for mesh in known:
-        if np.any(mesh.refpos) or not np.array_equal(mesh.refquat, (1, 0, 0, 0)):
-            moved.add(mesh.name)
-    for m in sorted(solid):
-        name = _name(raw, "mesh", m)
-        if raw.mesh_pathadr[m] < 0:
-            yield "mesh without a file", f"mesh {name} touches"
-        if name in moved:
-            yield "refpos or refquat of a mesh", f"mesh {name} touches"
 
 
 def _actuators(raw: mujoco.MjModel) -> Found:

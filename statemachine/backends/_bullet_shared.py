@@ -34,6 +34,7 @@ class Shared:
         self.kind: Literal["stepped", "engine"] = kind
         self.made_ghost: World | None = None
         self._still_joints = np.zeros(plan.raw.nv)
+        self._known: tuple[bytes, list[tuple[Array, Array]]] = b"?", []
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Shared, (self.plan, self.kind)
@@ -53,39 +54,72 @@ class Shared:
         mujoco.mj_kinematics(self.raw, data)
         return data.xpos, data.xquat, data.site_xpos, data.site_xmat
 
-    def poses(self, qpos: Array) -> dict[str, Array]:
-        """xpos, xquat, site_xpos and site_xmat, by the engine's own forward kinematics.
+    def poses(self, qpos: Array, name: str) -> dict[str, Array]:
+        """Poses of bodies, or of sites, by the engine's own forward kinematics.
 
         Centres of mass and their axes are what PyBullet reports in double precision; a
-        site is the centre of mass of a link of its own.
+        site is the centre of mass of a link of its own, where the tree has room for one.
+
+        Args:
+            qpos: (nq,) where the joints are.
+            name: Of `POSES`; only what it needs is computed.
         """
+        if name in ("site_xpos", "site_xmat"):
+            return {name: self._sites(qpos, name)}
         raw = self.raw
-        xpos, xquat, site_xpos, site_xmat = (array.copy() for array in self.still)
-        for tree in self.ghost.trees:
-            bodies, sites = list(tree.links), list(tree.tips)
-            with HiddenWorld.lock:
-                self.ghost.put(qpos, self._still_joints)
-                states = self.ghost.link_states(tree)
-            where, turned = (np.array(part) for part in zip(*states, strict=True))
-            turned = wxyz_from_xyzw(turned)
+        xpos, xquat = (array.copy() for array in self.still[:2])
+        for tree, (where, turned) in zip(self.ghost.trees, self._states(qpos), strict=True):
+            bodies = list(tree.links)
             n = len(bodies)
-            xquat[bodies] = times(turned[:n], raw.body_iquat[bodies] * _INVERSE)
+            xquat[bodies] = times(wxyz_from_xyzw(turned[:n]), raw.body_iquat[bodies] * _INVERSE)
             turns = matrix_from_quat(xquat[bodies])
             xpos[bodies] = where[:n] - np.einsum("bij,bj->bi", turns, raw.body_ipos[bodies])
-            site_xpos[sites], site_xmat[sites] = (
-                where[n:],
-                matrix_from_quat(turned[n:]).reshape(-1, 9),
-            )
         for joint in np.flatnonzero(raw.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)):
             body, start = int(raw.jnt_bodyid[joint]), int(raw.jnt_qposadr[joint])
             quat = qpos[start + 3 : start + 7]
             xpos[body], xquat[body] = qpos[start : start + 3], quat / math.hypot(*quat)
-            turn = matrix_from_quat(xquat[body])
-            for site in np.flatnonzero(raw.site_bodyid == body):
-                site_xpos[site] = xpos[body] + dense.times(turn, raw.site_pos[site])
-                own = matrix_from_quat(raw.site_quat[site])
-                site_xmat[site] = dense.product(turn, own).ravel()
-        return dict(zip(POSES, (xpos, xquat, site_xpos, site_xmat), strict=True))
+        return {"xpos": xpos, "xquat": xquat}
+
+    def _sites(self, qpos: Array, name: str) -> Array:
+        """site_xpos or site_xmat."""
+        raw, still = self.raw, dict(zip(POSES, self.still, strict=True))
+        values = still[name].copy()
+        for tree, (where, turned) in zip(self.ghost.trees, self._states(qpos), strict=True):
+            sites, n = list(tree.tips), len(tree.links)
+            if not sites:
+                continue
+            if name == "site_xpos":
+                values[sites] = where[n:]
+            else:
+                values[sites] = matrix_from_quat(wxyz_from_xyzw(turned[n:])).reshape(-1, 9)
+        sites = self._carried_sites
+        if len(sites):
+            bodies, poses = raw.site_bodyid[sites], self.poses(qpos, "xpos")
+            turns = matrix_from_quat(poses["xquat"][bodies])
+            if name == "site_xpos":
+                offset = np.einsum("bij,bj->bi", turns, raw.site_pos[sites])
+                values[sites] = poses["xpos"][bodies] + offset
+            else:
+                own = matrix_from_quat(raw.site_quat[sites])
+                values[sites] = np.einsum("bij,bjk->bik", turns, own).reshape(-1, 9)
+        return values
+
+    @cached_property
+    def _carried_sites(self) -> Any:
+        """Sites that move and have no link: of free bodies, and of trees without room for it."""
+        linked = [site for tree in self.ghost.trees for site in tree.tips]
+        moving = self.raw.body_weldid[self.raw.site_bodyid] > 0
+        return np.flatnonzero(moving & ~np.isin(np.arange(self.raw.nsite), linked))
+
+    def _states(self, qpos: Array) -> list[tuple[Array, Array]]:
+        """Of each tree of joints, where its links are and how they are turned (x, y, z, w)."""
+        key = qpos.tobytes()
+        with HiddenWorld.lock:
+            if self._known[0] != key:
+                self.ghost.put(qpos, self._still_joints)
+                found = [zip(*self.ghost.link_states(t), strict=True) for t in self.ghost.trees]
+                self._known = key, [(np.array(where), np.array(turn)) for where, turn in found]
+            return self._known[1]
 
 
 def free_dynamics(raw: mujoco.MjModel, body: int, turn: Array, qvel: Array) -> tuple[Array, Array]:

@@ -41,6 +41,8 @@ class Dialect:
         anchored: Fix the root to a massless link "world", at its place. PyBullet's
             inverse dynamics takes gravity in the principal axes of a fixed base, which
             is gravity in another direction unless the base has no mass.
+        tips: Write a link for each site.
+        hulls: Geoms that are read from a file of their own, see `hull_file`.
         padding: (nv,) J of each degree of freedom. The link that a hinge carries gets
             J times `padding_shape` [kg m²] more inertia about its centre of mass, the
             link that a slide carries J [kg] more mass.
@@ -53,6 +55,8 @@ class Dialect:
     dynamics: bool = True
     anchored: bool = False
     padding: Array | None = None
+    tips: bool = True
+    hulls: frozenset[int] = frozenset()
 
 
 def roots(raw: mujoco.MjModel) -> list[int]:
@@ -70,6 +74,12 @@ def axes(raw: mujoco.MjModel, body: int) -> list[int]:
     start = int(raw.body_jntadr[body])
     joints = range(start, start + int(raw.body_jntnum[body]))
     return [j for j in joints if raw.jnt_type[j] in (int(JointType.HINGE), int(JointType.SLIDE))]
+
+
+def parts(raw: mujoco.MjModel, root: int) -> int:
+    """How many bodies and joints a tree has."""
+    bodies = tree(raw, root)
+    return len(bodies) + sum(len(axes(raw, body)) for body in bodies)
 
 
 def write(
@@ -95,7 +105,7 @@ def write(
         lines += _link(raw, body, dialect, names)
         if body != root or on_world:
             lines += _joints(raw, body, root, dialect, names)
-    for site in range(raw.nsite):
+    for site in range(raw.nsite if dialect.tips else 0):
         if raw.body_rootid[raw.site_bodyid[site]] == root and root:
             lines += _tip(raw, site, names)
     return "\n".join([*lines, "</robot>", ""])
@@ -189,7 +199,9 @@ def _geom(
     pos, mat = raw.geom_pos[geom] - anchor, matrix_from_quat(raw.geom_quat[geom])
     size, kind = raw.geom_size[geom], int(raw.geom_type[geom])
     solids: list[tuple[Array, str]] = []
-    if kind == _BOX:
+    if geom in dialect.hulls:
+        solids.append((pos, f'<mesh filename="{hull_file(geom)}"/>'))
+    elif kind == _BOX:
         solids.append((pos, f'<box size="{_numbers(2 * size)}"/>'))
     elif kind == _SPHERE:
         solids.append((pos, f'<sphere radius="{_number(size[0])}"/>'))
@@ -221,6 +233,11 @@ def _geom(
         yield f"      {_origin(where, mat)}"
         yield f"      <geometry>{solid}</geometry>"
         yield f"    </{element}>"
+
+
+def hull_file(geom: int) -> str:
+    """The name of the file with the hull of a geom, beside the URDF."""
+    return f"hull_{geom}.obj"
 
 
 def _mesh_file(raw: mujoco.MjModel, mesh: int, folder: Path | None) -> str:

@@ -11,7 +11,6 @@ import weakref
 from collections.abc import Iterator
 from typing import Any, Literal
 
-import mujoco
 import numpy as np
 
 from ..errors import ModelError
@@ -25,7 +24,7 @@ from ._bullet_plan import Plan, floats
 from ._bullet_surfaces import Solid
 from .compiled import gravity
 
-_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+_PARTS = 0.05  # of an overlap that a step undoes; by the engine's 0.2 meshes that overlap fly apart
 _AWAY = 1000.0  # [m] between bodies that a reset has set apart
 _TILT = 5e-4  # half the angle [rad] by which it tilts a free body to find its contacts
 _REST = math.sqrt(1 - 2 * _TILT**2)
@@ -42,7 +41,7 @@ class Tree:
         dofs: Their degrees of freedom; of a free joint, its first.
         qpos, qvel: What of these arrays is the tree's: a slice where that is enough.
         links: PyBullet's index of each body's link; -1 is the base.
-        tips: PyBullet's index of each site's link.
+        tips: PyBullet's index of each site's link, where it has one.
     """
 
     def __init__(self, plan: Plan, root: int, body: int, client: int) -> None:
@@ -56,7 +55,7 @@ class Tree:
         sites = [
             s for s in range(raw.nsite) if root and raw.body_rootid[raw.site_bodyid[s]] == root
         ]
-        self.tips = {s: indices[names.tips[s]] for s in sites}
+        self.tips = {s: indices[names.tips[s]] for s in sites if names.tips[s] in indices}
         by_name = {names.joints[j]: j for b in bodies for j in urdf.axes(raw, b)}
         moving = [(info[0], by_name[info[1].decode()]) for info in infos if info[3] >= 0]
         ids = [joint for _, joint in moving] or [int(raw.body_jntadr[root])] * self.free
@@ -80,6 +79,7 @@ class World:
     Attributes:
         client: What PyBullet's functions want as `physicsClientId`.
         trees: The trees of the model, the world's own geoms first.
+        geoms_of_links: By PyBullet's body and link, MuJoCo's body and its geoms that touch.
     """
 
     def __init__(self, plan: Plan, kind: Literal["stepped", "ghost", "engine"]) -> None:
@@ -115,13 +115,19 @@ class World:
             return
         if kind == "stepped":
             pb.setPhysicsEngineParameter(
-                deterministicOverlappingPairs=1, physicsClientId=self.client
+                deterministicOverlappingPairs=1,
+                globalCFM=plan.softness,
+                contactERP=_PARTS,
+                physicsClientId=self.client,
             )
         pb.setTimeStep(raw.opt.timestep, self.client)
         self._add_planes()
         if kind == "stepped":
             self._take_surfaces()
-        self._solid_links = [(body, link) for body, link, _ in self.solids()]
+        self.geoms_of_links = {
+            (body, link): (solid.body, solid.geoms) for body, link, solid in self.solids()
+        }
+        self._solid_links = list(self.geoms_of_links)
         self._homes = [
             (body, pb.getBasePositionAndOrientation(body, self.client))
             for body in (*(tree.body for tree in self.trees), *self._planes.values())
@@ -154,7 +160,7 @@ class World:
             | pb.URDF_USE_SELF_COLLISION_INCLUDE_PARENT  # which pairs meet, _take_surfaces says
             | pb.URDF_USE_IMPLICIT_CYLINDER  # else a polygon, and a millimetre too large
         )
-        with as_file(text) as name, silence() as said:
+        with as_file(text, self._plan.beside(root, kind)) as name, silence() as said:
             try:
                 body = pb.loadURDF(
                     name,
@@ -210,10 +216,8 @@ class World:
         """Friction of links, and which of them meet."""
         known = self._surfaces
         links = []
-        for k, (body, link, solid) in enumerate(self.solids()):
+        for k, (body, link, _) in enumerate(self.solids()):
             links.append((body, link))
-            if (self._raw.geom_type[list(solid.geoms)] == _MESH).any():  # else 1 mm too large
-                pb.changeDynamics(body, link, collisionMargin=0, physicsClientId=self.client)
             pb.changeDynamics(
                 body,
                 link,

@@ -195,7 +195,7 @@ class Machine:
         moment = self.moment
         if moment is None:
             return _nothing(self._model)
-        if name in POSES and (poses := self.world.kinematics(moment.qpos)):
+        if name in POSES and (poses := self.world.kinematics(moment.qpos, name)):
             return poses
         if self._lives:  # the world is still where the step that ends there left it
             return self.world.derive(name, moment, self.derive)

@@ -115,10 +115,10 @@ class HiddenWorld(ABC):
         self.command(moment.ctrl)
         self.step()
 
-    def kinematics(self, qpos: Array) -> Mapping[str, Array]:
-        """xpos, xquat, site_xpos and site_xmat at `qpos` (nq,), where that needs no step.
+    def kinematics(self, qpos: Array, name: str) -> Mapping[str, Array]:
+        """`name` of `records.POSES` at `qpos` (nq,), where that needs no step.
 
-        Empty by default: `derive` gives them.
+        And what comes with it. Empty by default: `derive` gives it.
         """
         return {}
 
@@ -194,13 +194,11 @@ class LookAhead:
 def values_of(world: HiddenWorld, moment: Moment) -> dict[str, Any]:
     """What a world tells of a moment, but for what kinematics alone gives."""
     world.look(moment)
-    poses, values = dict[str, Any](), dict[str, Any]()
+    values = dict[str, Any]()
 
     def read(name: str) -> Any:
-        if name in POSES and not poses:
-            poses.update(world.kinematics(moment.qpos))
-        if name in poses:
-            return poses[name]
+        if name in POSES and name not in values:
+            values.update(world.kinematics(moment.qpos, name))
         if name not in values:
             values.update(world.derive(name, moment, read))
         return values[name]

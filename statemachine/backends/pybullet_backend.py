@@ -55,7 +55,7 @@ _EMULATED = {
 _NATIVE = {
     "contacts": "the engine's own, which are hard: solref, solimp and the friction cone have no "
     "counterpart. It multiplies the frictions of two links: they are chosen so that the products "
-    "are the model's, and load warns where that cannot be",
+    "are the model's, and load warns where that cannot be. Edges of a mesh are rounded by 1 mm",
 }
 _RESTORE = (
     "two restores of one State have the same future, bit by bit, but not that of the run it was "
@@ -129,7 +129,7 @@ def load(
         raw = edited(raw, checked)
         raw.opt.timestep = step_length(float(raw.opt.timestep), substeps, checked)
     plan = Plan(raw)
-    check(plan, "pybullet", Path(path))
+    check(plan, "pybullet")
     model = PybulletModel(plan, Path(path), substeps, defaults)
     World(plan, model._shared.kind).close()  # what PyBullet cannot read shows now
     differences = [*ignored(raw), *plan.surfaces.differences]
@@ -198,7 +198,7 @@ class PybulletModel(HiddenModel):
         substeps = options.get("substeps", self.substeps)
         raw.opt.timestep = step_length(self.timestep, substeps, options)
         plan = Plan(raw)
-        check(plan, "pybullet", None)
+        check(plan, "pybullet")
         return PybulletModel(plan, self.path, substeps, self.defaults)
 
 

@@ -14,6 +14,7 @@ COMMANDS = {
     "audit": "what exactly the state is, found by saving, restoring and comparing bytes",
     "fingertip": "the engine's fingertip against an independent witness",
     "compare": "where two engines part, by how much, and why",
+    "robots": "any folder of models: what each does on every engine, in a table",
     "trace": "record a run, play it on another engine, look into it, draw it",
     "view": "a running simulation in the browser, with sliders",
     "doctor": "what this machine has, and what to do",

@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from ..errors import MissingEngineError, ModelError, StateMachineError, UnsupportedError
@@ -28,6 +29,13 @@ def one_line(text: object) -> str:
     A name may come from a file that somebody else made.
     """
     return "".join(c if c.isprintable() else "?" for c in " ".join(str(text).split()))
+
+
+def file_name(text: str) -> Path:
+    """A file to be written, as an option's type."""
+    if not text:
+        raise argparse.ArgumentTypeError("expected the name of a file")
+    return Path(text)
 
 
 def add_json(parser: argparse.ArgumentParser, what: str = "result", default: Any = False) -> None:

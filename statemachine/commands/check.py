@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from . import _mutants
-from ._common import SAYS_NO, add_backend, add_json, complain, show
+from ._common import SAYS_NO, add_backend, add_json, complain, file_name, show
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -26,8 +26,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         "files",
         nargs="*",
         metavar="FILE|FOLDER",
-        help="the student's file, like step_loop.py; or those of a class, each in the folder or in "
-        "a folder of its own there",
+        help="the student's file, like step_loop.py, or the folder that it is in; or those of a "
+        "class, each in the folder or in a folder of its own there",
     )
     add_backend(parser, everyone=False)
     parser.add_argument(
@@ -40,6 +40,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--csv",
+        type=file_name,
         default=None,
         metavar="TABLE",
         help="of a class: write the table there after each file; typed again, it judges only "
@@ -54,6 +55,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--gradescope",
+        type=file_name,
         default=None,
         metavar="RESULTS",
         help="of one file, or a folder with one: write Gradescope's results.json, too",
@@ -67,17 +69,25 @@ def run(options: argparse.Namespace) -> int:
     """Judge, and show."""
     if (not options.files) == (options.mutants is None):
         options.parser.error("expected one of FILE and --mutants TESTFILE")
+    from ..grading.classroom import is_one_students
+    from ..traces.whole import check_place
+
     folder = any(Path(file).is_dir() for file in options.files)
-    several = len(options.files) > 1 or (folder and not options.gradescope)
+    table = options.csv or options.jobs is not None
+    one = options.gradescope or (folder and not table and is_one_students(Path(options.files[0])))
+    several = len(options.files) > 1 or (folder and not one)
     if (options.mutants is not None or several) and options.gradescope:
         options.parser.error("--gradescope goes with one FILE, or one FOLDER")
     there = all(Path(file).exists() for file in options.files)
-    if not several and there and (options.csv or options.jobs is not None):
+    if not several and there and table:
         options.parser.error("--csv and --jobs go with several files, or a folder")
     if options.mutants is not None:
         return _mutants.run(options)
     if options.only:
         options.parser.error("--only goes with --mutants")
+    for target in (options.csv, options.gradescope):
+        if target is not None:
+            check_place(target)
     return _class(options) if several else _one(options)
 
 
@@ -103,11 +113,11 @@ def _one(options: argparse.Namespace) -> int:
     return show(words.page(grade), grade, options.json)
 
 
-def _gradescope(target: str, grade: Any, refusal: str) -> None:
+def _gradescope(target: Path, grade: Any, refusal: str) -> None:
     from ..report import gradescope
     from ..traces.whole import replace_text
 
-    replace_text(Path(target), gradescope.results(grade, refusal))
+    replace_text(target, gradescope.results(grade, refusal))
 
 
 def _class(options: argparse.Namespace) -> int:
@@ -124,7 +134,7 @@ def _class(options: argparse.Namespace) -> int:
                 options.backend,
                 time_limit=options.time_limit,
                 jobs=options.jobs,
-                table=Path(options.csv) if options.csv else None,
+                table=options.csv,
                 progress=report,
             )
     except KeyboardInterrupt:

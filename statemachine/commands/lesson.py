@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInputError
+from ..errors import BadInputError, MissingEngineError
 from ..installed import DEFAULT
 from ..lessons import LESSONS, STATIONS
 from ..lessons.records import Lesson
 from ._common import (
+    MISSING,
     PROGRAM,
     SAYS_NO,
     add_backend,
     add_json,
     add_menagerie,
     add_model,
+    complain,
     on_each_backend,
     show,
 )
@@ -38,10 +41,9 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="of the whole path: where to begin, if not at the first",
     )
     parser.add_argument(
-        "--stopped",
-        type=int,
-        metavar="CODE",
-        help="of the whole path: exit code if its reader types q (default: as if it ended there)",
+        "--further",
+        action="store_true",
+        help="of the whole path: then the fingertip against a witness, and where to go next",
     )
     parser.set_defaults(run=run_path)
     named = parser.add_subparsers(metavar="name")
@@ -147,6 +149,8 @@ def run(options: argparse.Namespace) -> int:
             f"--from begins the whole path, and {lesson.name} is one lesson of it: type "
             f"{PROGRAM} lesson --from {options.start}, or {PROGRAM} lesson {lesson.name}"
         )
+    if options.further:
+        raise BadInputError(f"--further goes with the whole path: {PROGRAM} lesson --further")
     values = {option.key: getattr(options, option.key) for option in lesson.options}
     reader = _reader(options, lesson)
     page, results = _compute(options, lesson, options.model, values)
@@ -165,6 +169,15 @@ def run(options: argparse.Namespace) -> int:
 
 
 _AFTER = f"Check yourself: {PROGRAM} lesson questions. Then: python exercises/step_loop.py"
+_FURTHER = f"""\
+Where to go next:
+  {PROGRAM}                    everything that there is
+  {PROGRAM} lesson gravity --backend all     on all engines, side by side
+  {PROGRAM} lesson questions   check yourself
+  python exercises/step_loop.py   then four functions for you to write
+  {PROGRAM} compare hold --html hold.html     where two engines part, and why
+  {PROGRAM} doctor             what this machine has, and what to do
+"""
 
 
 def run_path(options: argparse.Namespace) -> int:
@@ -195,18 +208,44 @@ def _path(options: argparse.Namespace, reader: Any) -> int:
             code = code if page.holds else SAYS_NO
             if not options.json:
                 title = f"{number} of {len(STATIONS)}: {page.title}"
-                last = number == len(STATIONS)
+                last = number == len(STATIONS) and not options.further
                 terminal.show(replace(page, title=title), _AFTER if last else "", reader)
         except (Stopped, KeyboardInterrupt) as stop:
             if reader:
                 print(f"\nGo on later with: {PROGRAM} lesson --from {lesson.name}")
             if isinstance(stop, KeyboardInterrupt):
                 raise
-            return code if options.stopped is None else options.stopped
+            return code
+    if options.further and code == 0 and not options.json:
+        try:
+            return _further(options, reader)
+        except Stopped:
+            return code
     if options.json:
         from ..report.as_json import dumps
 
         print(dumps(everything))
+    return code
+
+
+def _further(options: argparse.Namespace, reader: Any) -> int:
+    """The fingertip of all engines against the witness, and where to go next."""
+    from ..lessons.fingertip import certify, page
+    from ..report import terminal
+
+    code, every = 0, argparse.Namespace(backend="all", menagerie=options.menagerie)
+    if reader:
+        reader.go_on("the last page: the fingertip, checked by another library")
+    try:
+        results = on_each_backend(
+            every, "fingertip", "so101", lambda model, _, report: certify(model, progress=report)
+        )
+        certificate = page(results)
+        code = 0 if certificate.holds else SAYS_NO
+        terminal.show(certificate, "", reader)
+    except MissingEngineError as error:  # nobody can compute it here
+        complain(error, MISSING)
+    (reader.read if reader else sys.stdout.write)(_FURTHER)
     return code
 
 

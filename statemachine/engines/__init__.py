@@ -33,6 +33,7 @@ PARTS: dict[str, str] = {
     "reading": "what the engine makes of a file, as a description",
     "energy": "the energies of states, by which all engines are measured",
     "mutants": "where a seeded fault is put into its backend",
+    "plain": "a file as its own users run it, to compare bits with",
     "watched": "what a student can do with the engine past the interface",
     "rendering": "pictures without a screen",
 }

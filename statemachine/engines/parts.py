@@ -180,6 +180,23 @@ class EnergyPart(Protocol):
         ...
 
 
+class PlainPart(Protocol):
+    """The part "plain": a file as the engine's own users run it.
+
+    An engine has it where the interface promises the engine's own bits.
+    """
+
+    def run(self, path: Path, commands: Array, keyframe: int | None) -> Array:
+        """Positions and velocities (n + 1, nq + nv) at the start and after each step.
+
+        Args:
+            path: The file.
+            commands: (n, nu) ctrl of each step.
+            keyframe: Where to start; None for the default state.
+        """
+        ...
+
+
 class RenderingPart(Protocol):
     """The part "rendering": pictures without a screen.
 

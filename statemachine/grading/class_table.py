@@ -69,11 +69,11 @@ def as_csv(entries: Iterable[ClassEntry]) -> str:
             entry.sha256,
             entry.made_with,
         )
-        writer.writerow([_safe(cell) for cell in row])
+        writer.writerow([no_formula(cell) for cell in row])
     return out.getvalue()
 
 
-def _safe(cell: object) -> object:
+def no_formula(cell: object) -> object:
     """No formula: a spreadsheet would run what a student wrote, or named the file."""
     return f"'{cell}" if isinstance(cell, str) and cell[:1] in "=+-@\t\r" and cell else cell
 

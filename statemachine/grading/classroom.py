@@ -6,15 +6,17 @@ import ast
 import hashlib
 import os
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 from ..errors import BadInputError
 from .class_table import ClassEntry, read, write
 from .exercise import LARGEST, TIME_LIMIT, ExerciseJudge, Grade
 from .judges import JUDGES
+from .parallel import checked_jobs, in_parallel
+
+_NAMES = ("step_loop.py", "test_arm.py")  # of the exercise's own files
 
 
 @dataclass(frozen=True)
@@ -35,14 +37,17 @@ def submissions(paths: Sequence[str | os.PathLike[str]]) -> list[Submission]:
     """The submissions among files and folders.
 
     In a folder each Python file is one, and each folder with one Python file that has at least
-    one of the functions of the exercise.
+    one of the functions of the exercise. One student's folder is one submission.
 
     Raises:
         BadInputError: A path is not there, or nothing is found at all.
     """
     found: dict[Path, Submission] = {}
     for each in map(Path, paths):
-        if each.is_dir():
+        if is_one_students(each):
+            name = each.resolve().name if len(paths) == 1 else each.as_posix()
+            found[each] = replace(_in_entry(each)[0], name=name)
+        elif each.is_dir():
             before = "" if len(paths) == 1 else f"{each.as_posix()}/"
             for entry in sorted(each.iterdir()):
                 if not _skipped(entry):
@@ -59,13 +64,28 @@ def submissions(paths: Sequence[str | os.PathLike[str]]) -> list[Submission]:
 
 def not_looked_at(paths: Sequence[str | os.PathLike[str]]) -> list[str]:
     """Names of the files in class folders that are no Python files."""
-    folders = [each for each in map(Path, paths) if each.is_dir()]
+    folders = [each for each in map(Path, paths) if each.is_dir() and not is_one_students(each)]
     return [
         entry.name
         for folder in folders
         for entry in sorted(folder.iterdir())
         if entry.is_file() and not _skipped(entry) and entry.suffix.lower() != ".py"
     ]
+
+
+def is_one_students(folder: Path) -> bool:
+    """Whether a folder is what one student works in, and not that of a class.
+
+    It holds one of the exercise's files under its own name, and nobody else's.
+    """
+    if not any((folder / name).is_file() for name in _NAMES):
+        return False
+    return not any(
+        _has_a_function(file)
+        for entry in folder.iterdir()
+        if not _skipped(entry) and entry.name not in _NAMES
+        for file in (entry.rglob("*.py") if entry.is_dir() else [entry])
+    )
 
 
 def _skipped(entry: Path) -> bool:
@@ -75,6 +95,8 @@ def _skipped(entry: Path) -> bool:
 
 def submission_in(folder: Path) -> Path:
     """The one file in a student's folder that has functions of the exercise.
+
+    Where there are several it is the one that is called `step_loop.py`.
 
     Raises:
         BadInputError: There is none, or more than one.
@@ -91,9 +113,12 @@ def _in_entry(entry: Path) -> list[Submission]:
     if not entry.is_dir():
         return []
     files = [file for file in sorted(entry.rglob("*.py")) if _has_a_function(file)]
+    files = [file for file in files if file.name == _NAMES[0]] or files
     if len(files) == 1:
         return [Submission(entry.name, files[0], folder=entry)]
     text = "no Python file in it has one of the functions"
+    if (tests := entry / _NAMES[1]).is_file():
+        text += f". Did you mean statemachine check --mutants {tests.as_posix()}?"
     if files:
         names = ", ".join(file.relative_to(entry).as_posix() for file in files[:3])
         text = f"{len(files)} files in it have the functions: {names}"
@@ -136,33 +161,34 @@ def judge_all(
         BadInputError: `jobs` is less than 1, or `table` is there and no such table.
         MissingEngineError: The backend's engine is not installed here.
     """
-    jobs = max(1, (os.cpu_count() or 1) // 2) if jobs is None else jobs
-    if jobs < 1:
-        raise BadInputError(f"jobs must be at least 1; got {jobs}")
+    jobs = checked_jobs(jobs, processors=2)
     before = read(table) if table is not None and table.exists() else {}
     entries: dict[str, ClassEntry] = {}
     code_of = cache(_code)  # the table is written after each file, and asks for all of them
-    with ExerciseJudge(backend, time_limit) as judge, ThreadPoolExecutor(jobs) as pool:
+    with ExerciseJudge(backend, time_limit) as judge:
         versions = " ".join(f"{name} {version}" for name, version in judge.versions.items())
         made_with = f"{backend}, {versions}, {time_limit:g} s"
-        try:
-            waiting: dict[Future[ClassEntry], str] = {}
-            for each in found:
-                digest = _digest(each)
-                known = before.get((digest, made_with))
-                if known is not None and known.judged:
-                    entries[each.name] = replace(known, name=each.name)
-                else:
-                    waiting[pool.submit(_entry, judge, each, digest, made_with)] = each.name
-            while waiting:
-                for future in wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED).done:
-                    entries[waiting.pop(future)] = future.result()
-                    if table is not None:
-                        write(table, _in_order(found, entries, code_of))
-                progress(1 - len(waiting) / len(found))
-        finally:
-            judge.stop.set()
-            pool.shutdown(wait=False, cancel_futures=True)
+        work: dict[str, Callable[[], ClassEntry]] = {}
+        for each in found:
+            digest = _digest(each)
+            known = before.get((digest, made_with))
+            if known is not None and known.judged:
+                entries[each.name] = replace(known, name=each.name)
+            else:
+                work[each.name] = partial(_entry, judge, each, digest, made_with)
+
+        def ended(name: str, entry: ClassEntry) -> None:
+            entries[name] = entry
+            if table is not None:
+                write(table, _in_order(found, entries, code_of))
+
+        in_parallel(
+            work,
+            jobs,
+            ended,
+            stop=judge.stop.set,
+            progress=lambda waiting: progress(1 - waiting / len(found)),
+        )
     done = _in_order(found, entries, code_of)
     if table is not None:
         write(table, done)

@@ -12,7 +12,6 @@ import hashlib
 import os
 import re
 import shutil
-import signal
 import sys
 import tempfile
 import threading
@@ -311,7 +310,7 @@ def _not_ready(outcome: sandbox.ProcessOutcome) -> str:
     if outcome.timed_out:
         how = f"the engine was not ready after {START:.0f} s, twice"
     else:
-        code = outcome.returncode if outcome.signal is None else _signal(outcome.signal)
+        code = outcome.returncode if outcome.signal is None else sandbox.signal_name(outcome.signal)
         how = f"the judge itself ended with {code}, twice"
     return (
         f"nothing could be judged: {how}. Your code was not run: this machine may be busy, or "
@@ -328,12 +327,5 @@ def _how_it_ended(limits: Limits, outcome: sandbox.ProcessOutcome) -> str:
     if outcome.out_of_memory:
         return "it asks for more memory than there is for it"
     if outcome.signal is not None:
-        return f"it crashed the process ({_signal(outcome.signal)})"
+        return f"it crashed the process ({sandbox.signal_name(outcome.signal)})"
     return f"it ended the process, with code {outcome.returncode}: a function must return"
-
-
-def _signal(number: int) -> str:
-    try:
-        return signal.Signals(number).name
-    except ValueError:
-        return f"signal {number}"

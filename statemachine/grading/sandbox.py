@@ -152,6 +152,14 @@ def run(
     )
 
 
+def signal_name(number: int) -> str:
+    """The name of the signal that ended a process."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
+
+
 def _limited(
     command: Sequence[str],
     cpu: float,

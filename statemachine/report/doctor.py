@@ -6,7 +6,7 @@ import importlib.metadata
 import platform
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..engines import needed_part
 from ..engines.parts import OpenGLPart
@@ -40,8 +40,8 @@ class Diagnosis:
 
 
 def examine() -> Diagnosis:
-    """Look at Python, the engines, rendering and the import name."""
-    findings = [_python(), *map(_engine, ENGINES), _rendering(), _clash()]
+    """Look at Python, the engines, rendering, the viewer and the import name."""
+    findings = [_python(), *map(_engine, ENGINES), _rendering(), _viewer(), _clash()]
     return Diagnosis(tuple(findings))
 
 
@@ -76,22 +76,38 @@ def _python() -> HealthCheck:
 
 
 def _engine(name: str) -> HealthCheck:
-    optional = name != DEFAULT
     code = f"from statemachine.installed import require; require({name!r})"
+    check = _imported(name, code, name != DEFAULT)
+    if check.works:
+        return replace(check, found=f"{engine_version(name)}, {ENGINES[name].role}")
+    told = any(word in check.found for word in ("pip install", "no wheel", "apt-get", "unset it"))
+    wheel = wheel_here(ENGINES[name])
+    if told or check.next_step or not wheel:
+        return check
+    return replace(check, next_step=f"pip install --force-reinstall {wheel.requirement}")
+
+
+def _viewer() -> HealthCheck:
+    name = "viser"
+    code = "from statemachine.view.server import require_viser; require_viser()"
+    check = _imported(name, code, optional=True)
+    if not check.works:
+        return check
+    return replace(check, found=f"{importlib.metadata.version(name)}, for `statemachine view`")
+
+
+def _imported(name: str, code: str, optional: bool) -> HealthCheck:
+    """Whether something can be imported, and what is said if not."""
     # In a subprocess: a broken engine may take its process down, or print at will.
     try:
         done = _run(code)
     except subprocess.TimeoutExpired:
         return HealthCheck(name, False, f"import takes over {_PATIENCE} s", "try again", optional)
     if done.returncode == 0:
-        found = f"{engine_version(name)}, {ENGINES[name].role}"
-        return HealthCheck(name, True, found, optional=optional)
+        return HealthCheck(name, True, "", optional=optional)
     reason = (done.stderr.strip().splitlines() or [f"import ended with code {done.returncode}"])[-1]
     reason = reason.removeprefix("statemachine.errors.MissingEngineError: ")
-    told = any(word in reason for word in ("pip install", "no wheel", "apt-get", "unset it"))
-    wheel = wheel_here(ENGINES[name])
-    step = "" if told or not wheel else f"pip install --force-reinstall {wheel.requirement}"
-    return HealthCheck(name, False, reason, step, optional)
+    return HealthCheck(name, False, reason, optional=optional)
 
 
 def _rendering() -> HealthCheck:

@@ -7,6 +7,7 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Iterator
+from contextlib import suppress
 
 from ..page import LETTERS, Question
 
@@ -77,6 +78,7 @@ class Reader:
 
     def _typed(self, prompt: str, end: str = "") -> str:
         """What the reader types, in small letters; `end` if there is nothing more to come."""
+        _forget_typed_ahead()
         try:
             typed = input(prompt).strip().lower().rstrip(")")
         except EOFError:
@@ -86,6 +88,22 @@ class Reader:
             raise Stopped
         self._rows = 0
         return typed
+
+
+def _forget_typed_ahead() -> None:
+    """Drop what was typed before there was a question: it is no answer to it."""
+    if not sys.stdin.isatty():
+        return
+    if sys.platform == "win32":
+        import msvcrt
+
+        while msvcrt.kbhit():
+            msvcrt.getwch()
+        return
+    import termios
+
+    with suppress(termios.error):  # it has gone
+        termios.tcflush(sys.stdin, termios.TCIFLUSH)
 
 
 def _room() -> int:

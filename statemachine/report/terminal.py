@@ -113,12 +113,12 @@ def spelled(error: UnicodeError) -> tuple[str, int]:
     return lacking.encode("ascii", "replace").decode(), error.end
 
 
-def judged(question: Question, choice: int) -> Verdict:
-    """What became of a prediction."""
+def judged(question: Question, choice: int) -> Text:
+    """What became of a prediction; the marks of a verdict are for what the run claims."""
     if choice == question.right:
-        return Verdict(f"as you said. {question.because}", True)
+        return Text(f"You predicted it: {LETTERS[choice]}. {question.because}")
     right = "none of them" if question.right is None else LETTERS[question.right]
-    return Verdict(f"you said {LETTERS[choice]}; it is {right}. {question.because}", False)
+    return Text(f"You predicted {LETTERS[choice]}; it is {right}. {question.because}")
 
 
 def _write(

@@ -1,0 +1,81 @@
+"""`statemachine robots`: any folder of models, and what each does on every engine."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ._common import SAYS_NO, add_json, complain, show
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Its options."""
+    parser.description = (
+        "Examine every MJCF and URDF in a folder and below it, each in a process of its own: does "
+        "it load, is it the bits of the engine without us, how far apart are two engines under "
+        "the same random commands, without contacts and with them, is a State restored, what does "
+        "the witness say, which experiments run, what does a step cost. Of one model: all that "
+        "was found."
+    )
+    parser.epilog = (
+        "Exit code 1: a model could not be examined to its end (it crashed, or took too long), or "
+        "what was found contradicts: other bits than the engine's, a restore that parts, a gap "
+        "without contacts that neither a warning nor the timestep accounts for, an explosion, a "
+        "witness that places a frame elsewhere. A refusal is a fact, and no fault."
+    )
+    parser.add_argument("paths", nargs="+", metavar="DIR|FILE", help="folders of models, or models")
+    parser.add_argument(
+        "--out",
+        default=None,
+        metavar="TABLE",
+        help="write the table there after each model, .csv or .json; typed again, it examines "
+        "only models that are new or changed",
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="leave out the experiments and the costs"
+    )
+    parser.add_argument(
+        "--seconds", type=float, default=60.0, metavar="S", help="that a model may take (60)"
+    )
+    parser.add_argument(
+        "--jobs",
+        type=int,
+        default=None,
+        metavar="N",
+        help="how many models at once (default: one for each processor)",
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of what is drawn (0)")
+    add_json(parser, "table")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Examine, and show."""
+    from ..report import robots as words
+    from ..report.progress import progress
+    from ..robots import examine_all, find
+    from ..robots.table import check_suffix
+    from ..traces.whole import check_place
+
+    out = Path(options.out) if options.out else None
+    if out is not None:
+        check_suffix(out)
+        check_place(out)
+    models = find(options.paths)
+    try:
+        with progress(f"{len(models)} models") as told:
+            survey = examine_all(
+                models,
+                quick=options.quick,
+                seconds=options.seconds,
+                jobs=options.jobs,
+                seed=options.seed,
+                table=out,
+                progress=told,
+            )
+    except KeyboardInterrupt:
+        if out is not None and out.exists():
+            return complain(f"stopped; {out} has what was examined. Type the same to go on", 130)
+        raise
+    show(words.page(survey), survey, options.json)
+    return SAYS_NO if survey.wrong else 0

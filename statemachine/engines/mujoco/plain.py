@@ -1,0 +1,34 @@
+"""A file as MuJoCo's own users run it: MjModel.from_xml_path, mj_step."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ...installed import require
+from ...interface import Array
+
+
+def run(path: Path, commands: Array, keyframe: int | None) -> Array:
+    """Positions and velocities (n + 1, nq + nv) at the start and after each step.
+
+    Args:
+        path: The file.
+        commands: (n, nu) ctrl of each step.
+        keyframe: Where to start; None for the default state.
+    """
+    mujoco = require("mujoco")
+    open_file = mujoco.MjModel.from_xml_path
+    if path.suffix.lower() == ".mjb":
+        open_file = mujoco.MjModel.from_binary_path
+    model = open_file(str(path))
+    data = mujoco.MjData(model)
+    if keyframe is not None:
+        mujoco.mj_resetDataKeyframe(model, data, keyframe)
+    rows = [np.concatenate((data.qpos, data.qvel))]
+    for ctrl in commands:
+        data.ctrl[:] = ctrl
+        mujoco.mj_step(model, data)
+        rows.append(np.concatenate((data.qpos, data.qvel)))
+    return np.array(rows)

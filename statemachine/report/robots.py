@@ -1,0 +1,291 @@
+"""A table of models, and one model in detail, as a page."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+from ..comparison.text import count, figure, listed, rough, sentence
+from ..page import Block, Page, Table, Text, Verdict
+from ..robots.examine import SCENARIOS
+from ..robots.gaps import STEPS
+from ..robots.records import RUNS, TOLERANCE, BackendRow, ExaminedModel, RunGap, Survey
+
+_NOTHING = "–"
+_WIDEST = 28  # characters of a name
+_LISTED = 20  # of what is wrong, and of features
+
+
+def page(survey: Survey, widest: int = _WIDEST) -> Page:
+    """The table; of one model alone, all that was found of it.
+
+    Args:
+        survey: What was found.
+        widest: Characters of a model's name.
+    """
+    if len(survey.models) == 1 and not survey.parts:
+        return _one(survey, survey.models[0])
+    others = _others(survey)
+    headers = ["model", "bits", *_headers(others), "witness", "runs", "cost"]
+    words = frozenset({0, 1, len(headers) - 3, len(headers) - 2})
+    rows = [[_short(row.file, widest), *_row(survey, row, others)] for row in survey.models]
+    blocks: list[Block] = [
+        Table(headers, rows, words=words, wide=frozenset({len(headers) - 1})),
+        Text(_legend(survey), small=True),
+    ]
+    blocks += [Text(text) for text in _sums(survey, others)]
+    for other in others:
+        blocks += _refused(survey.models, other)
+    if survey.parts:
+        files = count(len(survey.parts), "file")
+        verb = "is" if len(survey.parts) == 1 else "are"
+        blocks.append(Text(f"{files} that others include {verb} no model alone: left out."))
+    wrong = [(file, text) for file, said in survey.wrong.items() for text in said]
+    blocks += [Verdict(f"{file}: {text}", False) for file, text in wrong[:_LISTED]]
+    if len(wrong) > _LISTED:
+        blocks.append(Text(f"And {len(wrong) - _LISTED} more like these; --json has them all."))
+    if not wrong:
+        blocks.append(Verdict("every model was examined, and nothing contradicts another", True))
+    return Page(f"{count(len(survey.models), 'model')} on every engine", survey.made_with, blocks)
+
+
+def _others(survey: Survey) -> list[str]:
+    names = dict.fromkeys(name for row in survey.models for name in row.backends)
+    return [name for name in names if name != survey.default]
+
+
+def _headers(others: Sequence[str]) -> list[str]:
+    if len(others) == 1:
+        return ["no contacts", "contacts"]
+    return [f"{name}, {what}" for name in others for what in ("no contacts", "contacts")]
+
+
+def _row(survey: Survey, row: ExaminedModel, others: Sequence[str]) -> list[str]:
+    gaps = [
+        cell
+        for other in others
+        for cell in (
+            _gap(row, other, without=True),
+            _gap(row, other, without=False),
+        )
+    ]
+    return [_bits(survey, row), *gaps, _witness(row), _runs(row), _cost(row)]
+
+
+def _short(name: str, widest: int) -> str:
+    """The end of a long name, which tells more than its beginning."""
+    return name if len(name) <= widest else f"…{name[1 - widest :]}"
+
+
+def _bits(survey: Survey, row: ExaminedModel) -> str:
+    if row.ended:
+        return "ended"
+    first = row.backends.get(survey.default)
+    if first is None or (first.refusal and first.refusal_without):
+        return "no"
+    told = [value for each in row.backends.values() for value in _same(each)]
+    return "✗" if False in told else "✓" if True in told else _NOTHING
+
+
+def _same(row: BackendRow) -> tuple[bool | None, bool | None]:
+    return row.equals_engine, row.restores
+
+
+def _gap(model: ExaminedModel, other: str, without: bool) -> str:
+    row = model.backends.get(other)
+    if row is None:
+        return _NOTHING
+    gap = row.without_contacts if without else row.with_contacts
+    if gap is None:
+        return "refused" if (row.refusal_without if without else row.refusal) else _NOTHING
+    if not model.nv:
+        return "still"
+    if gap.explodes:
+        return "explodes"
+    if gap.ended:
+        return "stops"
+    return figure(gap.largest) + (" h" if gap.first_order else "")
+
+
+def _witness(row: ExaminedModel) -> str:
+    if row.witness is None:
+        return _NOTHING
+    if row.witness.gap is None:
+        return "refused"
+    return f"{row.witness.grade.partition(' ')[0]} {rough(row.witness.gap)}"
+
+
+def _runs(row: ExaminedModel) -> str:
+    counts = [_running(each) for each in row.backends.values() if each.scenarios]
+    return " ".join(map(str, counts)) or _NOTHING
+
+
+def _running(row: BackendRow) -> int:
+    return sum(word == RUNS for word in row.scenarios.values())
+
+
+def _cost(row: ExaminedModel) -> str:
+    costs = [f"{each.cost:.3g}" for each in row.backends.values() if each.cost is not None]
+    return " ".join(costs) or _NOTHING
+
+
+def _legend(survey: Survey) -> str:
+    backends = list(dict.fromkeys(name for row in survey.models for name in row.backends))
+    return (
+        f"bits: {survey.default} computes the bits of the engine without us, and two futures of a "
+        "State are the same bits on every engine. no contacts, contacts: the largest gap to "
+        f"{survey.default} within {STEPS} steps under random commands, in rad (hinges) or m "
+        "(slides and free bodies), whichever is larger; h: it vanishes with the timestep; "
+        "still: nothing in it moves. "
+        "witness: its reading, and its largest gap in m. runs: of "
+        f"{', '.join(SCENARIOS)}, how many run on {listed(backends)}."
+    )
+
+
+def _sums(survey: Survey, others: Sequence[str]) -> Iterator[str]:
+    rows = survey.models
+    first = [row.backends[survey.default] for row in rows if survey.default in row.backends]
+    same = sum(row.equals_engine is True for row in first)
+    yield (
+        f"{survey.default} loads {sum(row.loads for row in first)} of {len(rows)}, and computes "
+        f"the bits of the engine without us on {same}."
+    )
+    for other in others:
+        found = [row.backends[other] for row in rows if other in row.backends]
+        loads = sum(row.loads for row in found)
+        more = sum(not row.loads and not row.refusal_without for row in found)
+        gaps = [row.without_contacts for row in found if row.without_contacts]
+        small = sum(not gap.ended and gap.largest <= TOLERANCE for gap in gaps)
+        order = sum(not gap.ended and gap.first_order for gap in gaps)
+        text = f"{other} loads {loads} of {len(rows)}" + (
+            f", and {more} more with contacts off" if more else ""
+        )
+        text += (
+            f". Without contacts {small} of {len(gaps)} stay within {TOLERANCE:g} rad or m of "
+            f"{survey.default}"
+        )
+        yield text + (
+            f", and the gap of {order} more vanishes with the timestep." if order else "."
+        )
+    asked = [row.witness for row in rows if row.witness is not None]
+    if asked:
+        grades = Counter(witness.grade for witness in asked if witness.grade)
+        said = ", ".join(f"{number} by its {grade}" for grade, number in sorted(grades.items()))
+        yield f"The witness speaks of {sum(grades.values())} of {len(asked)}: {said or 'none'}."
+
+
+def _refused(rows: Sequence[ExaminedModel], other: str) -> list[Block]:
+    """What is refused, how often, and for how many models it alone stands in the way."""
+    all_of, alone, solved = Counter[str](), Counter[str](), Counter[str]()
+    for row in rows:
+        found = row.backends.get(other)
+        if found is None or not found.refusal:
+            continue
+        all_of.update(found.features)
+        alone.update(found.features if len(found.features) == 1 else ())
+        solved.update(found.features if not found.refusal_without else ())
+    if not all_of:
+        return []
+    return [
+        Table(
+            ("feature", "models", "the only one in", "not with contacts off in"),
+            [
+                (name, str(number), str(alone[name]), str(solved[name]))
+                for name, number in all_of.most_common(_LISTED)
+            ],
+            title=f"What {other} refuses",
+        )
+    ]
+
+
+def _one(survey: Survey, row: ExaminedModel) -> Page:
+    """All that was found of one model."""
+    names = list(row.backends)
+    blocks: list[Block] = []
+    if row.nq is not None:
+        sizes = f"nq {row.nq}, nv {row.nv}, nu {row.nu}, nbody {row.nbody}, ngeom {row.ngeom}"
+        blocks.append(Text(f"{sizes}; examined in {row.took:g} s."))
+    lines = [
+        ("loads", [_loads(row.backends[name]) for name in names]),
+        ("the bits of the engine without us", [_mark(_same(row.backends[n])[0]) for n in names]),
+        ("two futures of a State are one", [_mark(row.backends[n].restores) for n in names]),
+        ("gap without contacts", [_whole(row.backends[n].without_contacts) for n in names]),
+        ("gap with contacts", [_whole(row.backends[n].with_contacts) for n in names]),
+    ]
+    for name in SCENARIOS:
+        cells = [row.backends[n].scenarios.get(name) for n in names]
+        marks = [_NOTHING if cell is None else "✓" if cell == RUNS else "no" for cell in cells]
+        lines.append((f"scenario {name}", marks))
+    costs = [row.backends[n].cost for n in names]
+    lines.append(
+        (
+            "cost of a step, on this machine",
+            [_NOTHING if cost is None else f"{cost:.3g} ×" for cost in costs],
+        )
+    )
+    lines = [(what, cells) for what, cells in lines if set(cells) != {_NOTHING}]
+    table = Table(
+        ("", *names), [(what, *cells) for what, cells in lines], words=frozenset(range(9))
+    )
+    blocks += [table] if names else []
+    for name, found in row.backends.items():
+        for when, text in (("", found.refusal), (" with contacts off", found.refusal_without)):
+            if text and not (when and text == found.refusal):
+                blocks.append(Text(f"{name} refuses it{when}: {text}"))
+        blocks += [
+            Text(f"{name} warns: {text}") for text in found.warnings or found.warnings_without
+        ]
+        refused = dict.fromkeys(word for word in found.scenarios.values() if word != RUNS)
+        for reason in refused:
+            which = [scenario for scenario, word in found.scenarios.items() if word == reason]
+            blocks.append(Text(f"{', '.join(which)} on {name}: {reason}"))
+    if row.witness is not None:
+        blocks.append(Text(_witness_words(row)))
+    wrong = row.wrong(survey.default)
+    blocks += [Verdict(text, False) for text in wrong]
+    if not wrong:
+        blocks.append(Verdict("it was examined, and nothing contradicts another", True))
+    return Page(f"{row.file} on every engine", row.made_with, blocks)
+
+
+def _loads(row: BackendRow) -> str:
+    if row.loads:
+        return "✓"
+    return "no" if row.refusal_without else "with contacts off"
+
+
+def _mark(value: bool | None) -> str:
+    return _NOTHING if value is None else "✓" if value else "✗"
+
+
+def _whole(gap: RunGap | None) -> str:
+    if gap is None:
+        return _NOTHING
+    parts = [
+        f"{what} {rough(value)} {unit}"
+        for what, value, unit in (
+            ("hinge", gap.hinge, "rad"),
+            ("slide", gap.slide, "m"),
+            ("free body", gap.position, "m"),
+            ("turn", gap.turn, "rad"),
+        )
+        if value is not None
+    ]
+    text = ", ".join(parts) or _NOTHING
+    if gap.shrinks is not None:
+        text += f"; {gap.shrinks:.3g} times that at half the timestep"
+    return f"{text}; {gap.ended} (after {count(gap.steps, 'step')})" if gap.ended else text
+
+
+def _witness_words(row: ExaminedModel) -> str:
+    witness = row.witness
+    assert witness is not None
+    if witness.gap is None:
+        return f"The witness refuses it: {sentence(witness.refusal)}"
+    text = (
+        f"The witness, by its {witness.grade}, places {count(witness.frames, 'frame')} within "
+        f"{rough(witness.gap)} m of the engine."
+    )
+    if witness.refusal:
+        text += f" It has no reading of its own: {sentence(witness.refusal)}"
+    return text

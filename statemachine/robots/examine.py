@@ -1,0 +1,246 @@
+"""One model, examined: what it does on each engine that is here.
+
+It runs in a process of its own. What is known is told before each part, so that a part that
+crashes leaves what was found before it.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..backends import backend_names, load
+from ..engines import part
+from ..engines.auditing import SavePoint
+from ..errors import (
+    BadInputError,
+    DivergedError,
+    EngineWarning,
+    MissingEngineError,
+    ModelError,
+    StateMachineError,
+    UnsupportedError,
+)
+from ..installed import DEFAULT, WITNESS, require
+from ..interface import Model, get_state, make_data, reset, set_state, step
+from ..lessons.in_turns import Ratio, in_turns
+from ..scenarios import scenario
+from ..traces import record_scenario
+from . import gaps
+from .places import witness_row
+from .records import RUNS, BackendRow, ExaminedModel
+
+SCENARIOS = ("hold", "gravity", "droop", "waves")
+_SHORT = 40  # steps of a scenario
+_SAME = 200  # steps of the run that is compared with the engine without us
+_FUTURE = 60  # steps of each future of a State
+_ROUNDS, _TURN = 15, 0.005  # of the costs; a turn takes about so long [s]
+
+Tell = Callable[[ExaminedModel, str], object]  # what is known, and which part begins
+
+
+def examine(path: Path, row: ExaminedModel, quick: bool, seed: int, tell: Tell) -> ExaminedModel:
+    """Examine a model.
+
+    Args:
+        path: The file.
+        row: Its row with nothing in it yet.
+        quick: Whether to leave out scenarios and costs.
+        seed: Of all that is drawn.
+        tell: Told what is known so far, and what comes next.
+    """
+    return _Examination(path, row, seed, tell).all(quick)
+
+
+class _Examination:
+    def __init__(self, path: Path, row: ExaminedModel, seed: int, tell: Tell) -> None:
+        self.path, self.row, self.seed, self.tell = path, row, seed, tell
+        self.models: dict[str, Model] = {}  # by backend, with contacts
+        self.without: dict[str, Model] = {}  # without
+
+    def all(self, quick: bool) -> ExaminedModel:
+        for backend in backend_names():
+            with suppress(MissingEngineError):
+                self._load(backend)
+        if DEFAULT in self.models:
+            self._sizes(self.models[DEFAULT])
+        for backend, model in self._any().items():
+            with self._part(f"the engine alone, {backend}"):
+                self._put(backend, equals_engine=self._equals_engine(model))
+            with self._part(f"restore, {backend}"):
+                self._put(backend, restores=self._restores(model))
+        with self._part("witness"), suppress(MissingEngineError):
+            require(WITNESS)
+            model = self._any().get(DEFAULT)
+            if model is not None and model.nv:
+                self.row = replace(self.row, witness=witness_row(model, self.seed))
+        self._gaps()
+        if not quick:
+            for backend, model in self._any().items():
+                for name in SCENARIOS:
+                    with self._part(f"scenario {name}, {backend}"):
+                        known = self.row.backends[backend].scenarios
+                        self._put(backend, scenarios={**known, name: self._scenario(name, model)})
+                # The engine's own motors may throw it.
+                with self._part(f"cost, {backend}"), suppress(DivergedError):
+                    self._put(backend, cost=self._cost(model))
+        return self.row
+
+    @contextmanager
+    def _part(self, name: str) -> Iterator[None]:
+        """A part of the examination: an error in it costs this part alone."""
+        self.tell(self.row, name)
+        try:
+            yield
+        except Exception as error:  # what nobody meant to raise is what is looked for
+            words = " ".join(f"{name}: {type(error).__name__}: {error}".split())
+            self.row = replace(self.row, faults=(*self.row.faults, words[:300]))
+
+    def _put(self, backend: str, **found: Any) -> None:
+        row = replace(self.row.backends.get(backend, BackendRow()), **found)
+        self.row = replace(self.row, backends={**self.row.backends, backend: row})
+
+    def _any(self) -> dict[str, Model]:
+        """For each backend the Model with contacts, else that without."""
+        return {**self.without, **self.models}
+
+    def _load(self, backend: str) -> None:
+        self.tell(self.row, f"loading, {backend}")
+        refusals: dict[bool, str] = {}
+        features: tuple[str, ...] = ()
+        told: dict[bool, tuple[str, ...]] = {}
+        for contacts, kept in ((True, self.models), (False, self.without)):
+            options: dict[str, Any] = {} if contacts else {"contacts": False}
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                try:
+                    kept[backend] = load(self.path, backend, **options)
+                    refusals[contacts] = ""
+                except MissingEngineError:
+                    raise
+                except StateMachineError as error:
+                    refusals[contacts] = " ".join(str(error).split())
+                    features = features or _features(error)
+                except Exception as error:
+                    words = f"{type(error).__name__}: {error}"
+                    refusals[contacts] = " ".join(words.split())
+                    fault = f"loading, {backend}: {refusals[contacts]}"
+                    self.row = replace(self.row, faults=(*self.row.faults, fault[:300]))
+            told[contacts] = self._of_its_own(backend, caught)
+        self._put(
+            backend,
+            refusal=refusals[True],
+            refusal_without=refusals[False],
+            features=features,
+            warnings=told[True],
+            warnings_without=told[False],
+        )
+
+    def _of_its_own(
+        self, backend: str, caught: Sequence[warnings.WarningMessage]
+    ) -> tuple[str, ...]:
+        """Warnings of a backend that the default one did not give, too, each once."""
+        texts = [
+            " ".join(str(each.message).split())
+            for each in caught
+            if issubclass(each.category, EngineWarning)
+        ]
+        first = self.row.backends.get(DEFAULT)
+        if first is not None and backend != DEFAULT:
+            known = [text.partition(": ")[2] for text in first.warnings]
+            texts = [text for text in texts if not any(text.endswith(each) for each in known)]
+        return tuple(dict.fromkeys(texts))
+
+    def _sizes(self, model: Model) -> None:
+        sizes = {name: int(getattr(model, name)) for name in ("nq", "nv", "nu", "nbody", "ngeom")}
+        self.row = replace(self.row, **sizes)
+
+    def _equals_engine(self, model: Model) -> bool | None:
+        plain = part(model.backend, "plain")
+        if plain is None:
+            return None
+        orders = gaps.commands(model, _SAME, self.seed)
+        ours = gaps.run(model, orders)
+        theirs = plain.run(self.path, orders[: len(ours.qpos) - 1], gaps.keyframe_of(model))
+        rows = np.hstack((ours.qpos, ours.qvel))
+        return rows.tobytes() == theirs[: len(rows)].tobytes()
+
+    def _restores(self, model: Model) -> bool | None:
+        """Whether two futures of a State are one, and that of the run itself if promised."""
+        orders = gaps.commands(model, 2 * _FUTURE, self.seed)
+        ends = []
+        with make_data(model) as data:
+            reset(model, data, gaps.keyframe_of(model))
+            for ctrl in orders[:_FUTURE]:
+                data.ctrl[:] = ctrl
+                step(model, data)
+            state = get_state(model, data)
+            for again in range(3):
+                if again:
+                    set_state(model, data, state)
+                for ctrl in orders[_FUTURE:]:
+                    data.ctrl[:] = ctrl
+                    step(model, data)
+                ends.append(get_state(model, data))
+        if model.capabilities.exact_restore and ends[0] != ends[1]:
+            return False
+        return ends[1] == ends[2]
+
+    def _gaps(self) -> None:
+        """Each other backend against the default one."""
+        for kept, name, halve in (
+            (self.without, "without_contacts", True),
+            (self.models, "with_contacts", False),
+        ):
+            first = kept.get(DEFAULT)
+            for backend, model in kept.items():
+                if first is None or backend == DEFAULT:
+                    continue
+                with self._part(f"gap {name.replace('_', ' ')}, {backend}"):
+                    self._put(backend, **{name: gaps.run_gap(first, model, self.seed, halve)})
+
+    def _scenario(self, name: str, model: Model) -> str:
+        try:
+            record_scenario(scenario(name), model, seconds=_SHORT * model.timestep, seed=self.seed)
+        except (BadInputError, UnsupportedError) as error:  # it says that it makes no sense here
+            return " ".join(str(error).split())
+        return RUNS
+
+    def _cost(self, model: Model) -> float | None:
+        """Time of a step over that of the engine, driven by its own functions, in turns."""
+        audit = part(model.backend, "audit")
+        if audit is None or not model.nv:
+            return None
+        engine = audit.driver(model, self.seed)
+        ctrl = gaps.commands(model, 1, self.seed)[0]
+        with make_data(model) as data:
+            reset(model, data, gaps.keyframe_of(model))
+            point = SavePoint("start", "", model, data.qpos.copy(), data.qvel.copy(), ctrl, 0)
+            data.ctrl[:] = ctrl
+            with engine.at(point) as machine:
+
+                def ours(steps: int) -> None:
+                    for _ in range(steps):
+                        step(model, data)
+
+                first = in_turns({"": lambda: ours(3)}, 2)[""][-1] / 3
+                steps = max(1, min(500, round(_TURN / max(first, 1e-7))))
+                ways = {
+                    "ours": lambda: ours(steps),
+                    "alone": lambda: engine.advance(machine, steps),
+                }
+                times = in_turns(ways, _ROUNDS, seed=self.seed)
+        return round(Ratio.of("", times["ours"], times["alone"]).median, 3)
+
+
+def _features(error: StateMachineError) -> tuple[str, ...]:
+    """What of a model is refused, in a few words each."""
+    if isinstance(error, UnsupportedError):
+        return tuple(getattr(error, "features", ())) or (error.feature,)
+    return ("not read",) if isinstance(error, ModelError) else (type(error).__name__,)

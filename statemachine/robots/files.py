@@ -1,0 +1,128 @@
+"""The models among files and folders, by what is in the files."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+from ..errors import BadInputError
+from ..installed import DEFAULT
+from ..models import SUFFIXES
+from ..scenarios.provenance import model_digest, model_files
+
+_ROOTS = (DEFAULT, "robot")  # of MJCF, whose root is called after its engine, and of URDF
+_BINARY = ".mjb"
+_START = 65536  # bytes in which a file that is no XML may say what it was meant to be
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """A file that is a model, or a part of one.
+
+    Attributes:
+        name: What it is called in the table.
+        path: Where it is.
+        sha256: Digest of it and of what it includes; "" where it cannot be read.
+        part_of: The first file found that includes it; "" for none.
+    """
+
+    name: str
+    path: Path
+    sha256: str
+    part_of: str = ""
+
+
+def find(paths: Sequence[str | os.PathLike[str]]) -> list[ModelFile]:
+    """The models among files and folders, in an order that does not change.
+
+    In a folder, and in all below it, each MJCF and URDF is one; a binary model must be named.
+    A file without bodies, itself or in what it includes, is left out.
+
+    Raises:
+        BadInputError: A path is not there, or nothing is found at all.
+    """
+    found: dict[Path, ModelFile] = {}
+    for given in map(Path, paths):
+        if given.is_dir():
+            before = "" if len(paths) == 1 else f"{given.as_posix()}/"
+            for file in _below(given):
+                name = before + file.relative_to(given).as_posix()
+                found.setdefault(file.resolve(), ModelFile(name, file, ""))
+        elif not given.is_file():
+            raise BadInputError(f"there is no file or folder {given}")
+        elif given.suffix.lower() not in SUFFIXES:
+            raise BadInputError(f"{given} is no model: it does not end in {', '.join(SUFFIXES)}")
+        else:
+            found.setdefault(given.resolve(), ModelFile(given.as_posix(), given, ""))
+    if not found:
+        raise BadInputError(f"no models (MJCF or URDF) in {', '.join(map(str, paths))}")
+    owners: dict[Path, str] = {}
+    for each in found.values():
+        for part in _parts(each.path):
+            owners.setdefault(part.resolve(), each.name)
+    return [
+        replace(
+            each, path=each.path.absolute(), sha256=_digest(each.path), part_of=owners.get(path, "")
+        )
+        for path, each in found.items()
+    ]
+
+
+def _below(folder: Path) -> Iterator[Path]:
+    for file in sorted(folder.rglob("*")):
+        parts = file.relative_to(folder).parts
+        if any(part.startswith(".") or part in ("__pycache__", "__MACOSX") for part in parts):
+            continue
+        if file.suffix.lower() in SUFFIXES and file.suffix.lower() != _BINARY and file.is_file():
+            root = _root(file)
+            if root in _ROOTS and (root == "robot" or _has_bodies(file)):
+                yield file
+
+
+def _root(file: Path) -> str:
+    """The name of a file's root element; of one that is no XML, what it begins to be; or ""."""
+    try:
+        for _, element in ElementTree.iterparse(file, events=("start",)):
+            return element.tag
+    except (ElementTree.ParseError, UnicodeError, ValueError):
+        pass
+    except OSError:
+        return ""
+    with file.open("rb") as content:
+        start = content.read(_START)
+    return next((root for root in _ROOTS if f"<{root}".encode() in start), "")
+
+
+def _has_bodies(file: Path) -> bool:
+    """Whether a body is in an MJCF, or in what it includes; one that is no XML may have."""
+    try:
+        return any(
+            element.tag in ("body", "attach", "replicate", "composite", "flexcomp")
+            for each in model_files(file)
+            for _, element in ElementTree.iterparse(each, events=("start",))
+        )
+    except (ElementTree.ParseError, UnicodeError, ValueError, OSError):
+        return True
+
+
+def _parts(file: Path) -> Iterator[Path]:
+    """The files that a model includes."""
+    try:
+        yield from list(model_files(file))[1:]
+    except (UnicodeError, ValueError, OSError):
+        return
+
+
+def _digest(file: Path) -> str:
+    try:
+        return model_digest(file)
+    except (UnicodeError, ValueError, OSError):
+        pass
+    try:
+        return hashlib.sha256(file.read_bytes()).hexdigest()
+    except OSError:
+        return ""

@@ -1,0 +1,124 @@
+"""One run on two engines, under commands that a seed draws."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..engines.futures import Coordinates, gap
+from ..errors import StateMachineError
+from ..interface import Array, JointType, Model, make_data, reset, step
+from .records import TOLERANCE, RunGap
+
+STEPS = 400
+_HOLDS = 50  # steps that a command stays
+# Of its range, about the middle, that a command is drawn from: of a position servo, and of what
+# else there is, as a motor that drives a joint without end.
+_SHARE, _SHARE_OF_MOTOR = 0.5, 0.1
+_WIDE = 1e3  # a range beyond this says nothing of where an actuator works
+
+
+class Run(NamedTuple):
+    """A run: positions (n + 1, nq), velocities (n + 1, nv), and why it ended early, or ""."""
+
+    qpos: Array
+    qvel: Array
+    ended: str
+
+
+def commands(model: Model, steps: int, seed: int) -> Array:
+    """Random commands (steps, nu), a new one for all actuators every 50 steps."""
+    low, high = model.actuator_ctrlrange.T.copy()
+    joints = model.actuator_jntid
+    servo = np.isfinite(model.actuator_kp) & (joints >= 0)
+    for a in np.flatnonzero(servo):  # a servo without a range has that of its joint
+        if abs(low[a]) > _WIDE or abs(high[a]) > _WIDE:
+            limited = model.jnt_limited[joints[a]]
+            low[a], high[a] = model.jnt_range[joints[a]] if limited else (-1.0, 1.0)
+    wide = (np.abs(low) > _WIDE) | (np.abs(high) > _WIDE)
+    low[wide], high[wide] = -1.0, 1.0
+    share = np.where(servo, _SHARE, _SHARE_OF_MOTOR)
+    middle, half = (low + high) / 2, share * (high - low) / 2
+    drawn = np.random.default_rng(seed).uniform(-1, 1, (-(-steps // _HOLDS), model.nu))
+    return np.repeat(middle + half * drawn, _HOLDS, axis=0)[:steps]
+
+
+def keyframe_of(model: Model) -> int | None:
+    """Where a run of a model starts: its first keyframe, or None for the default state."""
+    return 0 if model.keyframes else None
+
+
+def run(model: Model, orders: Array) -> Run:
+    """Run a model from its start; `orders` (n, nu) is the ctrl of each step."""
+    qpos, qvel, ended = [], [], ""
+    with make_data(model) as data:
+        reset(model, data, keyframe_of(model))
+        qpos.append(data.qpos.copy())
+        qvel.append(data.qvel.copy())
+        for ctrl in orders:
+            data.ctrl[:] = ctrl
+            try:
+                step(model, data)
+            except StateMachineError as error:
+                ended = f"{model.backend} stopped: {error}"
+                break
+            qpos.append(data.qpos.copy())
+            qvel.append(data.qvel.copy())
+    return Run(np.array(qpos), np.array(qvel), ended)
+
+
+def run_gap(one: Model, other: Model, seed: int, halve: bool = False) -> RunGap:
+    """How far two Models of one file are apart, under the same commands.
+
+    Args:
+        one: On one engine.
+        other: On another.
+        seed: Of the commands.
+        halve: Whether to repeat it at half the timestep, where they part.
+    """
+    found = _gap(one, other, commands(one, STEPS, seed))
+    if not halve or found.ended or found.largest <= TOLERANCE:
+        return found
+    timestep = one.timestep / 2
+    try:
+        finer = [model.replace(timestep=timestep) for model in (one, other)]
+    except StateMachineError:
+        return found
+    orders = np.repeat(commands(one, STEPS, seed), 2, axis=0)
+    halved = _gap(finer[0], finer[1], orders)
+    if halved.ended or not halved.largest:
+        return found
+    return replace(found, shrinks=found.largest / halved.largest)
+
+
+def _gap(one: Model, other: Model, orders: Array) -> RunGap:
+    first, second = run(one, orders), run(other, orders)
+    rows = min(len(first.qpos), len(second.qpos))
+    a, b = first.qpos[:rows], second.qpos[:rows]
+    places: dict[JointType, list[int]] = {kind: [] for kind in JointType}
+    for kind, start in zip(one.jnt_type.tolist(), one.jnt_qposadr.tolist(), strict=True):
+        places[JointType(kind)].append(start)
+    free = [start + k for start in places[JointType.FREE] for k in range(3)]
+    quats = [*places[JointType.BALL], *(start + 3 for start in places[JointType.FREE])]
+    hinges, slides = places[JointType.HINGE], places[JointType.SLIDE]
+
+    def angle(joints: list[int], turns: list[int]) -> float | None:
+        used = Coordinates(tuple(joints), (), tuple(turns))
+        return gap(a, b, used).angle if joints or turns else None
+
+    def length(coordinates: list[int]) -> float | None:
+        used = Coordinates((), tuple(coordinates), ())
+        return gap(a, b, used).length if coordinates else None
+
+    return RunGap(
+        steps=rows - 1,
+        hinge=angle(hinges, []),
+        slide=length(slides),
+        position=length(free),
+        turn=angle([], quats),
+        moved=float(np.abs(a - a[0]).max(initial=0.0)),
+        fastest=float(np.abs(second.qvel[:rows]).max(initial=0.0)),
+        ended=first.ended or second.ended,
+    )

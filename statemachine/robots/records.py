@@ -1,0 +1,215 @@
+"""What is found of a model, as records of plain values: they cross processes and fill tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+TOLERANCE = 1e-6  # of a gap without contacts [rad or m]
+PLACES = 1e-9  # of a gap to the witness [m]
+_FAR = 10.0  # times as far as the first engine moves anything
+_STILL = 0.3  # [rad or m]: what moves less than this may be pushed about by a contact
+_FIRST_ORDER = 1.5  # by how much a gap shrinks at least with half the timestep
+RUNS = "runs"
+
+
+@dataclass(frozen=True)
+class RunGap:
+    """How far two engines are apart over a run under the same commands.
+
+    Attributes:
+        steps: How many steps were compared.
+        hinge: The largest difference of a hinge [rad]; None where the model has none.
+        slide: That of a slide [m].
+        position: That of a coordinate of a free body's origin [m].
+        turn: That of the orientation of a free body or ball joint [rad].
+        moved: How far the first engine moved any of them [rad or m].
+        fastest: The largest velocity on the other engine [rad/s or m/s].
+        ended: Why a side ended early; "" if none did.
+        shrinks: The gap divided by that at half the timestep; None where not measured.
+    """
+
+    steps: int
+    hinge: float | None = None
+    slide: float | None = None
+    position: float | None = None
+    turn: float | None = None
+    moved: float = 0.0
+    fastest: float = 0.0
+    ended: str = ""
+    shrinks: float | None = None
+
+    @property
+    def largest(self) -> float:
+        """The largest of them, in SI units; 0 where there is none."""
+        return max((self.hinge or 0.0, self.slide or 0.0, self.position or 0.0, self.turn or 0.0))
+
+    @property
+    def explodes(self) -> bool:
+        """Whether the other engine went far beyond where the first one went."""
+        return self.largest > _FAR * max(self.moved, _STILL)
+
+    @property
+    def first_order(self) -> bool:
+        """Whether it vanishes with the timestep, as that of two integrators does."""
+        return self.shrinks is not None and self.shrinks >= _FIRST_ORDER
+
+
+@dataclass(frozen=True)
+class BackendRow:
+    """What a model does on one backend.
+
+    Attributes:
+        refusal: Why it does not load; "" if it does.
+        refusal_without: The same with contacts off.
+        features: What of the model is refused, each in a few words.
+        warnings: What was told when it was loaded, and the default backend did not tell.
+        warnings_without: The same with contacts off.
+        equals_engine: Whether a run has the bits of the engine without us; None if not asked.
+        restores: Whether two futures of one State are the same bits, and, where the backend
+            promises it, those of the run itself; None if not asked.
+        without_contacts: Gap to the default backend where nothing touches anything.
+        with_contacts: The same with contacts.
+        scenarios: By name: "runs", or why it does not.
+        cost: Time of a step over that of the engine without us, on this machine.
+    """
+
+    refusal: str = ""
+    refusal_without: str = ""
+    features: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    warnings_without: tuple[str, ...] = ()
+    equals_engine: bool | None = None
+    restores: bool | None = None
+    without_contacts: RunGap | None = None
+    with_contacts: RunGap | None = None
+    scenarios: dict[str, str] = field(default_factory=dict)
+    cost: float | None = None
+
+    @property
+    def loads(self) -> bool:
+        """Whether it loads with contacts."""
+        return not self.refusal
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether the gap without contacts is one that nothing accounts for.
+
+        What accounts for it: a warning at load that names a difference, or that the gap
+        vanishes with the timestep.
+        """
+        gap = self.without_contacts
+        if gap is None:
+            return False
+        beyond = gap.largest > TOLERANCE and not gap.first_order and not self.warnings_without
+        return beyond or bool(gap.ended)
+
+
+@dataclass(frozen=True)
+class WitnessRow:
+    """What the witness says.
+
+    Attributes:
+        grade: "own reading" or "same reading"; "" where it refuses.
+        refusal: Why; of a same reading, why it has none of its own.
+        frames: How many bodies or sites were compared.
+        gap: The largest distance between the engine's and its own [m].
+    """
+
+    grade: str = ""
+    refusal: str = ""
+    frames: int = 0
+    gap: float | None = None
+
+
+@dataclass(frozen=True)
+class ExaminedModel:
+    """What was found of one model.
+
+    Attributes:
+        file: What it is called in the table.
+        sha256: Digest of the file and of what it includes.
+        made_with: Versions and settings.
+        limit: Time that it had [s].
+        took: Time that it took [s].
+        part_of: The file that includes it; "" for none.
+        ended: Why the examination did not come to its end; "" if it did.
+        faults: Errors that nobody meant to raise, and in which part of the examination.
+        nq, nv, nu, nbody, ngeom: Sizes; None where the default backend cannot read it.
+        backends: What was found on each backend that is here.
+        witness: What the witness says; None where it is not here.
+    """
+
+    file: str
+    sha256: str
+    made_with: str
+    limit: float = 0.0
+    took: float = 0.0
+    part_of: str = ""
+    ended: str = ""
+    faults: tuple[str, ...] = ()
+    nq: int | None = None
+    nv: int | None = None
+    nu: int | None = None
+    nbody: int | None = None
+    ngeom: int | None = None
+    backends: dict[str, BackendRow] = field(default_factory=dict)
+    witness: WitnessRow | None = None
+
+    @property
+    def is_model(self) -> bool:
+        """Whether it is a model of its own: a part of another file must load, and move."""
+        return not self.part_of or bool(self.nv)
+
+    def wrong(self, default: str) -> tuple[str, ...]:
+        """What must not be, in short sentences.
+
+        Args:
+            default: The backend that the others are compared with.
+        """
+        said = [self.ended] if self.ended else []
+        said += self.faults
+        for name, row in self.backends.items():
+            if row.equals_engine is False:
+                said.append(f"{name}: not the bits of the engine without us")
+            if row.restores is False:
+                said.append(f"{name}: two restores of one State part")
+            if name != default and row.unexplained:
+                said.append(f"{name}: {_gap_words(row.without_contacts)}")
+            gap = row.with_contacts
+            if gap is not None and gap.explodes:
+                said.append(f"{name}: it explodes with contacts, to {gap.largest:.0e} rad or m")
+        witness = self.witness
+        if witness is not None and witness.gap is not None and not witness.gap <= PLACES:
+            said.append(f"the witness places a frame {witness.gap:.1e} m elsewhere")
+        return tuple(said)
+
+
+def _gap_words(gap: RunGap | None) -> str:
+    assert gap is not None
+    if gap.ended:
+        return f"without contacts, {gap.ended}"
+    return f"a gap of {gap.largest:.1e} without contacts that nothing accounts for"
+
+
+@dataclass(frozen=True)
+class Survey:
+    """A table of models.
+
+    Attributes:
+        default: The backend that the others are compared with.
+        models: One row each, in the order of the files.
+        parts: Files that are no models of their own but parts of others.
+        made_with: Versions and settings.
+    """
+
+    default: str
+    models: Sequence[ExaminedModel]
+    parts: Sequence[ExaminedModel]
+    made_with: str
+
+    @property
+    def wrong(self) -> Mapping[str, tuple[str, ...]]:
+        """What must not be, by file."""
+        found = {row.file: row.wrong(self.default) for row in self.models}
+        return {file: said for file, said in found.items() if said}

@@ -1,0 +1,350 @@
+"""A folder of models: what is found in it, and that no model can spoil the table."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from statemachine.errors import BadInputError
+from statemachine.report.robots import page
+from statemachine.report.terminal import show
+from statemachine.robots import (
+    BackendRow,
+    ExaminedModel,
+    RunGap,
+    Survey,
+    WitnessRow,
+    examine_all,
+    find,
+    many,
+)
+from statemachine.robots import table as tables
+
+from .conftest import ROOT, Cli, need_engine
+
+GOOD = """<mujoco><option timestep='0.002'/><worldbody>
+<body name='arm' pos='0 0 1'><joint name='j' axis='0 1 0' damping='0.1'/>
+<geom name='rod' type='capsule' fromto='0 0 0 0.4 0 0' size='0.03'/>
+<body name='hand' pos='0.4 0 0'><joint name='k' axis='0 1 0' damping='0.1'/>
+<geom type='sphere' size='0.05'/></body></body></worldbody>
+<actuator><position joint='j' kp='5' ctrlrange='-1 1'/></actuator></mujoco>"""
+TENDON = GOOD.replace(
+    "</mujoco>", "<tendon><fixed name='t'><joint joint='j' coef='1'/></fixed></tendon></mujoco>"
+)
+URDF = """<robot name='r'><link name='base'/><link name='tip'><inertial><mass value='1'/>
+<inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial></link>
+<joint name='a' type='revolute'><parent link='base'/><child link='tip'/><axis xyz='0 1 0'/>
+<limit lower='-1' upper='1' effort='1' velocity='1'/></joint></robot>"""
+# Read before anything else by the Python that examines; by the name of its model it goes wrong.
+SABOTAGE = """
+import json, os, sys, time
+if "statemachine.robots._child" in " ".join(sys.orig_argv):
+    file = json.load(open(sys.orig_argv[-2]))["file"]
+    if "crash" in file:
+        os.abort()
+    if "hang" in file:
+        time.sleep(600)
+    if "memory" in file:
+        sys.stderr.write("MemoryError")
+        os._exit(1)
+    with open(os.environ["EXAMINED"], "a") as log:
+        log.write(file + "\\n")
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    home = tmp_path / "robots"
+    (home / "parts").mkdir(parents=True)
+    (home / ".git").mkdir()
+    (home / "good.xml").write_text(GOOD)
+    (home / "arm.urdf").write_text(URDF)
+    (home / "broken.xml").write_text("<mujoco><worldbody><body></worldbody>")
+    (home / "scene.xml").write_text("<mujoco><include file='parts/hand.xml'/></mujoco>")
+    (home / "parts" / "hand.xml").write_text(
+        "<mujoco><worldbody><body><geom size='.1' material='m'/></body></worldbody></mujoco>"
+    )
+    (home / "parts" / "colours.xml").write_text("<mujoco><asset/></mujoco>")
+    (home / "tendon.xml").write_text(TENDON)
+    (home / "package.xml").write_text("<package/>")
+    (home / "binary.mjb").write_bytes(b"\0")
+    (home / ".git" / "old.xml").write_text(GOOD)
+    (home / "notes.txt").write_text("none")
+    return home
+
+
+@pytest.fixture
+def sabotage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Models of some names go wrong; the file in which the others are noted."""
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site" / "sitecustomize.py").write_text(SABOTAGE)
+    monkeypatch.syspath_prepend(tmp_path / "site")
+    log = tmp_path / "examined.txt"
+    log.touch()
+    monkeypatch.setenv("EXAMINED", str(log))
+    return log
+
+
+def test_what_is_a_model(folder: Path) -> None:
+    found = {each.name: each for each in find([folder])}
+    assert list(found) == [
+        "arm.urdf", "broken.xml", "good.xml", "parts/hand.xml", "scene.xml", "tendon.xml"
+    ]  # fmt: skip
+    assert found["parts/hand.xml"].part_of == "scene.xml"
+    assert not found["scene.xml"].part_of
+    assert all(each.path.is_absolute() and len(each.sha256) == 64 for each in found.values())
+    before = found["scene.xml"].sha256
+    (folder / "parts" / "hand.xml").write_text(GOOD)
+    after = {each.name: each.sha256 for each in find([folder])}
+    assert after["scene.xml"] != before  # what it includes has changed
+    assert after["good.xml"] == found["good.xml"].sha256
+
+
+def test_files_are_named_too(folder: Path) -> None:
+    good, binary = folder / "good.xml", folder / "binary.mjb"
+    assert [each.path for each in find([good, binary, good])] == [good, binary]
+    with pytest.raises(BadInputError, match="no file or folder"):
+        find([folder / "none"])
+    with pytest.raises(BadInputError, match="is no model"):
+        find([folder / "notes.txt"])
+    with pytest.raises(BadInputError, match="no models"):
+        find([folder / ".git" / "..", folder / ".git"][:0] or [_empty(folder)])
+
+
+def _empty(folder: Path) -> Path:
+    (folder / "empty").mkdir()
+    return folder / "empty"
+
+
+def test_a_table_of_all_that_can_go_wrong(folder: Path, sabotage: Path, tmp_path: Path) -> None:
+    need_engine("pybullet")
+    for name in ("crash", "hang", "memory"):
+        (folder / f"{name}.xml").write_text(GOOD)
+    table = tmp_path / "table.json"
+    survey = examine_all(find([folder]), quick=True, seconds=25, jobs=3, table=table)
+    rows = {row.file: row for row in survey.models}
+    assert list(rows) == [
+        "arm.urdf", "broken.xml", "crash.xml", "good.xml", "hang.xml", "memory.xml", "scene.xml",
+        "tendon.xml",
+    ]  # fmt: skip
+    assert [row.file for row in survey.parts] == ["parts/hand.xml"]
+    good = rows["good.xml"]
+    assert (good.nq, good.nv, good.nu) == (2, 2, 1)
+    mujoco, pybullet = good.backends["mujoco"], good.backends["pybullet"]
+    assert mujoco.equals_engine
+    assert mujoco.restores
+    assert pybullet.restores
+    assert pybullet.equals_engine is None
+    gap = pybullet.without_contacts
+    assert gap is not None
+    assert gap.moved > 0.1
+    assert gap.hinge is not None
+    assert gap.hinge < 1e-9
+    assert gap.slide is None
+    assert pybullet.with_contacts is not None
+    assert not good.faults
+    assert not mujoco.scenarios  # quick
+    assert rows["tendon.xml"].backends["pybullet"].features == ("tendon",)
+    assert "tendon" in rows["tendon.xml"].backends["pybullet"].refusal
+    assert rows["tendon.xml"].backends["mujoco"].equals_engine
+    assert "cannot read" in rows["broken.xml"].backends["mujoco"].refusal
+    assert rows["arm.urdf"].nv == 1
+    assert rows["crash.xml"].ended.startswith("it crashed (SIGABRT)")
+    assert rows["hang.xml"].ended.startswith("not at its end after 25 s")
+    assert "more than" in rows["memory.xml"].ended
+    assert set(survey.wrong) == {"crash.xml", "hang.xml", "memory.xml"}
+    assert not page(survey).holds
+    # Typed again: only what ended otherwise than it should is tried again, and what is new.
+    sabotage.write_text("")
+    (folder / "good.xml").write_text(GOOD.replace("0.05", "0.06"))
+    again = examine_all(find([folder]), quick=True, seconds=26, jobs=3, table=table)
+    assert sabotage.read_text().split() == ["good.xml"]
+    assert [row.file for row in again.models] == list(rows)
+    assert {row.file: row for row in again.models}["tendon.xml"] == rows["tendon.xml"]
+
+
+def test_scenarios_and_costs(folder: Path) -> None:
+    (row,) = examine_all(find([folder / "good.xml"])).models
+    for backend in row.backends.values():
+        assert backend.scenarios["gravity"] == "runs"
+        assert set(backend.scenarios) == {"hold", "gravity", "droop", "waves"}
+        assert backend.cost is not None
+        assert backend.cost > 0
+    assert not row.faults
+
+
+def test_an_error_in_one_part_costs_that_part(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from statemachine.robots import examine, gaps
+
+    monkeypatch.setattr(examine, "get_state", lambda *_: 1 / 0)
+    told: list[str] = []
+    row = examine.examine(
+        folder / "good.xml", ExaminedModel("good.xml", "", ""), True, 0, lambda _, s: told.append(s)
+    )
+    assert row.faults[0] == "restore, mujoco: ZeroDivisionError: division by zero"
+    assert row.backends["mujoco"].equals_engine
+    assert "gap without contacts, pybullet" in told or "pybullet" not in row.backends
+    assert row.wrong("mujoco")
+    # What is not the engine's own is seen.
+    monkeypatch.setattr(gaps, "commands", lambda m, n, _: gaps.np.full((n, m.nu), 0.5))
+    plain = examine.part("mujoco", "plain")
+    real = plain.run
+    monkeypatch.setattr(plain, "run", lambda path, ctrl, key: real(path, ctrl + 1e-15, key))
+    row = examine.examine(folder / "good.xml", row, True, 0, lambda *_: None)
+    assert row.backends["mujoco"].equals_engine is False
+    assert "mujoco: not the bits of the engine without us" in row.wrong("mujoco")
+
+
+ROW = ExaminedModel(
+    "a/b.xml", "0" * 64, "with", 60.0, 1.5, "", "", ("one: \u00e4, \"b\"", "two"), 2, 2, 1, 3, 4,
+    {
+        "mujoco": BackendRow(
+            equals_engine=True, restores=True, scenarios={"hold": "runs", "droop": "-"}, cost=1.01
+        ),
+        "pybullet": BackendRow(
+            "it has a tendon", "", ("tendon",), ("RK4",), ("RK4",), None, False,
+            RunGap(400, 4e-4, None, 2.5e-17, 0.0, 1.0, 3.0, "", 2.0), None,
+        ),
+    },
+    WitnessRow("own reading", "", 2, 1e-16),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".json"])
+def test_a_table_is_read_as_it_was_written(tmp_path: Path, suffix: str) -> None:
+    bare = ExaminedModel("=c.xml", "1" * 64, "with", ended="it crashed")
+    target = tmp_path / f"table{suffix}"
+    tables.write(target, [ROW, bare])
+    read = tables.read(target)
+    assert read[ROW.file, ROW.sha256, "with"] == ROW
+    assert list(read.values())[1] == bare
+    if suffix == ".csv":
+        cells = list(csv.DictReader(target.open(encoding="utf-8-sig")))
+        assert cells[0]["backends.pybullet.without_contacts.hinge"] == "0.0004"
+        assert cells[1]["file"] == "'=c.xml"  # no formula
+    else:
+        assert [row["file"] for row in json.loads(target.read_text())] == [ROW.file, "=c.xml"]
+    target.write_text("a,b\n1,2\n" if suffix == ".csv" else '{"a": 1}')
+    with pytest.raises(BadInputError, match="is no table of models"):
+        tables.read(target)
+
+
+def test_what_is_wrong() -> None:
+    pybullet = ROW.backends["pybullet"]
+
+    def wrong(row: ExaminedModel = ROW, **changes: object) -> str:
+        backend = replace(pybullet, restores=True, **changes)
+        return " ".join(replace(row, faults=(), backends={"pybullet": backend}).wrong("mujoco"))
+
+    far = RunGap(400, 1e-3, moved=1.0)
+    assert not wrong()
+    assert "two restores" in " ".join(ROW.wrong("mujoco"))
+    assert "nothing accounts for" in wrong(without_contacts=far, warnings_without=())
+    assert not wrong(without_contacts=far, warnings_without=("RK4 acts as Euler",))
+    assert not wrong(without_contacts=replace(far, shrinks=2.0), warnings_without=())
+    assert "nothing accounts" in wrong(
+        without_contacts=replace(far, shrinks=1.0), warnings_without=()
+    )
+    assert "stopped" in wrong(without_contacts=replace(far, ended="pybullet stopped"))
+    assert "explodes" in wrong(with_contacts=replace(far, hinge=1e10))
+    assert not wrong(with_contacts=replace(far, hinge=3.0))  # contacts may part
+    assert "the witness" in wrong(replace(ROW, witness=WitnessRow("own reading", "", 1, 1e-3)))
+    nan = replace(ROW, witness=WitnessRow("own reading", "", 1, float("nan")))
+    assert "the witness" in wrong(nan)
+
+
+def test_a_page_of_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
+    long = replace(ROW, file="a_very_long_folder/" * 4 + "robot.xml")
+    survey = Survey(
+        "mujoco", (long, ROW, replace(ROW, file="c.xml", ended="x", witness=None)), (), "w"
+    )
+    show(page(survey))
+    out = capsys.readouterr().out
+    assert max(map(len, out.splitlines())) <= 80
+    assert "…" in out
+    assert "4e-4 h" in out
+    assert "refused" in out
+    assert "own 2e-16" in out or "own 1e-16" in out
+    (row,) = [line for line in out.splitlines() if line.startswith("tendon")]
+    assert row.split() == ["tendon", "3", "3", "3"]
+    show(page(Survey("mujoco", (ROW,), (), "w")))
+    out = capsys.readouterr().out
+    assert "pybullet refuses it: it has a tendon" in out
+    assert "pybullet warns: RK4" in out
+    assert max(map(len, out.splitlines())) <= 80
+
+
+@pytest.mark.slow
+def test_the_command(cli: Cli, folder: Path) -> None:
+    done = cli("robots", str(folder), "--quick", "--json", "--jobs", "2")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert {"default", "models", "parts", "made_with", "wrong"} == set(told)
+    row = told["models"][0]
+    assert {"file", "sha256", "nq", "backends", "witness", "faults", "ended"} <= set(row)
+    done = cli("robots", str(folder / "good.xml"), "--quick")
+    assert "gap without contacts" in done.stdout
+    assert done.returncode == 0
+    for words, text in (
+        (["--out", "t.txt"], "ends in .csv or .json"),
+        (["--jobs", "0"], "jobs must be"),
+        (["--seconds", "0"], "seconds must be"),
+        (["--seed", "-1"], "seed must not"),
+    ):
+        done = cli("robots", str(folder / "good.xml"), *words)
+        assert done.returncode == 2
+        assert text in done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_leaves_a_table_and_no_process(
+    folder: Path, sabotage: Path, tmp_path: Path, number: signal.Signals
+) -> None:
+    (folder / "hang.xml").write_text(GOOD)
+    table = tmp_path / "table.csv"
+    paths = os.pathsep.join([str(tmp_path / "site"), str(ROOT)])
+    process = subprocess.Popen(
+        [sys.executable, "-m", "statemachine", "robots", str(folder), "--quick", "--jobs", "3",
+         "--out", str(table), "--seconds", "300"],
+        env={**os.environ, "PYTHONPATH": paths}, text=True, stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )  # fmt: skip
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline and not (table.exists() and len(tables.read(table)) == 6):
+        time.sleep(0.2)
+    process.send_signal(number)
+    _, err = process.communicate(timeout=60)
+    if number is signal.SIGINT:
+        assert process.returncode == 130
+        assert "Type the same to go on" in err
+    else:
+        assert process.returncode == -signal.SIGTERM
+    assert len(tables.read(table)) == 6
+    for entry in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            words = entry.read_bytes()
+        except OSError:
+            continue
+        environment = entry.parent / "environ"
+        if b"robots._child" in words:
+            assert str(sabotage).encode() not in environment.read_bytes()
+
+
+def test_versions_and_settings_are_part_of_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    quick, whole = many._made_with(True, 0), many._made_with(False, 1)
+    assert quick.endswith(", quick")
+    assert "seed 1" in whole
+    assert "mujoco" in whole
