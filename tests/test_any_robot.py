@@ -22,6 +22,8 @@ from statemachine.scenarios import SCENARIOS, fitting
 from statemachine.scenarios.commands import hold_ctrl, is_servo
 from statemachine.traces import record_scenario
 
+from .conftest import need_engine
+
 # A slide with a servo whose gear is 2, a hinge with a motor of gear 3 that holds a load, and a
 # hinge that a velocity servo drives.
 MIXED = """<mujoco><worldbody>
@@ -305,6 +307,16 @@ def test_an_actuator_may_take_several_numbers_of_ctrl(model: Any) -> None:
     trace = record_scenario(SCENARIOS["waves"], robot, seconds=0.05)
     assert trace.header.actuators == names
     assert main(["compare", "--models", str(robot.path), str(robot.path)]) == 0
+
+
+def test_no_filler_of_ours_is_shown(model: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    need_engine("pybullet")
+    file = str(model(MIXED.format(rest="").replace(' range="-1 1" limited="true"', "")).path)
+    # The robots are the same; a motor whose ctrl has a range may differ in what it can exert.
+    main(["compare", "--models", file, "--backends", "mujoco", "pybullet"])
+    said = capsys.readouterr().out
+    assert "e+09" not in said
+    assert "e+12" not in said
 
 
 class _Registry(types.ModuleType):
