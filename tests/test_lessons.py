@@ -363,11 +363,20 @@ def test_of_which_moment_a_step_leaves_what(backend: str) -> None:
     assert {"xpos", "site_xpos", "contacts"} <= set(stages.same)
 
 
+def test_a_model_without_actuators_has_no_commands_to_tell(cli: Cli, tmp_path: Path) -> None:
+    (file := tmp_path / "passive.xml").write_text(_SLIDE)
+    said = " ".join(cli("lesson", "objects", "--model", str(file)).stdout.split())
+    assert "took 200 steps in turn. Each ended" in said
+    said = " ".join(cli("lesson", "objects").stdout.split())
+    assert "took 200 steps in turn, each with its own ctrl, and no two of them ended alike" in said
+
+
 def test_what_keyframe_0_of_the_public_scene_is(cli: Cli, menagerie: Path) -> None:
     done = cli("lesson", "reset", "--menagerie", str(menagerie))
     assert done.returncode == 0, done.stderr
     said = " ".join(done.stdout.split())
-    assert "The box is not held: 4 contacts with what does not move, none with the robot" in said
+    not_held = "The box is not held: it has 4 contacts with what does not move, and none with the"
+    assert not_held in said
     assert "is mistaken" in said
 
 
@@ -754,7 +763,7 @@ def test_broken_code_differs_as_its_page_says(way: str, steps: int) -> None:
 def test_two_worst_joints_are_named() -> None:
     page, taken = _take("hold", "mujoco")
     target, free = taken.result.goal, taken.result.without_contacts
-    (said,) = (b.text for b in page.blocks if isinstance(b, Text) and "contacts left out" in b.text)
+    (said,) = (b.text for b in page.blocks if isinstance(b, Text) and "without contacts" in b.text)
     for gaps in (taken.result.qpos[-1] - target, free - target):
         joint = int(np.argmax(np.abs(gaps)))
         assert f"{taken.result.joints[joint]}, by {np.degrees(abs(gaps[joint])):.2f}°" in said

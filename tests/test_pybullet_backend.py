@@ -469,7 +469,9 @@ _G = '<geom size="0.1" mass="1"/>'
 _JOINT = f'<worldbody><body name="x"><joint name="j"/>{_G}</body></worldbody>'
 REFUSED = {
     "ball joint": _world(f'<body><joint name="wrist" type="ball"/>{_G}</body>'),
-    "joint margin": _world(f'<body><joint name="wrist" range="-1 1" margin="0.1"/>{_G}</body>'),
+    "two limits at once": _world(
+        f'<body><joint name="wrist" range="-1 1" margin="0.1"/>{_G}</body>'
+    ),
     "mocap body": _world(f'<body name="hand" mocap="true">{_G}</body>'),
     "equality constraint": f'{_JOINT}<equality><joint joint1="j"/></equality>',
     "tendon": f'{_JOINT}<tendon><fixed><joint joint="j" coef="1"/></fixed></tendon>',
@@ -502,7 +504,7 @@ REFUSED = {
 }
 # The part of a file that an error has to name, where it has a name.
 NAMED = {
-    "ball joint": "wrist", "joint margin": "wrist", "mocap body": "hand",
+    "ball joint": "wrist", "two limits at once": "wrist", "mocap body": "hand",
     "actuator transmission": "pull",
     "actuator of a free joint": "jet", "actuator dynamics": "lag", "actuator gain": "odd",
     "free body of several bodies": "top", "damping of a free joint": "joint f",

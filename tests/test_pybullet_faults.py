@@ -83,8 +83,10 @@ def xyzw_for_wxyz(right: Any, quat: Any) -> Any:
 
 
 @around("shared.Shared", "poses")
-def centre_of_mass_for_frame(right: Any, self: Any, qpos: Any) -> Any:
-    found = right(self, qpos)
+def centre_of_mass_for_frame(right: Any, self: Any, qpos: Any, name: str) -> Any:
+    found = right(self, qpos, name)
+    if "xpos" not in found:
+        return found
     turns = matrix_from_quat(found["xquat"])
     found["xpos"] = found["xpos"] + np.einsum("bij,bj->bi", turns, self.raw.body_ipos)
     return found

@@ -72,6 +72,14 @@ def test_limits_under_a_stiff_servo(tmp_path: Path) -> None:
     assert apart(models, 300, 0.0, ctrl=2.0) < 1e-8
 
 
+def test_a_limit_acts_from_its_margin_on(tmp_path: Path) -> None:
+    text = chain('range="-20 30" limited="true" margin=".1" armature=".01" damping=".1"')
+    motors = "".join(f'<motor joint="j{k}"/>' for k in range(3))
+    models = both(tmp_path, text, rest=f"<actuator>{motors}</actuator>")
+    assert apart(models, 300, 0.0, ctrl=0.5) < 1e-8
+    assert apart([models[0], both(tmp_path, text.replace("margin", "user"))[1]], 300, 0.0) > 1e-3
+
+
 @pytest.mark.parametrize("flag", ["", '<flag eulerdamp="disable"/>'])
 def test_the_integrator_of_the_file(tmp_path: Path, flag: str) -> None:
     """Under Euler a servo's kv is explicit, and joint damping is not, or is."""

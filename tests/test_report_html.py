@@ -347,7 +347,9 @@ def test_causes_are_of_the_difference_that_leads(hold: Made) -> None:
     comparison = hold[0]
     found = headline(comparison, [], attribution_of(hold))
     assert found.lead.startswith("Joint wrist_flex is up to 2.61° apart")
-    assert found.causes[0] == "Of that, made the same one on top of the other: servo law 60.0 %."
+    assert (
+        found.causes[0] == "Of that, made the same, each added to those before: servo law 60.0 %."
+    )
     # What moves the first side too is a hint, wherever it is said.
     assert "contact takes 50.0 % of it away*" in found.causes[1]
     assert "a hint, not a proof" in found.causes[1]

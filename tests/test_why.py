@@ -421,7 +421,7 @@ def test_with_everything_dialled_off_the_engines_agree() -> None:
 
 
 @pytest.mark.usefixtures("bullet")
-@pytest.mark.parametrize("dial", ["damping", "limits"])
+@pytest.mark.parametrize("dial", ["damping", "limits", "surfaces"])
 def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
     """A limp arm without joint damping, which reaches its limits and the floor."""
     from statemachine.engines.pybullet import dials as module
@@ -445,11 +445,13 @@ def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
     own = {
         "damping": lambda w: module._set_damping(w, module.BODY_DAMPING, np.full(raw.nv, 0.05)),
         "limits": lambda w: module._set_limits(w, module._ranges(fresh)),
+        "surfaces": module._harden,
     }
     # Of another kind: so it would have been seen.
     other = {
         "damping": lambda w: module._set_damping(w, 0.05, np.full(raw.nv, 0.05)),
         "limits": lambda w: module._set_limits(w, dict.fromkeys(range(raw.nv), (-0.1, 0.3))),
+        "surfaces": lambda w: w.soften(),
     }
     experiment = replace(scenario("gravity"), seconds=1.0)
     plain = path_of(module._dialled(fresh, [limp]), experiment)

@@ -90,15 +90,19 @@ class Law:
         damped = np.zeros(passive.shape)
         damped[:, len(dofs) : -1] = np.diag(self._rub_b)
         self._linear = np.vstack([passive, damped, feedback])
-        self._rub_r = _softness(_impedance(solimp, np.zeros(len(dofs))), weight)
+        self._rub_r = _softness(_impedance(_clipped(solimp), np.zeros(len(dofs))), weight)
 
         self._rub_weight = weight + self._rub_r
 
         limited = raw.jnt_limited[joints].astype(bool) & (not (off["limit"] or off["constraint"]))
-        self._low, self._high = _range(raw.jnt_range[joints], limited)
+        # A limit acts from its margin on, and as if it were there.
+        margin = raw.jnt_margin[joints][:, None] * [1.0, -1.0]
+        self._low, self._high = _range(raw.jnt_range[joints] + margin, limited)
         self._ranges = list(zip(self._low.tolist(), self._high.tolist(), strict=True))
-        self._solimp, self._weight = raw.jnt_solimp[joints], weight
-        self._stop_b, self._stop_k = _spring(raw.jnt_solref[joints], self._solimp, floor)
+        solref, solimp = raw.jnt_solref[joints], raw.jnt_solimp[joints]
+        self._solimp, self._weight = _clipped(solimp), weight
+        self._stop_b, self._stop_k = _spring(solref, solimp, floor)
+        self._every, self._ones = np.arange(len(dofs)), np.ones(len(dofs))
 
     def _take_actuators(self, raw: mujoco.MjModel, joints: Any, off: Mapping[str, bool]) -> Array:
         """Force = clip(gain·clip(ctrl) + b₀ + b₁·length + b₂·speed); length = gear·q."""
@@ -218,21 +222,23 @@ class Law:
         """
         n = len(friction)
         place, speed = x[:n], x[n:-1]
-        gap = np.minimum(place - self._low, self._high - place)
-        hit = np.flatnonzero(gap < 0)
-        side = np.where(place - self._low < self._high - place, 1.0, -1.0)[hit]
+        above, below = place - self._low, self._high - place
+        gap = np.minimum(above, below)
+        hit = (gap < 0).nonzero()[0]
+        side = np.where(above[hit] < below[hit], 1.0, -1.0)
         strength = _impedance(self._solimp[hit], gap[hit])
         stop = -self._stop_b[hit] * side * speed[hit] - self._stop_k[hit] * strength * gap[hit]
-        at = np.concatenate([np.arange(n), hit])
-        sign = np.concatenate([np.ones(n), side])
+        at = np.concatenate([self._every, hit])
+        sign = np.concatenate([self._ones, side])
         soft = np.concatenate([self._rub_r, _softness(strength, self._weight[hit])])
         goal = np.concatenate([-self._rub_b * speed, stop])
-        least = np.concatenate([self._least_rub, np.zeros(len(hit))])
-        most = np.concatenate([self._frictionloss, np.full(len(hit), np.inf)])
-        inverse = dense.inverse(factor)[np.ix_(at, at)]
-        matrix = sign[:, None] * inverse * sign + np.diag(soft)
+        nothing = np.zeros(len(hit))
+        least = np.concatenate([self._least_rub, nothing])
+        most = np.concatenate([self._frictionloss, nothing + np.inf])
+        matrix = sign[:, None] * dense.inverse(factor)[at[:, None], at] * sign
+        matrix.flat[:: len(at) + 1] += soft
         right = goal - sign * dense.solved(factor, others)[at]
-        force = np.concatenate([friction, np.zeros(len(hit))])
+        force = np.concatenate([friction, nothing])
         force = _pivoted(matrix, right, least, most, force)
         limit = np.zeros(n)
         limit[hit] = side * force[n:]
@@ -249,9 +255,11 @@ def _pivoted(matrix: Array, right: Array, least: Array, most: Array, start: Arra
     force = np.minimum(np.maximum(start, least), most)
     free = (force > least) & (force < most) | (least == 0) & (most > 0)
     for _ in range(_PIVOTS):
-        bound = dense.times(matrix[np.ix_(free, ~free)], force[~free])
-        factor = dense.factored(matrix[np.ix_(free, free)])
-        force[free] = dense.solved(factor, right[free] - bound)
+        inside, held = free.nonzero()[0], (~free).nonzero()[0]
+        rows = inside[:, None]
+        bound = dense.times(matrix[rows, held], force[held])
+        factor = dense.factored(matrix[rows, inside])
+        force[inside] = dense.solved(factor, right[inside] - bound)
         outside = free & ((force < least) | (force > most))
         force = np.minimum(np.maximum(force, least), most)
         miss = dense.times(matrix, force) - right
@@ -287,18 +295,20 @@ def _range(ranges: Array, limited: Any) -> tuple[Array, Array]:
     return low, high
 
 
+def _clipped(solimp: Array) -> Array:
+    """Rows of solimp (n, 5), each number within what MuJoCo takes."""
+    least, most = [1e-4, 1e-4, 1e-15, 1e-4, 1.0], [0.9999, 0.9999, 9e9, 0.9999, 9e9]
+    return np.clip(solimp, least, most)
+
+
 def _impedance(solimp: Array, distance: Array) -> Array:
-    """d(r) of rows of solimp (n, 5) [MuJoCo's manual, chapter Modeling, Solver parameters]."""
-    low, high, width, middle, power = np.clip(
-        solimp.T,
-        [[1e-4], [1e-4], [1e-15], [1e-4], [1.0]],
-        [[0.9999], [0.9999], [9e9], [0.9999], [9e9]],
-    )
+    """d(r) of clipped rows (n, 5) [MuJoCo's manual, chapter Modeling, Solver parameters]."""
+    low, high, width, middle, power = solimp.T
     x = np.minimum(np.abs(distance) / width, 1.0)
     rising = _powers(x, power) / _powers(middle, power - 1)
     falling = 1 - _powers(1 - x, power) / _powers(1 - middle, power - 1)
     found = low + np.where(x <= middle, rising, falling) * (high - low)
-    return np.where(solimp[:, 2] <= 1e-15, (low + high) / 2, found)
+    return np.where(width <= 1e-15, (low + high) / 2, found)
 
 
 def _powers(base: Array, exponent: Array) -> Array:

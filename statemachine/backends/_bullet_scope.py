@@ -152,10 +152,11 @@ def _joints(raw: mujoco.MjModel) -> Found:
                     yield f"{what} of a free joint", f"joint {name} has it"
             if raw.jnt_stiffness[j]:
                 yield "stiffness of a free joint", f"joint {name} has it"
+        low, high = raw.jnt_range[j]
         for what, values in (
             ("nonlinear spring", raw.jnt_stiffnesspoly[j]),
             ("nonlinear damping", raw.dof_dampingpoly[dof]),
-            ("joint margin", raw.jnt_margin[j] * raw.jnt_limited[j]),
+            ("two limits at once", raw.jnt_limited[j] and high - low < 2 * raw.jnt_margin[j]),
         ):
             if np.any(values):
                 yield what, f"joint {name} has it"

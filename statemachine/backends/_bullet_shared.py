@@ -33,8 +33,8 @@ class Shared:
         self.plan, self.raw = plan, plan.raw
         self.kind: Literal["stepped", "engine"] = kind
         self.made_ghost: World | None = None
-        self._still_joints = np.zeros(plan.raw.nv)
-        self._known: tuple[bytes, list[tuple[Array, Array]]] = b"?", []
+        self._known: dict[bool, list[tuple[Array, Array]]] = {}  # of the sites, and of the bodies
+        self._known_at = b"?"
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Shared, (self.plan, self.kind)
@@ -70,10 +70,9 @@ class Shared:
         xpos, xquat = (array.copy() for array in self.still[:2])
         for tree, (where, turned) in zip(self.ghost.trees, self._states(qpos), strict=True):
             bodies = list(tree.links)
-            n = len(bodies)
-            xquat[bodies] = times(wxyz_from_xyzw(turned[:n]), raw.body_iquat[bodies] * _INVERSE)
+            xquat[bodies] = times(wxyz_from_xyzw(turned), raw.body_iquat[bodies] * _INVERSE)
             turns = matrix_from_quat(xquat[bodies])
-            xpos[bodies] = where[:n] - np.einsum("bij,bj->bi", turns, raw.body_ipos[bodies])
+            xpos[bodies] = where - np.einsum("bij,bj->bi", turns, raw.body_ipos[bodies])
         for joint in np.flatnonzero(raw.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)):
             body, start = int(raw.jnt_bodyid[joint]), int(raw.jnt_qposadr[joint])
             quat = qpos[start + 3 : start + 7]
@@ -82,16 +81,13 @@ class Shared:
 
     def _sites(self, qpos: Array, name: str) -> Array:
         """site_xpos or site_xmat."""
-        raw, still = self.raw, dict(zip(POSES, self.still, strict=True))
-        values = still[name].copy()
-        for tree, (where, turned) in zip(self.ghost.trees, self._states(qpos), strict=True):
-            sites, n = list(tree.tips), len(tree.links)
-            if not sites:
-                continue
+        raw, values = self.raw, self.still[POSES.index(name)].copy()
+        for tree, (where, turned) in zip(self.ghost.trees, self._states(qpos, True), strict=True):
+            sites = list(tree.tips)
             if name == "site_xpos":
-                values[sites] = where[n:]
+                values[sites] = where
             else:
-                values[sites] = matrix_from_quat(wxyz_from_xyzw(turned[n:])).reshape(-1, 9)
+                values[sites] = matrix_from_quat(wxyz_from_xyzw(turned)).reshape(-1, 9)
         sites = self._carried_sites
         if len(sites):
             bodies, poses = raw.site_bodyid[sites], self.poses(qpos, "xpos")
@@ -111,15 +107,19 @@ class Shared:
         moving = self.raw.body_weldid[self.raw.site_bodyid] > 0
         return np.flatnonzero(moving & ~np.isin(np.arange(self.raw.nsite), linked))
 
-    def _states(self, qpos: Array) -> list[tuple[Array, Array]]:
-        """Of each tree of joints, where its links are and how they are turned (x, y, z, w)."""
-        key = qpos.tobytes()
+    def _states(self, qpos: Array, sites: bool = False) -> list[tuple[Array, Array]]:
+        """Of each tree of joints its bodies or sites: centres of mass, and axes (x, y, z, w)."""
+        at = qpos.tobytes()
         with HiddenWorld.lock:
-            if self._known[0] != key:
-                self.ghost.put(qpos, self._still_joints)
-                found = [zip(*self.ghost.link_states(t), strict=True) for t in self.ghost.trees]
-                self._known = key, [(np.array(where), np.array(turn)) for where, turn in found]
-            return self._known[1]
+            if self._known_at != at:
+                self._known, self._known_at = {}, at
+            if sites not in self._known:
+                self.ghost.put_joints(qpos)
+                self._known[sites] = [
+                    self.ghost.link_states(tree, tree.tips if sites else tree.links)
+                    for tree in self.ghost.trees
+                ]
+            return self._known[sites]
 
 
 def free_dynamics(raw: mujoco.MjModel, body: int, turn: Array, qvel: Array) -> tuple[Array, Array]:

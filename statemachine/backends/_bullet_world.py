@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import weakref
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -24,7 +24,6 @@ from ._bullet_plan import Plan, floats
 from ._bullet_surfaces import Solid
 from .compiled import gravity
 
-_PARTS = 0.05  # of an overlap that a step undoes; by the engine's 0.2 meshes that overlap fly apart
 _AWAY = 1000.0  # [m] between bodies that a reset has set apart
 _TILT = 5e-4  # half the angle [rad] by which it tilts a free body to find its contacts
 _REST = math.sqrt(1 - 2 * _TILT**2)
@@ -115,10 +114,7 @@ class World:
             return
         if kind == "stepped":
             pb.setPhysicsEngineParameter(
-                deterministicOverlappingPairs=1,
-                globalCFM=plan.softness,
-                contactERP=_PARTS,
-                physicsClientId=self.client,
+                deterministicOverlappingPairs=1, physicsClientId=self.client
             )
         pb.setTimeStep(raw.opt.timestep, self.client)
         self._add_planes()
@@ -212,8 +208,13 @@ class World:
             body, link = (self._planes[solid.geoms[0]], -1) if solid.plane else links[solid.body]
             yield body, link, solid
 
+    def soften(self) -> None:
+        """Let contacts yield to their own force, by the model's `softness`."""
+        pb.setPhysicsEngineParameter(globalCFM=self._plan.softness, physicsClientId=self.client)
+
     def _take_surfaces(self) -> None:
-        """Friction of links, and which of them meet."""
+        """Softness and friction of links, and which of them meet."""
+        self.soften()
         known = self._surfaces
         links = []
         for k, (body, link, _) in enumerate(self.solids()):
@@ -281,6 +282,16 @@ class World:
                     physicsClientId=self.client,
                 )
 
+    def put_joints(self, qpos: Array) -> None:
+        """Set the positions of joints, in a world that is never stepped."""
+        for tree in self.trees:
+            pb.resetJointStatesMultiDof(
+                tree.body,
+                tree.joints,
+                [[q] for q in qpos[tree.qpos].tolist()],
+                physicsClientId=self.client,
+            )
+
     def _put_free(self, tree: Tree, qpos: Array, qvel: Array) -> None:
         body, qpos, qvel = tree.body, qpos[tree.qpos], qvel[tree.qvel]
         centre, axes = self._frames[body]
@@ -324,13 +335,14 @@ class World:
         spin = turned((-x, -y, -z, w), spin)
         return [px, py, pz, w, x, y, z], [vx, vy, vz, *spin]
 
-    def link_states(self, tree: Tree) -> list[Any]:
-        """Centre of mass, and its axes (x, y, z, w), of a tree's bodies, then of its sites."""
-        links = [*tree.links.values(), *tree.tips.values()]
+    def link_states(self, tree: Tree, links: Mapping[int, int]) -> tuple[Array, Array]:
+        """Centres of mass (n, 3), and their axes (n, 4) (x, y, z, w), of a tree's links."""
+        if not links:
+            return np.empty((0, 3)), np.empty((0, 4))
         found = pb.getLinkStates(
-            tree.body, links, computeForwardKinematics=1, physicsClientId=self.client
+            tree.body, list(links.values()), computeForwardKinematics=1, physicsClientId=self.client
         )
-        return [state[:2] for state in found]
+        return np.array([state[0] for state in found]), np.array([state[1] for state in found])
 
     def contact_points(self) -> list[Any]:
         """PyBullet's contact points of the last collision detection."""

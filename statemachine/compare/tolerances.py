@@ -15,7 +15,7 @@ from .series import Series
 # A 12-bit encoder, as in the SO-101's servos (Feetech STS3215).
 COUNT = 2 * np.pi / 4096
 _COUNT_SAYS = "1/4096 turn, one count of a 12-bit encoder as in the SO-101's servos"
-_ENERGY = 0.01  # of what the run turns over
+_ENERGY = 0.01  # of what the energy changes by in the run
 _FORCE = 0.05  # of its mean while it acts
 _BODY, _BODY_TURN = 1e-3, np.radians(1.0)
 
@@ -52,7 +52,7 @@ def tolerance_for(
         range_ = max(_range(series.one), _range(series.two))
         return Tolerance(
             max(_ENERGY * range_, 1e-9),
-            f"1 % of the {rounded(range_, 'J')} that the run turns over",
+            f"1 % of {rounded(range_, 'J')}, by which the energy changes in the run",
         )
     if kind == "force":
         # Not of its peak: that of an impact is its impulse over the timestep, whatever that is.

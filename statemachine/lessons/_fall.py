@@ -268,8 +268,8 @@ def longer(results: Mapping[str, Gravity]) -> list[Any]:
     what = f"with the {first.drives} off" if first.drives else "of the same"
     caught = "What caught it? " if first.servos_off.touching else ""
     several = (
-        f"{caught}Here are two longer runs {what}: one as before, and one in which nothing can "
-        "touch anything."
+        f"{caught}Here are two longer runs {what}: one as before, and one with contacts switched "
+        "off."
     )
     blocks: list[Any] = [
         Text(several if len(first.longer) > 1 else f"Here is a longer run {what}."),

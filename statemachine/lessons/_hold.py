@@ -159,7 +159,7 @@ def at_end(result: Hold) -> str:
     text += f". The joint farthest from its goal is then {_farthest(result, gaps)}"
     if result.without_contacts is not None:
         free = np.abs(result.without_contacts - result.goal)
-        text += f"; with contacts left out it would be {_farthest(result, free)}"
+        text += f". In a run without contacts it is {_farthest(result, free)}"
     return text + "."
 
 

@@ -1,4 +1,4 @@
-"""Ways back to an earlier state: each is gone, and what follows is compared."""
+"""Ways to go back to an earlier state: each is taken, and what follows is compared."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def through_us(results: Mapping[str, Sequence[WayBack]]) -> Table:
             (name, *(_exactly(ways[k].difference) for ways in results.values()))
             for k, name in enumerate(names)
         ],
-        title="Ways back, tried, with 100 steps before and after: what follows is …",
+        title="Ways to go back to an earlier state. The next 100 steps are then …",
     )
 
 
@@ -77,8 +77,8 @@ def of_its_own(name: str, ways: Sequence[WayBack]) -> list[Table | Text]:
             title=f"The ways back that {name}'s own users have, tried on it alone",
         ),
         Text(
-            "The same bits in one trial are no promise: what was not exact here is not exact; "
-            "what was may differ elsewhere."
+            "This was one trial. A way that was not exact here is not exact. A way that was "
+            "exact here may still fail elsewhere."
         ),
     ]
 

@@ -73,7 +73,7 @@ def emulation(results: Mapping[str, Any], *promises: str) -> list[Text]:
         ours = [each for each in promises if each in result.provenance.emulated]
         if ours:
             texts.append(
-                Text(f"On {name} this interface, not the engine, sees to this: {', '.join(ours)}.")
+                Text(f"On {name} this interface, and not the engine, provides: {', '.join(ours)}.")
             )
     return texts
 

@@ -182,11 +182,11 @@ def page(results: Mapping[str, Forward], session: Session) -> Page:
             ),
         ),
         Text(
-            f"qpos, qvel, ctrl and time are stored. Where {sites} (site_xpos), where the "
-            "bodies are (xpos), what touches what, which forces act (qfrc_…): that is derived "
-            "from them, and nothing derived is computed until you ask. A write to qpos marks "
-            "nothing as out of date; what you read keeps saying what it said before. "
-            "forward recomputes all of it, and takes no time. step does the same, and then "
+            "qpos, qvel, ctrl and time are stored. Everything else is derived from them: where "
+            f"{sites} (site_xpos), where the bodies are (xpos), what touches what, which "
+            "forces act (qfrc_…). It is computed only when you call forward or step. A write to "
+            "qpos marks nothing as out of date: derived arrays keep their old numbers. forward "
+            "recomputes them all, and no time passes. step recomputes them too, and then "
             "integrates: it makes the next qpos and qvel."
         ),
         *_readings(results),
@@ -214,8 +214,8 @@ def page(results: Mapping[str, Forward], session: Session) -> Page:
 
 def _opening(site: str) -> str:
     if the_tip(site) == site:
-        return f"A fresh robot. Where is its {site}, and who works that out, and when?"
-    return "A fresh arm. Where is its fingertip, and who works that out, and when?"
+        return f"The robot was just made. Where is its {site}, and when is that computed?"
+    return "The arm was just made. Where is its fingertip, and when is that computed?"
 
 
 def _readings(results: Mapping[str, Forward]) -> list[Table | Text]:
@@ -277,7 +277,7 @@ def _findings(results: Mapping[str, Forward], name: str, result: Forward) -> lis
             sentence(
                 results,
                 name,
-                "nobody checks whether a robot could be where you write it: forward finds "
+                "nothing checks whether the robot can be where you write it. forward finds "
                 f"{count(result.contacts, 'contact')} now, the worst "
                 f"{millimetres(result.deepest, 1)} inside each other.",
             )

@@ -76,17 +76,17 @@ data = sm.make_data(model)
 print()
 """
     off = ", ".join(f"{name}={value}" for name, value in SCENARIOS["gravity"].options.items())
-    start = start_line(model, "each")
+    start = start_line(model, "variant")
     return f"""\
 {numpy}import statemachine as sm
 
 model = {load}
 limp = model.replace({off})  # another Model: {drives(model)} off
 slot = {slot}
-for each in (model, limp):
-    data = sm.make_data(each)
+for variant in (model, limp):
+    data = sm.make_data(variant)
     {start + "    " if start else ""}{loop}
-        sm.step(each, data, {nstep})
+        sm.step(variant, data, {nstep})
         print({shown}, end="  ")
     print()
 """
@@ -278,8 +278,8 @@ def _introduction(first: Gravity) -> str:
     if first.servo:
         zero = "zero is a target like any other" if first.keyframe is None else "it is a target"
         text += (
-            f". To a position servo {zero}: there is no fixed value "
-            "that means nothing. The second run has the servos switched off."
+            f". To a position servo {zero}: no value of ctrl means "
+            '"no command". The second run has the servos switched off.'
         )
     else:
         text += f". No position servo drives {first.joint}."

@@ -17,7 +17,7 @@ from ..interface import Array, Data, Model, make_data, step
 from ..interface.checks import as_count
 from ..page import Page, Question, Table, Text, Verdict
 from ..scenarios.provenance import Provenance, provenance
-from ..scenarios.runs import Progress
+from ..scenarios.runs import Progress, part_of
 from ._robot import is_of_the_arm
 from ._words import differences, page_of, sentence, typed, where, words
 from .records import Session
@@ -63,6 +63,7 @@ class Objects:
         nstep: Steps of each.
         alone: Whether each ended bit for bit where it ends when it runs alone.
         different: How many of the worlds' ends are different.
+        commanded: Whether each had a ctrl of its own; a model may have no actuators.
         arrays: How many arrays the Model and the engine's own model hold; constant:
             whether all of them are unchanged.
         shared: Whether each Data's engine object names the Model's as its own.
@@ -75,6 +76,7 @@ class Objects:
     nstep: int
     alone: bool
     different: int
+    commanded: bool
     arrays: int
     constant: bool
     shared: bool
@@ -108,8 +110,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Object
                 step(model, data)
             singly.append(data.qpos.copy())
         progress(0.5 + 0.25 * (k + 1) / worlds)
-    together = _in_turn(model, worlds)
-    progress(1.0)
+    together = _in_turn(model, worlds, part_of(progress, 0.75, 0.25))
     after = _arrays(model)
     return Objects(
         loading=loading,
@@ -119,6 +120,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Object
         nstep=_STEPS,
         alone=all(np.array_equal(a, b) for a, b in zip(singly, together, strict=True)),
         different=len({end.tobytes() for end in together}),
+        commanded=bool(model.nu),
         arrays=len(before),
         constant=before == after,
         shared=shared,
@@ -126,15 +128,16 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Object
     )
 
 
-def _in_turn(model: Model, count: int) -> list[Array]:
+def _in_turn(model: Model, count: int, progress: Progress) -> list[Array]:
     """Where each of several Data ends if they take their steps in turn."""
     worlds = [make_data(model) for _ in range(count)]
     try:
         for k, data in enumerate(worlds):
             _command(model, data, k, count)
-        for _ in range(_STEPS):
+        for number in range(_STEPS):
             for data in worlds:
                 step(model, data)
+            progress((number + 1) / _STEPS)
         return [data.qpos.copy() for data in worlds]
     finally:
         for data in worlds:
@@ -173,8 +176,8 @@ def page(results: Mapping[str, Objects], session: Session) -> Page:
     blocks: list[Any] = [
         Text(words(is_of_the_arm(results))),
         Text(
-            "Here a robot's file is loaded once, two of something are made of it, and one of "
-            "them is advanced by 100 steps."
+            "Below, a robot's file is loaded once, into a Model. Two Data are made of it, and one "
+            "of them is advanced by 100 steps. What Model and Data are is said after that."
         ),
         *typed(
             session,
@@ -210,30 +213,30 @@ def page(results: Mapping[str, Objects], session: Session) -> Page:
             sentence(
                 results,
                 name,
-                "the slow part is done once, and many Data use it. That is how many worlds are "
-                "simulated at the same time."
+                "loading is the slow part, and it is done once. Another Data is cheap, so many "
+                "worlds can be simulated at the same time."
                 if cheap
-                else "here a Data costs nearly what a load does: the slow part is done anew for "
-                "each.",
+                else "here a Data costs nearly as much as a load, because the slow part is done "
+                "again for each Data.",
             ),
             Verdict(
-                f"{prefix}{result.worlds} Data of one Model, each under a command of its own, took "
-                f"{count(result.nstep, 'step')} in turn: each ended bit for bit where it ends "
-                f"alone, at {count(result.different, 'different end')}",
+                f"{prefix}{result.worlds} Data of one Model took {count(result.nstep, 'step')} in "
+                f"turn{_commands(result)}. Each ended in the same bits as when it runs alone",
                 result.alone,
             ),
             Verdict(
-                f"{prefix}the Model's arrays, {result.arrays} with the engine's own, have the same "
-                "bytes as before",
+                f"{prefix}none of the Model's {result.arrays} arrays has changed, those of the "
+                "engine's own model included",
                 result.constant,
             ),
             sentence(
                 results,
                 name,
-                "all Data name the Model's own engine object as theirs: one in memory."
+                "all these Data refer to one and the same model of the engine; it is in memory "
+                "once."
                 if result.shared
-                else "the engine has no such two objects; the split is ours, and each Data is a "
-                "world that was loaded for itself.",
+                else "the engine itself has no Model and no Data. This interface makes the "
+                "difference, and loads a world of its own for each Data.",
             ),
         ]
     blocks += differences(
@@ -245,6 +248,14 @@ def page(results: Mapping[str, Objects], session: Session) -> Page:
         ],
     )
     return page_of("Two objects and one function", results, blocks)
+
+
+def _commands(result: Objects) -> str:
+    if not result.commanded:
+        return ""
+    ends = result.different
+    apart = "no two of them ended alike" if ends == result.worlds else f"they had {ends} ends"
+    return f", each with its own ctrl, and {apart}"
 
 
 def _steps(result: Objects) -> str:

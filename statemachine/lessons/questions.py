@@ -208,8 +208,8 @@ def _held(answers: Answers) -> _Answered:
     )
     if found.alone:
         text += (
-            ". (Without this interface it is another story: see what the engine itself does, in "
-            "statemachine lesson gravity)"
+            ". (The engine without this interface behaves differently: see statemachine lesson "
+            "gravity)"
         )
     return asked, text, _is_held(found)
 
@@ -229,7 +229,7 @@ def _two(answers: Answers) -> _Answered:
     return (
         asked,
         f"load takes {duration(found.loading)}, as long as {found.ratio:,.0f} steps; "
-        f"{found.worlds} Data of one Model went {found.different} ways, each as if it were alone",
+        f"{found.worlds} Data of one Model ended in {found.different} ways, each as it does alone",
         found.ratio > 1 and found.alone and found.constant,
     )
 

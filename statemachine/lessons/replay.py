@@ -218,8 +218,8 @@ def page(results: Mapping[str, Replay], session: Session) -> Page:
                 sentence(
                     results,
                     name,
-                    "a State, which get_state gives and set_state takes, holds all that decides "
-                    f"the future and that the engine shows: {', '.join(result.state)}.",
+                    "get_state returns a State, and set_state takes one. It holds what decides "
+                    f"the future, as far as the engine shows it: {', '.join(result.state)}.",
                 )
             )
         for name, result in results.items():
@@ -275,9 +275,9 @@ def _truth(prefix: str, result: Replay) -> list[Any]:
         return []
     return [
         Verdict(
-            f"{prefix}reproducible is not right: with half the timestep, {finer.timestep * 1e3:g} "
-            "ms, two runs are bit for bit the same too, and end somewhere else, off by "
-            f"{finer.difference:.1e}",
+            f"{prefix}reproducible does not mean right. With half the timestep, "
+            f"{finer.timestep * 1e3:g} ms, two runs are bit for bit the same, too; but they end "
+            f"elsewhere, {finer.difference:.1e} away",
             True,
         )
     ]

@@ -206,22 +206,22 @@ def page(results: Mapping[str, Reset], session: Session) -> Page:
     first = next(iter(results.values()))
     blocks: list[Any] = [
         Text(
-            f"Velocity and command are changed and {first.simulated:g} s is simulated; then all is "
-            "taken back, and a state is taken from the file."
+            f"Velocity and command are changed, and {first.simulated:g} s is simulated. Then the "
+            "Data is reset: first to the default state, then to one that the model file names."
         ),
         *typed(session, _question(first)),
         Text(
             "reset puts a Data back to the model's default state: positions, velocities, "
             "command and time. With keyframe=… it goes to a state that the model file names. "
-            "Nothing derived is computed by it: that is forward's work."
+            "reset computes nothing that is derived: call forward for that."
         ),
     ]
     for name, result in results.items():
         prefix, steps = where(results, name), count(result.steps, "step")
         blocks += [
             Verdict(
-                f"{prefix}after {steps} and a reset qpos, qvel, ctrl and time are bit for bit "
-                f"those of a fresh Data, and so are the next {steps}",
+                f"{prefix}after {steps} and a reset, qpos, qvel, ctrl and time have the same bits "
+                f"as in a new Data. The next {steps} end in the same bits, too",
                 len(result.restored) == 4 and result.same_future,
             ),
             Verdict(f"{prefix}every derived array is zero after a reset", result.empty),
@@ -281,17 +281,18 @@ def _finding(results: Mapping[str, Reset], name: str, number: int, file: str) ->
     if scene.body is None:
         return sentence(results, name, "there is no free body in this scene.")
     moved = f"it {'rises' if scene.rise > 0 else 'sinks'} by {millimetres(abs(scene.rise))}"
-    steps = f"in {scene.robot_steps} of {scene.nstep} steps under the keyframe's own ctrl"
+    steps = f"in {scene.robot_steps} of the next {scene.nstep} steps"
     if scene.held:
         return Verdict(
             f"{where(results, name)}the {scene.body} is held: it touches the robot and nothing "
-            f"else, then and {steps}; {moved}",
+            f"else, right after the reset and {steps}. Meanwhile {moved}",
             True,
         )
     if scene.on_robot == 0 and scene.on_world:
         text = (
-            f"the {scene.body} is not held: {count(scene.on_world, 'contact')} with what does not "
-            f"move, none with the robot; the robot touches it {steps}, and {moved}"
+            f"the {scene.body} is not held: it has {count(scene.on_world, 'contact')} with what "
+            f"does not move, and none with the robot. The robot touches it {steps}. Meanwhile "
+            f"{moved}"
         )
         if number == 0 and file.startswith("robotstudio_so101"):
             text += ". A lesson that calls this a grasp with the box lifted is mistaken"

@@ -144,16 +144,16 @@ def page(results: Mapping[str, Speed], session: Session) -> Page:
     blocks: list[Any] = [
         Text(
             f"{first.simulated:g} simulated seconds, {count(first.nstep, 'step')} of "
-            f"{first.provenance.timestep:g} s, as fast as they come. In bulk: one call for many "
+            f"{first.provenance.timestep:g} s, as fast as possible. In bulk: one call for many "
             "steps. Step by step: a Python loop of single calls, as a controller needs it. How "
             "much an experiment may cost follows from the ratio of simulated to real time."
         ),
         *typed(session, _question(first)),
         Text(
             "One measurement says little: something else may have run on this machine meanwhile. "
-            f"So the same steps are measured again in {count(first.loop.rounds, 'round')}, the "
-            "ways in turns, and the bulk way twice in each round. Its cost over itself is the "
-            "noise: what is smaller than that cannot be told here."
+            f"So the same steps are measured again in {count(first.loop.rounds, 'round')}. Each "
+            "round measures both ways, and the bulk way a second time. How much the two bulk "
+            "measurements differ is the noise; smaller differences cannot be seen here."
         ),
     ]
     rows = [
@@ -175,7 +175,7 @@ def page(results: Mapping[str, Speed], session: Session) -> Page:
                 ("step by step", *(_spread(r.loop) for r in results.values())),
                 ("in bulk again", *(_spread(r.null) for r in results.values())),
             ],
-            title="Cost over that in bulk: median of the rounds, and their middle half",
+            title="Cost relative to bulk: median of the rounds, and their middle half",
         ),
         *(sentence(results, name, _told(result)) for name, result in results.items()),
     ]

@@ -108,16 +108,15 @@ def page(results: Mapping[str, Layout], session: Session) -> Page:
     first = next(iter(results.values()))
     blocks: list[Any] = [
         Text(
-            "Where the joints of a Data are stands in the array qpos, how fast they move in "
-            "qvel. How long are the two? In this model: nq numbers and nv numbers; nu is the "
-            "length of ctrl. jnt_qposadr says where in qpos a joint begins, jnt_dofadr where in "
-            "qvel."
+            "The array qpos says where the joints of a Data are, and qvel says how fast they "
+            "move. qpos has nq numbers, qvel has nv, and ctrl has nu. jnt_qposadr says where a "
+            "joint begins in qpos, and jnt_dofadr where it begins in qvel."
         ),
         *typed(session, _question(first)),
         Text(
             "A hinge takes one number in each. A free body takes seven in qpos (three of "
             "position, four of a quaternion) and six in qvel (three linear, three angular): a "
-            "rotation has three degrees of freedom, and a quaternion one number more than that."
+            "rotation has three degrees of freedom, but a quaternion describes it by four numbers."
         ),
         Table(
             ("", "nq", "nv", "nu", "nbody"),
@@ -125,7 +124,7 @@ def page(results: Mapping[str, Layout], session: Session) -> Page:
                 (name, str(layout.nq), str(layout.nv), str(layout.nu), str(layout.nbody))
                 for name, layout in results.items()
             ],
-            title="Sizes: qpos, qvel, ctrl, bodies (the world is one)",
+            title="Lengths of qpos, qvel and ctrl; number of bodies, the world included",
         ),
     ]
     for names, layout in _alike(results, lambda each: each.joints):
@@ -162,14 +161,17 @@ def page(results: Mapping[str, Layout], session: Session) -> Page:
     if apart:
         blocks.append(
             Text(
-                f"qpos has {first.nq} numbers and qvel {first.nv}. Of {', '.join(apart)} the slots "
-                "differ. Whatever stands behind such a joint is shifted: take addresses from "
-                "jnt_qposadr and jnt_dofadr, never by arithmetic."
+                f"qpos has {first.nq} numbers and qvel {first.nv}. The slots of {', '.join(apart)} "
+                "differ, and so would those of any joint after it. So look addresses up in "
+                "jnt_qposadr and jnt_dofadr; do not compute them."
             )
         )
     else:
         blocks.append(
-            Text("In this model every joint has the same slots in qpos and qvel; in others not.")
+            Text(
+                "In this model every joint has the same slots in qpos and qvel. This is not so in "
+                "every model."
+            )
         )
     for name, layout in results.items():
         if layout.terms:

@@ -181,7 +181,7 @@ def page(results: Mapping[str, Write], session: Session) -> Page:
     """The same memory, what it changes, what is refused."""
     first = next(iter(results.values()))
     blocks: list[Any] = [
-        Text("One number is written, by way of a second name for data.qpos."),
+        Text("One number is written into data.qpos, through a second name for that array."),
         *typed(
             session,
             Question(
@@ -192,9 +192,9 @@ def page(results: Mapping[str, Write], session: Session) -> Page:
             ),
         ),
         Text(
-            "data.qpos is no copy. A second name for it is the same array, and what you write "
-            "there is what the next call starts from; nothing has to be handed over. (To keep a "
-            "value, copy it: data.qpos.copy().)"
+            "data.qpos is no copy. A second name for it is the same array, and the next call "
+            "starts from what you write there. There is nothing else to do. (To keep a value, "
+            "copy it: data.qpos.copy().)"
         ),
     ]
     for name, result in results.items():
@@ -211,8 +211,8 @@ def page(results: Mapping[str, Write], session: Session) -> Page:
                 sentence(
                     results,
                     name,
-                    "the engine keeps its state to itself; the arrays are the interface's, and "
-                    "the next call takes over what they say.",
+                    "the engine does not give access to its own memory. The arrays belong to "
+                    "this interface, and the next call passes their numbers on to the engine.",
                 )
             )
         else:
@@ -225,8 +225,8 @@ def page(results: Mapping[str, Write], session: Session) -> Page:
             )
         blocks.append(
             Verdict(
-                f"{prefix}the write alone changes nothing that is derived from qpos: "
-                f"{_changed(result)} changed. The next lesson is about that",
+                f"{prefix}the write alone changed {_changed(result)}. The next lesson is about "
+                "that",
                 not result.changed,
             )
         )
@@ -234,10 +234,10 @@ def page(results: Mapping[str, Write], session: Session) -> Page:
             sentence(
                 results,
                 name,
-                f"the next step starts from what you wrote. After it the speed of {result.joint} "
-                f"is off by {position(result.felt, result.slide, 1)}/s from that of a step without "
-                f"the write, and it finds {count(result.found, 'contact')} instead of "
-                f"{result.otherwise}.",
+                "the next step starts from what you wrote. To see that, the same step is taken "
+                f"without the write, too. It finds {count(result.otherwise, 'contact')}; the step "
+                f"after the write finds {result.found}. The write changes the speed of "
+                f"{result.joint} after the step by {position(result.felt, result.slide, 1)}/s.",
             )
         )
     blocks += emulation(results, "stale after a write")

@@ -27,13 +27,13 @@ def page(results: Mapping[str, Audit]) -> Page:
     first = next(iter(results.values()))
     blocks: list[Block] = [
         Text(
-            "A run is saved, goes on, is set back and goes on again: the same bytes of all "
-            f"positions and velocities, there and after each of {first.steps} steps? What is "
-            "saved is restored three times: in the run itself, which only went on; in a fresh "
-            "one; and in a used one, with another past: other commands and, where they stay, "
-            "forces left applied. 'same' is every byte; else the largest difference, of a "
-            "joint or an orientation in °, of a slide or a free body in mm; 'bytes' where that "
-            "is none."
+            "A run is saved, and goes on. Then it is restored, and goes on again. Are all "
+            "positions and velocities the same, byte for byte, right after the restore and after "
+            f"each of {first.steps} steps? What was saved is restored in three places: in the "
+            "run itself; in a fresh one; and in a used one, which had other commands before and, "
+            "where they stay, has forces left applied. A cell says 'same' if every byte is. "
+            "Otherwise it gives the largest difference: of a joint or an orientation in °, of a "
+            "slide or a free body in mm; or 'bytes', if only bytes differ."
         )
     ]
     for backend, result in results.items():

@@ -20,8 +20,8 @@ def sentences(one: Audited) -> list[str]:
     points = [seen.point for seen in one.points]
     if of.suffice:
         said.append(
-            f"{one.name}: the state that suffices: {' or '.join(of.suffice)}: the same bytes at "
-            f"{_all(points)}, whatever it was restored in."
+            f"{one.name}: the state that suffices: {' or '.join(of.suffice)}. The bytes are the "
+            f"same at {_all(points)}, whatever it was restored in."
         )
     else:
         said.append(
@@ -78,16 +78,19 @@ def _what_breaks(name: str, of: Conclusion, points: Sequence[str]) -> list[str]:
     lines = []
     itself = [each for each in of.missing if each.itself]
     others = [each for each in of.missing if not each.itself]
-    alone = {None: "", True: " These alone suffice, tried.", False: " These alone do not suffice."}
-    text = f"{name}: back in the run itself it needs {', '.join(_with(itself, points))}"
+    alone = {
+        None: "",
+        True: " These alone suffice: it was tried.",
+        False: " These alone do not suffice.",
+    }
+    text = f"{name}: to restore the run itself one needs {', '.join(_with(itself, points))}"
     if others:
-        text += f"; in one with another past also {', '.join([each.field for each in others])}"
+        text += f"; to restore a used one also {', '.join([each.field for each in others])}"
     lines.append(f"{text}.{alone[of.smallest]}")
     lines.append(
-        f"{name}: what breaks a smaller one: "
+        f"{name}: left out, each of these makes the run differ, at the worst by so much: "
         + "; ".join(
-            f"{each.field}, left out, differs from step {each.gap.first}, by {cell(each.gap)} "
-            f"at the worst"
+            f"{each.field} by {cell(each.gap)}, from step {each.gap.first} on"
             for each in of.missing
         )
         + "."

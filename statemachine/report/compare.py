@@ -193,8 +193,8 @@ def _figures(comparison: Comparison, witness: Witness | None) -> list[Block]:
         Text(
             f"Compared at {comparison.moments} moments over {comparison.until:g} s. Settled: the "
             f"mean over {window(comparison)} (of forces: how far apart the means are). From: when "
-            "first beyond tolerance. What is never beyond it agrees, what is settled within it "
-            "settles, the rest differs."
+            "first beyond tolerance. A quantity agrees if it never is; it settles if it is within "
+            "its tolerance at the end; otherwise it differs."
         ),
         Table(
             ("quantities", "tolerance", "because"),

@@ -18,9 +18,9 @@ def page(result: Conventions) -> Page:
     """One table for each question, and why it matters."""
     blocks: list[Block] = [
         Text(
-            "The engines themselves were asked, on small models of the question's own; not this "
-            "project's backends, which make every engine keep one contract. So what is said here "
-            "may differ from what a lesson shows on the same engine."
+            "The engines themselves were asked, each question on a small model made for it. The "
+            "lessons ask this project's backends instead, which make every engine keep one "
+            "contract. So an answer here may differ from what a lesson shows on the same engine."
         )
     ]
     for answered in result.questions:

@@ -31,8 +31,8 @@ def emulated(comparison: Comparison) -> list[Block]:
         if moving:
             blocks.append(
                 Text(
-                    f"Computed around {side.label}, which lacks what the model asks for: "
-                    f"{listed(moving)}. The engine as its own users meet it: --defaults engine."
+                    f"{side.label} lacks some of what the model asks for, so this library "
+                    f"computes it: {listed(moving)}. The engine without that: --defaults engine."
                 )
             )
         if rest:

@@ -105,7 +105,7 @@ def _what(result: Attribution) -> str:
 def _gap_sentence(result: Attribution) -> str:
     gap = result.first[result.quantity]
     text = (
-        f"As they come, {_what(result)} is up to {amount(result, gap.worst)} apart, at "
+        f"Without any change, {_what(result)} is up to {amount(result, gap.worst)} apart, at "
         f"{short_time(gap.at)} (root mean square {amount(result, gap.rms)}, in the end "
         f"{amount(result, gap.end)})."
     )
@@ -146,7 +146,7 @@ def _astray(result: Attribution) -> Text:
 
 
 def _ladder(result: Attribution) -> Table:
-    """All factors, one on top of the other."""
+    """All factors, each added to those before."""
     rows = [
         (
             capital(title(trial.factor)),
@@ -160,7 +160,7 @@ def _ladder(result: Attribution) -> Table:
     return Table(
         ("what", "explains", "gap left", "brought to"),
         rows,
-        f"All of them, one on top of the other: from {gap} to {left}",
+        f"All of them, each added to those before: from {gap} to {left}",
         words=frozenset({0, 3}),
     )
 

@@ -53,7 +53,7 @@ def causes(result: Attribution) -> tuple[str, ...]:
         )
     same = [f"{title(t.factor)} {percent(t.explains)}" for t in worth if not moves(t)]
     if same:
-        found.append(f"Of that, made the same one on top of the other: {', '.join(same)}.")
+        found.append(f"Of that, made the same, each added to those before: {', '.join(same)}.")
     other = [
         f"{title(t.factor)} takes {percent(t.explains)} of it away*" for t in worth if moves(t)
     ]
@@ -92,8 +92,8 @@ def conclusion(result: Attribution) -> list[str]:
     else:
         parts = [f"{FACTORS[t.factor].title} {percent(t.explains)}" for t in worth]
         found.append(
-            f"Of the {gap}, one on top of the other: {', '.join(parts)}. "
-            f"With all of it the same or left out, {left} stays."
+            f"Of the {gap}, each added to those before: {', '.join(parts)}. "
+            f"With all these changes together {left} is left."
         )
     found += _other_orders(result, worth)
     most = max((t.worst or 0.0 for t in counted), default=0.0)

@@ -74,7 +74,7 @@ class Attribution:
         quantity: What the gap is measured in; unit: of it.
         first: The gap in each quantity, as they come.
         alone: Each factor by itself; empty where the gap is rounding.
-        ladder: All of them, one on top of the other; what is left telescopes to `left`.
+        ladder: All of them, each added to those before; what is left telescopes to `left`.
         left: What stays unexplained, in `unit`.
         negligible: Gaps below this are taken for rounding, in `unit`.
         extent: How far one moves from where it starts, in `unit`.

@@ -96,7 +96,7 @@ class PybulletDials:
         if "limits" in dials:
             acts.append(partial(_set_limits, ranges=None))
         if "surfaces" in dials:
-            acts.append(partial(_set_frictions, surfaces=self.emulated.plan.surfaces))
+            acts.append(partial(_set_surfaces, surfaces=self.emulated.plan.surfaces))
         if "contact" in dials:
             acts.append(_touch_nothing)
         return _dialled(model, acts)
@@ -274,7 +274,8 @@ def _set_limits(world: World, ranges: Mapping[int, tuple[float, float]] | None) 
             _change(world, tree.body, link, maxJointVelocity=fastest)
 
 
-def _set_frictions(world: World, surfaces: Surfaces) -> None:
+def _set_surfaces(world: World, surfaces: Surfaces) -> None:
+    world.soften()
     for k, (body, link, _) in enumerate(world.solids()):
         wanted = [float(friction[k]) for friction in (surfaces.slide, surfaces.roll, surfaces.spin)]
         _rub(world, body, link, wanted)
@@ -292,8 +293,14 @@ def _rub(world: World, body: int, link: int, wanted: list[float]) -> None:
     _verify("a friction", wanted, [told[1], told[6], told[7]])
 
 
+def _harden(world: World) -> None:
+    """Contacts that do not yield, as in a fresh world."""
+    pb.setPhysicsEngineParameter(globalCFM=0.0, physicsClientId=world.client)
+
+
 def _fresh_surfaces(world: World, plan: Plan) -> None:
-    """Friction of what was loaded, and links of one robot that do not meet."""
+    """Friction and hardness of what was loaded, and links of one robot that do not meet."""
+    _harden(world)
     solids = list(world.solids())
     for body, link, _ in solids:
         _rub(world, body, link, [FRICTION, 0.0, 0.0])
