@@ -30,7 +30,8 @@ orphan: true
 # The models of some packages
 
 Made by `docs/make_robots.py`, for [any folder of models](robots.md), where the columns are
-explained. A file that a package does not ship, as a mesh, makes MuJoCo refuse the model.
+explained; without experiments and costs, which are of a machine. A file that a package does not
+ship, as a mesh, makes MuJoCo refuse the model.
 """
 
 
@@ -43,7 +44,7 @@ def main(folder: str) -> None:
         if not root.is_dir():
             sys.exit(f"{name} is not in {folder}")
         table = Path(folder).with_name(f"robots-{module}.json")
-        survey = examine_all(find([root]), table=table)
+        survey = examine_all(find([root]), quick=True, table=table)
         parts.append(f"## {name} {versions[name]}")
         parts += [part for part in body(page(survey, widest=80), lambda _: "") if part]
     text = "\n\n".join(part.strip() for part in parts) + "\n"

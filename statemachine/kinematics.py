@@ -2,7 +2,8 @@
 
 Pinocchio reads the robot's file with its own parser and computes poses with its own
 code. This module imports no backend, and no backend imports it, so that where the
-two agree, neither has copied from the other.
+two agree, neither has copied from the other. Where it cannot read a file, it computes
+from a compiled model's numbers: other code, and the same reading of the file.
 """
 
 from __future__ import annotations
@@ -17,11 +18,11 @@ from numpy.typing import ArrayLike
 
 from .errors import BadInputError, ModelError, unknown_name
 from .installed import require
-from .interface import Array
+from .interface import Array, Model
 from .interface.checks import as_vector, check_entries
 from .models import resolve
 from .rotations import matrix_from_quat, xyzw_from_wxyz
-from .witness_file import read
+from .witness import Segment, WitnessModel, read_file, read_numbers
 
 Kind = Literal["site", "body"]
 
@@ -44,6 +45,9 @@ class FrameDefinition(NamedTuple):
 class Kinematics:
     """Poses and Jacobians of a robot, by Pinocchio.
 
+    Of a file, Pinocchio's parser is given the bodies, joints and sites: nothing else has a
+    part in where they are.
+
     Args:
         model: An MJCF or URDF file, or the name of one of our models.
         joint_names: The joints in the order in which a qpos lists them; by default
@@ -51,8 +55,12 @@ class Kinematics:
             is alphabetical along each chain.
 
     Attributes:
-        joint_names: That order.
+        joint_names: That order; "" for a joint without a name.
+        body_names, site_names: What `pose` knows. One without a name is called "body 7" or
+            "site 3", by its place in MuJoCo's order; of a URDF, bodies are links.
         nq, nv: Lengths of qpos and qvel, in MuJoCo's layout.
+        grade: "own reading" of the file, or "same reading" as the engine's.
+        prepared: What was done to the file's text before Pinocchio read it.
 
     Raises:
         MissingEngineError: Pinocchio is not installed here.
@@ -63,13 +71,44 @@ class Kinematics:
     def __init__(
         self, model: str | os.PathLike[str], joint_names: Sequence[str] | None = None
     ) -> None:
-        self._pin: Any = require("pinocchio")
-        self.path: Path = resolve(model)
-        self.version: str = self._pin.__version__
-        self._model, in_file, self._misplaced = read(self._pin, self.path)
+        pin, path = require("pinocchio"), resolve(model)
+        self._hold(pin, path, read_file(pin, path), joint_names)
+
+    @classmethod
+    def same_reading(cls, model: Model) -> Kinematics:
+        """Poses by Pinocchio from the numbers that a Model was compiled to.
+
+        This checks the code that computes. A misreading of the file is in the numbers, and
+        cannot be seen.
+
+        Raises:
+            MissingEngineError: Pinocchio is not installed here.
+            ModelError: The Model's backend does not start from a compiled model.
+        """
+        pin, compiled = require("pinocchio"), model.compiled
+        if compiled is None:
+            raise ModelError(f"{model.backend} does not start from a compiled model")
+        names = (model.body_names, model.joint_names, model.site_names)
+        kinematics = cls.__new__(cls)
+        kinematics._hold(pin, model.path, read_numbers(pin, compiled, *names), None)
+        return kinematics
+
+    def _hold(
+        self, pin: Any, path: Path, read: WitnessModel, joint_names: Sequence[str] | None
+    ) -> None:
+        self._pin: Any = pin
+        self.path: Path = path
+        self.version: str = pin.__version__
+        self._model: Any = read.model
         self._data: Any = self._model.createData()
+        self._frames: dict[Kind, dict[str, int]] = {"site": read.sites, "body": read.bodies}
+        self.grade: str = read.grade
+        self.prepared: tuple[str, ...] = read.prepared
+        self.body_names: tuple[str, ...] = tuple(read.bodies)
+        self.site_names: tuple[str, ...] = tuple(read.sites)
+        in_file = [name for name, _ in read.joints]
         self.joint_names: tuple[str, ...] = _names(in_file if joint_names is None else joint_names)
-        self._segments = _segments(self._model, in_file, self.joint_names, self.path)
+        self._segments = _in_order(read, self.joint_names, path)
         self.nq: int = sum(segment.nq for segment in self._segments)
         self.nv: int = sum(segment.nv for segment in self._segments)
 
@@ -149,31 +188,29 @@ class Kinematics:
         return ours
 
     def definition(self, name: str, kind: Kind = "site") -> FrameDefinition:
-        """How the file, as Pinocchio read it, fixes a frame to a body.
+        """How a frame is fixed to a body, as the witness has read it.
 
         Raises:
             UnknownNameError: There is no such frame.
         """
-        frame = self._model.frames[self._frame(name, kind)]
-        body = frame if kind == "body" else self._model.frames[frame.parentFrame]
-        offset = body.placement.actInv(frame.placement)
-        return FrameDefinition(body.name, np.array(offset.translation), np.array(offset.rotation))
+        number = self._frame(name, kind)
+        owners = {frame: own for own, frame in self._frames["body"].items()}
+        owner = number
+        while owner not in owners:  # a fixed joint may be between a site and its body
+            owner = self._model.frames[owner].parentFrame
+        placement = self._model.frames[number].placement
+        offset = self._model.frames[owner].placement.actInv(placement)
+        return FrameDefinition(
+            owners[owner], np.array(offset.translation), np.array(offset.rotation)
+        )
 
     def _frame(self, name: str, kind: Kind) -> int:
-        types = self._pin.FrameType
-        wanted = {"site": types.OP_FRAME, "body": types.BODY}
-        if kind not in tuple(wanted):
-            raise unknown_name("kind of frame", kind, wanted)
-        if kind == "site" and name in tuple(self._misplaced):
-            raise ModelError(
-                f"site {name!r} of {self.path.name} is placed by fromto, which Pinocchio's "
-                "parser does not read"
-            )
-        # A joint and a body may share a name, so the name alone does not tell.
-        known = [frame.name for frame in self._model.frames if frame.type == wanted[kind]]
-        if name not in known:  # asked here: Pinocchio takes nothing but text
+        if kind not in tuple(self._frames):
+            raise unknown_name("kind of frame", kind, self._frames)
+        known = self._frames[kind]
+        if not isinstance(name, str) or name not in known:
             raise unknown_name(f"{kind} in {self.path.name}", name, known)
-        return self._model.getFrameId(name, wanted[kind])
+        return known[name]
 
     def _configurations(self, qpos: ArrayLike) -> Array:
         """(N, nq) in MuJoCo's layout to (N, nq) in Pinocchio's."""
@@ -194,51 +231,49 @@ class Kinematics:
                 part = np.hstack([part[:, :-4], xyzw_from_wxyz(quat)])
             elif segment.kind == "unbounded":
                 part = np.hstack([np.cos(part), np.sin(part)])
+            else:
+                part = part - segment.ref
             theirs[:, segment.idx_q : segment.idx_q + part.shape[1]] = part
             start += segment.nq
         return theirs
 
 
-class _Segment(NamedTuple):
-    """One joint: its kind, its size in MuJoCo's layout, its place in Pinocchio's."""
+def shared_joints(kinematics: Kinematics, names: Sequence[str]) -> list[int]:
+    """Which of an engine's joints the witness has, by their numbers.
 
-    kind: str
-    nq: int
-    nv: int
-    idx_q: int
-    idx_v: int
+    Args:
+        kinematics: The witness.
+        names: The engine's joints, "" for one without a name. Joints that only the engine
+            has (of a free box) are left out.
 
-
-def _segments(
-    model: Any, in_file: Sequence[str], wanted: Sequence[str], path: Path
-) -> list[_Segment]:
-    """Pinocchio's joints as segments of a qpos whose joints come in the order `wanted`."""
-    found: list[_Segment] = []
-    for joint in list(model.joints)[1:]:
-        name = joint.shortname()
-        if name.endswith("FreeFlyer"):
-            found.append(_Segment("free", 7, 6, joint.idx_q, joint.idx_v))
-        elif name.endswith("Spherical"):
-            found.append(_Segment("ball", 4, 3, joint.idx_q, joint.idx_v))
-        elif (joint.nq, joint.nv) == (2, 1):
-            found.append(_Segment("unbounded", 1, 1, joint.idx_q, joint.idx_v))
-        elif joint.nq == joint.nv:  # one joint, or several of one body
-            for k in range(joint.nq):
-                found.append(_Segment("plain", 1, 1, joint.idx_q + k, joint.idx_v + k))
-        else:
-            raise ModelError(f"{path.name}: a joint of Pinocchio's kind {name} is not handled")
-    if len(found) != len(in_file):
-        raise ModelError(
-            f"{path.name} has {len(in_file)} joints, and Pinocchio made {len(found)} of them"
+    Raises:
+        BadInputError: The witness has joints that are not among them, or that cannot be
+            told apart.
+    """
+    own = kinematics.joint_names
+    if own == tuple(names):
+        return list(range(len(own)))
+    if not all(own):
+        raise BadInputError(
+            f"{kinematics.path.name} has joints without a name: they cannot be matched"
         )
-    if list(wanted) == list(in_file):
-        return found
-    by_name = dict(zip(in_file, found, strict=True))
-    if sorted(by_name) != sorted(wanted):
+    lacking = sorted(set(own) - set(names))
+    if lacking:
+        raise BadInputError(f"the engine lacks joints of the witness: {', '.join(lacking)}")
+    return [number for number, name in enumerate(names) if name in own]
+
+
+def _in_order(read: WitnessModel, wanted: Sequence[str], path: Path) -> list[Segment]:
+    """The joints as segments of a qpos that lists them in the order `wanted`."""
+    in_file = [name for name, _ in read.joints]
+    if list(wanted) == in_file:
+        return [segment for _, segment in read.joints]
+    if sorted(in_file) != sorted(wanted) or len(set(in_file)) != len(in_file):
         raise ModelError(
             f"{path.name} has other joints than asked for: {', '.join(in_file)} "
             f"against {', '.join(wanted)}"
         )
+    by_name = dict(read.joints)
     return [by_name[name] for name in wanted]
 
 

@@ -103,3 +103,27 @@ def _in_menagerie(name: str, root: Path) -> Path:
         found = sorted(f"{robot}/{found.stem}" for found in home.glob("*.xml"))
         raise unknown_name(f"model in {root}", f"{robot}/{file}", found)
     return path.absolute()
+
+
+def mesh_file(name: str, folder: Path) -> Path | None:
+    """The file of a mesh that a URDF names, or None where there is none.
+
+    Args:
+        name: As the URDF has it. A package:// is looked for in the folders above: ROS knows
+            where packages are, and a file alone does not.
+        folder: That of the URDF.
+    """
+    plain = name.removeprefix("file://")
+    choices = [folder / plain]
+    if plain.startswith("package://"):
+        inside = plain.removeprefix("package://")
+        rest = inside.partition("/")[2]
+        above = (folder, *list(folder.parents)[:3])
+        choices = [up / part for up in above for part in (inside, rest)]
+    for choice in choices:
+        try:
+            if choice.is_file():
+                return choice
+        except (OSError, ValueError):
+            continue
+    return None

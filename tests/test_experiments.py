@@ -12,11 +12,14 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.errors import BadInputError
+from statemachine.errors import BadInputError, ModelError
 from statemachine.lessons import fingertip, in_turns, session
+from statemachine.lessons._certificate import page
 from statemachine.lessons._fall import Forces, milestones
+from statemachine.lessons._tips import random_qpos
 from statemachine.lessons.speed import Speed
 from statemachine.models import models_dir
+from statemachine.page import Verdict
 from statemachine.scenarios.provenance import provenance
 
 from .conftest import lesson_result, need_engine
@@ -183,8 +186,8 @@ class TestCertificate:
 
     def test_poses_are_drawn_within_the_limits_by_the_seed(self) -> None:
         model = sm.load("so101")
-        names = list(model.joint_names)
-        one, again, other = (fingertip._random_qpos(model, names, 50, seed) for seed in (1, 1, 2))
+        ids = range(model.njnt)
+        one, again, other = (random_qpos(model, ids, 50, seed) for seed in (1, 1, 2))
         assert np.array_equal(one, again)
         assert not np.array_equal(one, other)
         assert not one[0].any()
@@ -252,3 +255,92 @@ class TestCertificate:
         )
         found = fingertip.certify(sm.load(file), poses=50, site="tip")
         assert found.agrees
+        assert (found.grade, found.body) == ("own reading", "b")
+
+    ENDS = (
+        "<mujoco><worldbody>{}<body name='a'><joint name='j'/><geom size='.1'/><body name='b' "
+        "pos='1 0 0'><geom size='.1'/></body><body pos='0 1 0'><joint type='slide' axis='1 0 0'/>"
+        "<geom size='.1'/></body></body><body name='table' pos='0 0 9'/></worldbody></mujoco>"
+    )
+
+    def test_without_a_name_every_body_at_an_end_has_a_certificate(self, tmp_path: Path) -> None:
+        file = tmp_path / "m.xml"
+        file.write_text(self.ENDS.format(""))
+        model = sm.load(file)
+        found = fingertip.certify(model, poses=50)
+        assert found.agrees
+        assert {tip.site for tip in found.tips} == {"b", "body 3"}  # not the table: it is still
+        assert found.site == found.tips[0].site
+        assert found.position_worst == found.tips[0].position_worst
+        assert [tip.worst for tip in found.tips] == sorted(t.worst for t in found.tips)[::-1]
+        drawn = random_qpos(model, range(2), 500, 0)
+        assert np.abs(drawn[:, 0]).max() == pytest.approx(np.pi, rel=0.01)
+        assert np.abs(drawn[:, 1]).max() == pytest.approx(1, rel=0.01)  # a slide's metres
+        alone = fingertip.certify(model, poses=50, site="a")
+        assert [tip.site for tip in alone.tips] == ["a"]
+        assert "no worse" not in repr(page({"mujoco": found}))
+        still = tmp_path / "still.xml"
+        still.write_text("<mujoco><worldbody><body name='b'/></worldbody></mujoco>")
+        with pytest.raises(BadInputError, match="moved by a joint"):
+            fingertip.certify(sm.load(still), poses=5)
+        assert fingertip.certify(sm.load(still), poses=5, site="b").agrees
+
+    def test_one_tip_of_many_that_is_elsewhere_is_enough(
+        self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    ) -> None:
+        right = fingertip._engine_poses
+
+        def wrong(*arguments: object) -> fingertip.Pose:
+            pos, mat = right(*arguments)  # pyright: ignore[reportArgumentType]
+            pos[7, 1] += 1e-9
+            return fingertip.Pose(pos, mat)
+
+        monkeypatch.setattr(fingertip, "_engine_poses", wrong)
+        file = tmp_path / "m.xml"
+        file.write_text(self.ENDS.format(""))
+        found = fingertip.certify(sm.load(file), poses=20)
+        assert not found.agrees
+        assert found.site == "body 3"
+        assert [tip.agrees for tip in found.tips] == [False, True]
+
+    def test_what_is_not_read_from_the_file_is_told_and_is_no_verdict(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        file = tmp_path / "m.xml"
+        cloth = (
+            "<flexcomp name='f' type='grid' dim='2' count='3 3 1' spacing='.1 .1 .1' mass='1' "
+            "radius='.01'/>"
+        )
+        file.write_text(self.ENDS.format(cloth))
+        found = fingertip.certify(sm.load(file), poses=20)
+        assert found.agrees
+        assert found.grade == "same reading"
+        assert "<flexcomp>" in found.reason
+        shown = page({"mujoco": found})
+        text = repr(shown)
+        assert "same reading" in text
+        assert "a misreading is in the numbers" in text
+        assert "agrees" not in text
+        assert "certif" not in text
+        assert not any(isinstance(block, Verdict) for block in shown.blocks)
+        right = fingertip._engine_poses
+
+        def wrong(*arguments: object) -> fingertip.Pose:
+            pos, mat = right(*arguments)  # pyright: ignore[reportArgumentType]
+            return fingertip.Pose(pos + 1e-9, mat)
+
+        monkeypatch.setattr(fingertip, "_engine_poses", wrong)
+        shown = page({"mujoco": fingertip.certify(sm.load(file), poses=20)})
+        assert not shown.holds
+        with pytest.raises(ModelError, match="<flexcomp>"):  # asked for, it is not replaced
+            fingertip.certify(sm.load(file), poses=20, witness=file)
+
+    def test_mjcf_against_urdf_of_the_same_robot(self) -> None:
+        arm = models_dir() / "so101"
+        for one, other in (("so101.xml", "so101.urdf"), ("so101.urdf", "so101.xml")):
+            for site in ("gripper", "moving_jaw_so101_v1"):
+                found = fingertip.certify(
+                    sm.load(arm / one), poses=50, site=site, witness=arm / other
+                )
+                assert found.grade == "own reading"
+                assert found.agrees

@@ -14,7 +14,7 @@ from .conftest import ROOT
 
 PACKAGE = ROOT / "statemachine"
 # Rooms and files that may name an engine: its backend, its room, the table, the witness.
-MAY_NAME = ("backends/", "engines/", "installed.py", "kinematics.py", "witness_file.py")
+MAY_NAME = ("backends/", "engines/", "installed.py", "kinematics.py", "witness/")
 # A backend's file and a room are called after the engine, or after the first half of its name.
 NAMES = frozenset(ENGINES) | {engine.module for engine in ENGINES.values()}
 

@@ -190,3 +190,27 @@ def test_a_model_without_anything_steps() -> None:
             sm.set_state(model, data, sm.get_state(model, data))
             assert data.qpos.shape == (0,)
             assert data.time == pytest.approx(3 * model.timestep)
+
+
+_IN_A_PACKAGE = """<robot name="r"><link name="base"/><link name="arm"><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+<visual><geometry><mesh filename="package://robot/meshes/look.dae"/></geometry></visual>
+<collision><geometry><mesh filename="package://robot/meshes/{name}"/></geometry></collision></link>
+<joint name="j" type="continuous"><parent link="base"/><child link="arm"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("where", ["robot/urdf", "robot"])
+def test_meshes_of_ros_packages_are_found_in_the_folders_above(tmp_path: Path, where: str) -> None:
+    meshes = tmp_path / "robot" / "meshes"
+    meshes.mkdir(parents=True)
+    corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    (meshes / "a & b.obj").write_text("".join(f"v {x} {y} {z}\n" for x, y, z in corners))
+    file = tmp_path / where / "robot.urdf"
+    file.parent.mkdir(exist_ok=True)
+    file.write_text(_IN_A_PACKAGE.format(name="a &amp; b.obj"))
+    model = sm.load(file)
+    assert model.nq == 1
+    assert model.compiled.nmesh == 1
+    file.write_text(_IN_A_PACKAGE.format(name="none.obj"))
+    with pytest.raises(errors.ModelError, match=r"none\.obj"):
+        sm.load(file)

@@ -210,8 +210,12 @@ def test_what_ends_under_a_fault_has_caught_it(
     [
         ("assert 1 == 2, 'as it must'", "line 2: as it must"),
         ("raise SystemExit(0)", "line 2: SystemExit: 0"),
-        ("import os; os.abort()", "ended the process by signal 6"),
+        ("import os; os.abort()", "ended the process by signal 6 (SIGABRT): Fatal Python error"),
         ("import os; os._exit(0)", "ended the process with code 0"),
+        (
+            "import _pytest.runner as r; del r.TestReport",
+            "with code 3: NameError: name 'TestReport'",
+        ),
         ("import pytest; pytest.exit('enough')", "ended the process with code"),
         pytest.param("while True: pass", "took longer than 10 s", marks=pytest.mark.slow),
         # It prints what a run that passed would, and what is written in the record.

@@ -19,7 +19,7 @@ from statemachine.report.as_json import dumps
 from .conftest import ROOT
 
 CORE = (
-    "errors.py", "rotations.py", "interface", "installed.py", "models.py", "witness_file.py",
+    "errors.py", "rotations.py", "interface", "installed.py", "models.py", "witness",
     "kinematics.py", "backends",
 )  # fmt: skip
 

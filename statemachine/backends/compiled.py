@@ -14,15 +14,19 @@ from __future__ import annotations
 
 import copy
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import escape, unescape
 
 import mujoco
 import numpy as np
 
 from ..errors import BadInputError, ModelError
 from ..interface import Array, Keyframe
+from ..models import mesh_file
 from ._mjb import check_binary
 
 _DISABLE = mujoco.mjtDisableBit
@@ -82,13 +86,38 @@ def compile_file(path: str | os.PathLike[str]) -> mujoco.MjModel:
         if text.lower().endswith(".mjb"):
             raw = mujoco.MjModel.from_binary_path(text)
         else:
-            raw = mujoco.MjModel.from_xml_path(text)
+            raw = _with_packages(Path(text)) or mujoco.MjModel.from_xml_path(text)
     except (ValueError, MemoryError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split()) or "out of memory"
         raise ModelError(f"MuJoCo cannot read {text}: {reason}") from error
     for problem in _problems(raw):
         raise ModelError(f"{text} has a number that nothing can be computed with: {problem}")
     return raw
+
+
+_PACKAGE = re.compile(r"(?<=[\"'])package://[^\"']*")
+
+
+def _with_packages(path: Path) -> mujoco.MjModel | None:
+    """A URDF whose meshes are in ROS packages, which MuJoCo does not look for; None of others."""
+    if path.suffix.lower() != ".urdf":
+        return None
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return None
+    if not _PACKAGE.search(text):
+        return None
+
+    def found(match: re.Match[str]) -> str:
+        file = mesh_file(unescape(match[0], {"&quot;": '"', "&apos;": "'"}), path.parent)
+        if file is None:
+            return match[0]
+        return escape(str(file.resolve()), {'"': "&quot;", "'": "&apos;"})
+
+    spec = mujoco.MjSpec.from_string(_PACKAGE.sub(found, text))
+    spec.modelfiledir = str(path.parent.resolve())
+    return spec.compile()
 
 
 def _problems(raw: mujoco.MjModel) -> Iterator[str]:

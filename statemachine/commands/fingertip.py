@@ -9,14 +9,19 @@ from ._common import add_backend, add_json, add_menagerie, add_model, on_each_ba
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Its options."""
-    parser.description = "Compare a site's pose on an engine with Pinocchio's, over many poses."
+    parser.description = "Compare poses of sites or bodies on an engine with Pinocchio's."
     add_backend(parser)
     add_model(parser, "so101")
     add_menagerie(parser)
     add_json(parser)
     parser.add_argument("--poses", type=int, default=200, metavar="N", help="how many (200)")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the poses (0)")
-    parser.add_argument("--site", default="gripperframe", help="the frame (gripperframe)")
+    parser.add_argument(
+        "--site",
+        default=None,
+        metavar="NAME",
+        help="the site or body (gripperframe if there is one, else every body at an end)",
+    )
     parser.add_argument(
         "--witness", default=None, metavar="FILE", help="what Pinocchio reads (default: the model)"
     )
@@ -28,7 +33,8 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
-    from ..lessons.fingertip import certify, page
+    from ..lessons._certificate import page
+    from ..lessons.fingertip import certify
 
     results = on_each_backend(
         options,

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import StateMachineError
+from ..backends import load
+from ..errors import MissingEngineError, StateMachineError
 from ..installed import WITNESS
-from ..kinematics import Kinematics
+from ..interface import JointType
+from ..kinematics import Kinematics, shared_joints
 from ..scenarios.provenance import model_files
 from ..traces import Header, Trace, model_file
 from .series import default_tip
@@ -24,6 +26,8 @@ class Witness:
         site: Which site.
         one: Largest distance at any row of the first trace [m]; two: of the second.
         rows: How many poses were compared.
+        grade: "own reading" if the witness read the model's file with its own parser, "same
+            reading" if it computed from the numbers that the file was compiled to.
     """
 
     by: str
@@ -31,6 +35,7 @@ class Witness:
     one: float
     two: float
     rows: int
+    grade: str
 
 
 def witness(one: Trace, two: Trace, path: Path | None = None) -> Witness | None:
@@ -42,8 +47,8 @@ def witness(one: Trace, two: Trace, path: Path | None = None) -> Witness | None:
         path: The model's file; by default the one that the headers name.
 
     Returns:
-        None where Pinocchio is missing, where it cannot read the model, and where the file
-        that the traces were recorded with is not here.
+        None where Pinocchio is missing, where neither it nor an engine that is here can read
+        the model, and where the file that the traces were recorded with is not here.
     """
     site = default_tip(one.header, two.header)
     if not site or "site_xpos" not in one or "site_xpos" not in two:
@@ -55,33 +60,38 @@ def witness(one: Trace, two: Trace, path: Path | None = None) -> Witness | None:
         file, same = (path, True) if path else model_file(one.header)
         if not same:
             return None
-        kinematics = _readable(file, one.header)
-        if kinematics is None:
-            return None
-        gaps = [_gap(kinematics, trace, site) for trace in (one, two)]
-        if not np.isfinite(gaps).all():
+        kinematics = _readable(file, one.header, site)
+        first, second = (_gap(kinematics, trace, site) for trace in (one, two))
+        if not np.isfinite([first, second]).all():
             return None
     except StateMachineError:
         return None
-    return Witness(f"{WITNESS} {kinematics.version}", site, *gaps, rows=len(one) + len(two))
+    rows = len(one) + len(two)
+    by = f"{WITNESS} {kinematics.version}"
+    return Witness(by, site, first, second, rows, kinematics.grade)
 
 
-def _readable(file: Path, header: Header) -> Kinematics | None:
-    """The robot from a scene's file or from one that it includes."""
+def _readable(file: Path, header: Header, site: str) -> Kinematics:
+    """The robot from a scene's file, or from one that it includes, or from its numbers."""
     for path in model_files(file):
         try:
             found = Kinematics(path)
+            names = [header.joints[k] for k in shared_joints(found, header.joints)]
+        except MissingEngineError:
+            raise
         except StateMachineError:
             continue
-        if set(found.joint_names) <= set(header.joints):
-            shared = [name for name in header.joints if name in found.joint_names]
-            return Kinematics(path, joint_names=shared)
-    return None
+        if site in found.site_names:
+            return found if found.joint_names == tuple(names) else Kinematics(path, names)
+    return Kinematics.same_reading(load(file))
 
 
 def _gap(kinematics: Kinematics, trace: Trace, site: str) -> float:
     header = trace.header
-    places = [header.jnt_qposadr[header.joints.index(name)] for name in kinematics.joint_names]
+    places: list[int] = []
+    for joint in shared_joints(kinematics, header.joints):
+        start = header.jnt_qposadr[joint]
+        places += range(start, start + JointType(header.jnt_type[joint]).nq)
     theirs = kinematics.poses(trace.qpos[:, places], site).pos
     ours, _ = trace.site(site)
     return float(np.linalg.norm(ours - theirs, axis=1).max())

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..interface import Array
+from ..models import mesh_file
 from .records import CollisionShape
 
 _LARGEST = 256 * 2**20  # bytes
@@ -23,7 +24,7 @@ def read_mesh(name: str, folder: Path) -> tuple[Array | None, str]:
         name: As a URDF names it; of package://… the folders above are tried.
         folder: That of the URDF.
     """
-    path = _find(name, folder)
+    path = mesh_file(name, folder)
     if path is None:
         return None, "is not there"
     try:
@@ -42,22 +43,6 @@ def read_mesh(name: str, folder: Path) -> tuple[Array | None, str]:
     if not len(triangles) or not np.isfinite(triangles).all():
         return None, "has no triangles" if not len(triangles) else "has figures that are no numbers"
     return triangles, ""
-
-
-def _find(name: str, folder: Path) -> Path | None:
-    plain = name.removeprefix("file://")
-    choices = [folder / plain]
-    if plain.startswith("package://"):
-        inside = plain.removeprefix("package://")
-        rest = inside.partition("/")[2]
-        choices = [folder / rest, folder.parent / rest, folder.parent.parent / inside]
-    for choice in choices:
-        try:
-            if choice.is_file():
-                return choice
-        except (OSError, ValueError):
-            continue
-    return None
 
 
 def _stl(content: bytes) -> Array:

@@ -12,6 +12,7 @@ from ..comparison import QUANTITIES
 from ..comparison.text import NONE, milliseconds, quantity, sentence
 from ..page import Block, Code, Items, Page, Section, Table, TableCell, Text, Verdict
 from ..traces import Trace
+from ..witness import SAME_READING
 from . import why
 from .commanded import commanded
 from .contacts import contact_words
@@ -178,6 +179,11 @@ def _figures(comparison: Comparison, witness: Witness | None) -> list[Block]:
             f"within {1e3 * witness.two:.0e} mm of {two}'s."
         )
         checked = f"That checks where {witness.site} is for given joint angles, not the motion."
+        if witness.grade == SAME_READING:
+            checked += (
+                " Its parser cannot read the model's file, so it computed from the numbers that "
+                "the file was compiled to: a misreading of the file would be in them."
+            )
         more.append(Section("", "", [Text(checked)], detail=True))
     return [
         Table(

@@ -26,12 +26,19 @@ def page(survey: Survey, widest: int = _WIDEST) -> Page:
     if len(survey.models) == 1 and not survey.parts:
         return _one(survey, survey.models[0])
     others = _others(survey)
-    headers = ["model", "bits", *_headers(others), "witness", "runs", "cost"]
-    words = frozenset({0, 1, len(headers) - 3, len(headers) - 2})
-    rows = [[_short(row.file, widest), *_row(survey, row, others)] for row in survey.models]
+    headers = ["model", "bits", *_headers(others), "witness"]
+    words = {0, 1, len(headers) - 1}
+    wide: set[int] = set()
+    if tried := any(each.scenarios for row in survey.models for each in row.backends.values()):
+        words, wide = words | {len(headers)}, {len(headers) + 1}
+        headers += ["runs", "cost"]
+    rows = [
+        [_short(row.file, widest), *_row(survey, row, others)][: len(headers)]
+        for row in survey.models
+    ]
     blocks: list[Block] = [
-        Table(headers, rows, words=words, wide=frozenset({len(headers) - 1})),
-        Text(_legend(survey), small=True),
+        Table(headers, rows, words=frozenset(words), wide=frozenset(wide)),
+        Text(_legend(survey, tried), small=True),
     ]
     blocks += [Text(text) for text in _sums(survey, others)]
     for other in others:
@@ -129,17 +136,19 @@ def _cost(row: ExaminedModel) -> str:
     return " ".join(costs) or _NOTHING
 
 
-def _legend(survey: Survey) -> str:
+def _legend(survey: Survey, tried: bool) -> str:
     backends = list(dict.fromkeys(name for row in survey.models for name in row.backends))
-    return (
+    text = (
         f"bits: {survey.default} computes the bits of the engine without us, and two futures of a "
         "State are the same bits on every engine. no contacts, contacts: the largest gap to "
         f"{survey.default} within {STEPS} steps under random commands, in rad (hinges) or m "
         "(slides and free bodies), whichever is larger; h: it vanishes with the timestep; "
         "still: nothing in it moves. "
-        "witness: its reading, and its largest gap in m. runs: of "
-        f"{', '.join(SCENARIOS)}, how many run on {listed(backends)}."
+        "witness: its reading, and its largest gap in m."
     )
+    if not tried:
+        return text
+    return f"{text} runs: of {', '.join(SCENARIOS)}, how many run on {listed(backends)}."
 
 
 def _sums(survey: Survey, others: Sequence[str]) -> Iterator[str]:

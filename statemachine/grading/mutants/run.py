@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import signal
 import sys
 import tempfile
 import threading
@@ -32,6 +33,8 @@ _CLOCK = 300.0  # on the clock: the machine may be busy with others
 # Under a fault they may take longer: so many times as long, and so many seconds more.
 _TIMES, _AND, _CLOCK_AND = 5.0, 15.0, 120.0
 _RECORD_MOST = 10_000_000  # bytes
+_PYTEST_FAILS = "INTERNALERROR>"  # how pytest's report of an error of its own begins, on stdout
+_LONGEST = 300  # characters of what was said last
 _IMPORT = "the import of the file"
 _OWN = ("PYTEST_ADDOPTS", "PYTEST_PLUGINS", "PYTEST_DEBUG")  # settings of another pytest
 
@@ -289,9 +292,8 @@ def _read(record: Path, outcome: sandbox.ProcessOutcome, seconds: float, clock: 
             case _:
                 raise BadInputError("the tests wrote into the record of what they do")
     if not ready:  # of which no test can be the reason
-        lines = outcome.stderr.strip().splitlines()
-        said = [line for line in lines if "rror" in line] or lines or ["it said nothing"]
-        raise EngineError(f"pytest {_end(outcome, seconds, clock)} before the tests: {said[-1]}")
+        how = _ended(outcome, seconds, clock)
+        raise EngineError(f"pytest {how} before the tests: {_last(outcome) or 'it said nothing'}")
     if broken or tests is None:
         broken = broken or f"it {_end(outcome, seconds, clock)}"
         failures[_IMPORT] = broken
@@ -317,7 +319,20 @@ def _lines(record: Path) -> Iterator[Any]:
 
 
 def _end(outcome: sandbox.ProcessOutcome, seconds: float, clock: float) -> str:
-    """How a run ended that did not come to its end."""
+    """How a run ended that did not come to its end, and what it said last."""
+    how, said = _ended(outcome, seconds, clock), _last(outcome)
+    return f"{how}: {said}" if said else how
+
+
+def _last(outcome: sandbox.ProcessOutcome) -> str:
+    """The last line of an error, pytest's own among them; "" where nothing was said."""
+    lines = [line.strip() for line in outcome.stderr.splitlines() if line.strip()]
+    lines += [line for line in outcome.stdout.splitlines() if line.startswith(_PYTEST_FAILS)]
+    said = [line for line in lines if "rror" in line.removeprefix(_PYTEST_FAILS)] or lines
+    return said[-1].removeprefix(_PYTEST_FAILS).strip()[:_LONGEST] if said else ""
+
+
+def _ended(outcome: sandbox.ProcessOutcome, seconds: float, clock: float) -> str:
     if outcome.out_of_cpu:
         return f"took longer than {seconds:.0f} s of computing"
     if outcome.flooded:
@@ -327,5 +342,6 @@ def _end(outcome: sandbox.ProcessOutcome, seconds: float, clock: float) -> str:
     if outcome.out_of_memory:
         return "took more memory than it may"
     if outcome.signal is not None:
-        return f"ended the process by signal {outcome.signal}"
+        name = next((each.name for each in signal.Signals if each == outcome.signal), "unknown")
+        return f"ended the process by signal {outcome.signal} ({name})"
     return f"ended the process with code {outcome.returncode}"

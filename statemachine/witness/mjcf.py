@@ -1,0 +1,276 @@
+"""The bodies, joints and sites of an MJCF, written as Pinocchio's parser reads them.
+
+Pinocchio's parser follows no <include>, takes one root body, and passes over some ways to
+write a place in silence. What it would misread is written another way here, from the file's
+own text and never from what MuJoCo's compiler made of it; what cannot be, is refused. All
+else in a file (shapes, masses, actuators, keyframes) has no part in places and is left out.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+import numpy as np
+
+from ..errors import ModelError
+from ..rotations import Array
+from .mjcf_places import Place, numbers, own_place
+from .mjcf_text import classes, compiler_of, with_includes
+
+Element = ElementTree.Element
+_MOST_BODIES = 100_000
+# Children of a body that neither make nor move one.
+_WITHOUT_PLACES = {"inertial", "geom", "camera", "light", "plugin"}
+_PLACED_BY = {"quat", "euler", "axisangle", "xyaxes", "zaxis", "fromto"}
+# What a joint and a site of Pinocchio's parser need to be told.
+_KINEMATIC = {"joint": {"type", "pos", "axis", "ref"}, "site": {"pos"} | _PLACED_BY}
+
+
+class FileJoint(NamedTuple):
+    """A joint of a file: its name, its kind, and its ref [rad or m]."""
+
+    name: str
+    kind: str
+    ref: float
+
+
+@dataclass
+class FileBody:
+    """A body of a file.
+
+    Attributes:
+        name: "" if it has none.
+        written: Its name in what Pinocchio reads: there, names are unique and never empty.
+        joints: In order.
+        sites: Their names, and what they are called in what Pinocchio reads.
+    """
+
+    name: str
+    written: str
+    joints: list[FileJoint] = field(default_factory=list[FileJoint])
+    sites: list[tuple[str, str]] = field(default_factory=list[tuple[str, str]])
+
+
+class _Surroundings(NamedTuple):
+    """Where an element stands: the frame around it, its class, what its names end in."""
+
+    frame: Place
+    childclass: str
+    suffix: str
+
+
+class PlainMjcf:
+    """An MJCF with bodies, joints and sites alone, each with all that it needs.
+
+    Attributes:
+        root: What Pinocchio's parser reads.
+        bodies: The world first, then all bodies in MuJoCo's order.
+        changes: What was done, in words.
+    """
+
+    def __init__(self, root: Element, path: Path) -> None:
+        """Write it.
+
+        Args:
+            root: The file as it is.
+            path: Where it is; its includes are looked for from there.
+
+        Raises:
+            ModelError: It has something that we cannot write out.
+        """
+        self._path = path
+        self._done: Counter[str] = Counter()
+        root, included = with_includes(root, path)
+        self._done["included files"] = included
+        self._compiler = compiler_of(root, path)
+        self._classes = classes(root, path, self._done)
+        angle = "degree" if self._compiler.degrees else "radian"
+        self.root: Element = ElementTree.Element("mujoco", model="robot")
+        ElementTree.SubElement(self.root, "compiler", angle=angle)
+        world = ElementTree.SubElement(self.root, "worldbody")
+        # Of a root body without a joint, and of the world, Pinocchio drops the pose and the
+        # sites; of several root bodies, all but the first. Below one that stands still it
+        # keeps them.
+        ground = ElementTree.SubElement(world, "body", name="the ground")
+        still = ElementTree.SubElement(ground, "body", name="body 0")
+        self.bodies: list[FileBody] = [FileBody("world", "body 0")]
+        self._sites = self._joints = 0
+        around = _Surroundings(Place.IDENTITY, "", "")
+        for worldbody in root.findall("worldbody"):
+            self._write(worldbody, ground, self.bodies[0], around, still)
+        roots = ground.findall("body")
+        self._done["root bodies"] = len(roots) - 1 if len(roots) > 2 else 0
+        for root_body in roots:
+            self._right_sites(root_body)
+
+    def _right_sites(self, root_body: Element) -> None:
+        """Write sites of a body without a joint as bodies.
+
+        Pinocchio puts such a site as if the body below which its own is were at that body's
+        joint. A body that stands still it puts where it belongs.
+        """
+        for parent in list(root_body.iter("body")):
+            for body in parent.findall("body"):
+                if body.find("joint") is None:
+                    for site in body.findall("site"):
+                        site.tag = "body"
+                        self._done["still sites"] += 1
+
+    @property
+    def changes(self) -> tuple[str, ...]:
+        """What was done to the text, in words."""
+        return tuple(_CHANGES[what].format(n) for what, n in self._done.items() if n)
+
+    def _write(
+        self,
+        source: Element,
+        target: Element,
+        body: FileBody,
+        around: _Surroundings,
+        sites: Element,
+    ) -> None:
+        """Write what `source` holds below `target`; its sites below `sites`."""
+        for child in source:
+            if child.tag == "body":
+                self._body(child, target, around)
+            elif child.tag in ("joint", "freejoint"):
+                self._joint(child, target, body, around)
+            elif child.tag == "site":
+                self._site(child, sites, body, around)
+            elif child.tag in ("frame", "replicate"):
+                self._done[child.tag] += 1
+                for inner in self._copies(child, around):
+                    self._write(child, target, body, inner, sites)
+            elif isinstance(child.tag, str) and child.tag not in _WITHOUT_PLACES:
+                raise ModelError(
+                    f"{self._path.name} uses <{child.tag}>, which Pinocchio does not read, and "
+                    "which is not written out for it"
+                )
+
+    def _copies(self, element: Element, around: _Surroundings) -> Iterator[_Surroundings]:
+        """The surroundings within a <frame>, or within each copy of a <replicate>."""
+        childclass = element.get("childclass") or around.childclass
+        if element.tag == "frame":
+            place = own_place(element.attrib, self._compiler)
+            yield _Surroundings(around.frame @ place, childclass, around.suffix)
+            return
+        step = {"pos": element.get("offset", "0 0 0"), "euler": element.get("euler", "0 0 0")}
+        move, frame = own_place(step, self._compiler), around.frame
+        count = int(numbers(element.get("count", ""), 1)[0])
+        width = len(str(count))
+        for k in range(count):
+            suffix = f"{element.get('sep', '')}{k:0{width}d}{around.suffix}"
+            yield _Surroundings(frame, childclass, suffix)
+            frame = frame @ move
+
+    def _body(self, element: Element, target: Element, around: _Surroundings) -> None:
+        number = len(self.bodies)
+        if number > _MOST_BODIES:
+            raise ModelError(f"{self._path.name} has more than {_MOST_BODIES:,} bodies")
+        name = self._name(element, around)
+        body = FileBody(name, f"body {number}")
+        self._done["body names"] += not name
+        self.bodies.append(body)
+        written = ElementTree.SubElement(target, "body", name=body.written)
+        self._place(element.attrib, written, around)
+        childclass = element.get("childclass") or around.childclass
+        inside = _Surroundings(Place.IDENTITY, childclass, around.suffix)
+        self._write(element, written, body, inside, written)
+
+    def _joint(
+        self, element: Element, target: Element, body: FileBody, around: _Surroundings
+    ) -> None:
+        given = self._resolved(element, "joint", around)
+        free = element.tag == "freejoint" or given.get("type") == "free"
+        kind = "free" if free else given.get("type", "hinge")
+        if free and (element.get("align") == "true" or self._compiler.aligned):
+            raise ModelError(
+                f"{self._path.name} aligns a free body with its inertia, which its text does not "
+                "tell the place of"
+            )
+        ref = float(numbers(given.get("ref", "0"), 1)[0]) if kind in ("hinge", "slide") else 0.0
+        self._done["ref"] += bool(ref)
+        if kind == "hinge" and self._compiler.degrees:
+            ref = float(np.deg2rad(ref))
+        name = self._name(element, around)
+        body.joints.append(FileJoint(name, kind, ref))
+        self._done["joint names"] += not name
+        written = {"name": f"joint {self._joints}", "type": kind}
+        self._joints += 1
+        if kind != "free":
+            pos, axis = given.get("pos", "0 0 0"), given.get("axis", "0 0 1")
+            if not around.frame.is_identity:
+                pos = _text(around.frame.carry(numbers(pos, 3)))
+                axis = _text(around.frame.turn @ numbers(axis, 3))
+            written |= {"pos": pos, "axis": axis}
+        ElementTree.SubElement(target, "joint", written)
+
+    def _site(
+        self, element: Element, target: Element, body: FileBody, around: _Surroundings
+    ) -> None:
+        name = self._name(element, around)
+        body.sites.append((name, f"site {self._sites}"))
+        self._sites += 1
+        written = ElementTree.SubElement(target, "site", name=body.sites[-1][1])
+        self._place(self._resolved(element, "site", around), written, around)
+
+    def _place(self, given: dict[str, str], target: Element, around: _Surroundings) -> None:
+        """Give `target` a place: in the words of the file, where Pinocchio reads them rightly."""
+        by = _PLACED_BY & given.keys()
+        plain = {"quat", "xyaxes"} | ({"euler"} if self._compiler.eulerseq == "xyz" else set())
+        if around.frame.is_identity and by <= plain:
+            for name in ("pos", *by):
+                if name in given:
+                    target.set(name, given[name])
+            return
+        place = around.frame @ own_place(given, self._compiler)
+        target.set("pos", _text(place.pos))
+        target.set("quat", _text(place.quat))
+        for name in by - plain:
+            self._done[name] += 1
+
+    def _resolved(self, element: Element, tag: str, around: _Surroundings) -> dict[str, str]:
+        """Attributes of a joint or a site, those from its class included."""
+        own = {name: text for name, text in element.items() if name in _KINEMATIC[tag]}
+        if element.tag == "freejoint":
+            return own
+        name = element.get("class") or around.childclass or "main"
+        if name not in self._classes:
+            raise ModelError(f"{self._path.name} has no default class {name!r}")
+        preset = self._classes[name].get(tag, {})
+        preset = {key: text for key, text in preset.items() if key in _KINEMATIC[tag]}
+        if _PLACED_BY & own.keys():  # an orientation replaces that of the class
+            preset = {key: text for key, text in preset.items() if key not in _PLACED_BY}
+        self._done["defaults"] += bool(preset.keys() - own.keys())
+        return preset | own
+
+    def _name(self, element: Element, around: _Surroundings) -> str:
+        name = element.get("name", "")
+        return name + around.suffix if name else ""
+
+
+_CHANGES = {
+    "included files": "included files read in: {}",
+    "defaults": "defaults written out where they are used: in {} joints and sites",
+    "default blocks": "top-level <default> blocks taken together: {}",
+    "body names": "bodies without a name given one: {}",
+    "joint names": "joints without a name given one: {}",
+    "ref": "ref of joints subtracted from qpos: {}",
+    "frame": "<frame> written out: {}",
+    "replicate": "<replicate> written out: {}",
+    "euler": "euler in another order written as quat: {}",
+    "axisangle": "axisangle written as quat: {}",
+    "zaxis": "zaxis written as quat: {}",
+    "fromto": "fromto of a site written as pos and quat: {}",
+    "still sites": "sites of bodies without a joint written as bodies: {}",
+    "root bodies": "root bodies put below one body that stands still: {}",
+}
+
+
+def _text(values: Array) -> str:
+    return " ".join(repr(float(value)) for value in values)
