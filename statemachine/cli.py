@@ -44,8 +44,12 @@ class _Parser(argparse.ArgumentParser):
             message = f"{wrong}no {given!r}; known: {', '.join(known)}{hint}"
         if "expected one argument" in message:
             flag = message.split(":")[0].removeprefix("argument ").split("/")[0]
-            if typed := _after(flag):
+            named = {name: each for each in self._actions for name in each.option_strings}
+            typed = _after(flag)
+            if typed and typed not in named:
                 message += f" (one that begins with a minus: {flag}={typed})"
+            elif flag in named and isinstance(metavar := named[flag].metavar, str):
+                message += f": {flag} {metavar}"
         if message.startswith("unrecognized arguments: -"):
             given = message.split()[2].partition("=")[0]
             known = _flags(_parser(COMMANDS), sys.argv[1:])

@@ -27,7 +27,7 @@ def wheel(folder: Path) -> Path:
 
 def student_kit(built: Path) -> dict[str, bytes]:
     """What a student needs, by name in the zip."""
-    exercises = {name: _template(name) for name in ("step_loop.py", "test_arm.py")}
+    exercises = {name: _template(name) for name in ("step_loop.py", "test_arm.py", "conftest.py")}
     start = (HERE / "START.md").read_text(encoding="utf-8").replace("WHEEL", built.name)
     return {
         built.name: built.read_bytes(),

@@ -264,6 +264,8 @@ def test_alone_it_lists_the_lessons_in_order(cli: Cli) -> None:
         (("lesson", "--from", "gravty"), "Did you mean gravity?"),
         (("check",), "expected one of FILE"),
         (("check", "--mutants"), "expected one argument"),
+        (("compare", "hold", "--html"), "expected one argument: --html PAGE.html"),
+        (("compare", "hold", "--html", "--no-why"), "expected one argument: --html PAGE.html"),
         (("lessn",), "Did you mean lesson?"),
         (("gravity",), "Did you mean statemachine lesson gravity?"),
         (("lesson", "fingertip"), "Did you mean statemachine fingertip?"),

@@ -6,6 +6,8 @@ import importlib.util
 import json
 import math
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -146,6 +148,15 @@ def test_the_short_step_keeps_the_clock_right(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("plugin", [(), ("-p", "statemachine.grading.mutants.plugin")])
+def test_pytest_alone_runs_the_exercise(plugin: tuple[str, ...]) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *plugin, str(EXERCISE)],
+        capture_output=True, text=True, cwd=EXERCISE.parent, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout
+
+
 def test_the_exercise_begins_with_survivors_and_an_idle_test() -> None:
     found = examine(EXERCISE, only=("xyzw", "degrees", "no-forward"))
     assert found.failures == ()

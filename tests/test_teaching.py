@@ -46,6 +46,7 @@ def test_the_students_kit_has_no_solution(built: Path, tmp_path: Path) -> None:
                 "path.ipynb",
                 "exercises/step_loop.py",
                 "exercises/test_arm.py",
+                "exercises/conftest.py",
                 built.name,
             ]
         )

@@ -17,7 +17,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--html",
         default=None,
-        metavar="FILE",
+        metavar="PAGE.html",
         help="write a report that stands alone: both runs in 3D, curves, figures, what causes it",
     )
     parser.add_argument(

@@ -230,7 +230,8 @@ def _path(options: argparse.Namespace, reader: Any) -> int:
 
 def _further(options: argparse.Namespace, reader: Any) -> int:
     """The fingertip of all engines against the witness, and where to go next."""
-    from ..lessons.fingertip import certify, page
+    from ..lessons._certificate import page
+    from ..lessons.fingertip import certify
     from ..report import terminal
 
     code, every = 0, argparse.Namespace(backend="all", menagerie=options.menagerie)
