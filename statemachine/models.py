@@ -1,7 +1,8 @@
 """From the name of a model to the file that holds it.
 
-A name is one of ours ("so101/scene_box"), a path to a file, or a file of a
-folder laid out like MuJoCo Menagerie, given as an argument or by $MENAGERIE.
+A name is one of ours ("so101/scene_box"), a path to a file, a file of a folder laid
+out like MuJoCo Menagerie, given as an argument or by $MENAGERIE, or that of a robot
+in a package of robots ("menagerie:unitree_g1"; see `robot_packages`).
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import os
 from pathlib import Path
 
 from .errors import ModelFileError, shown, unknown_name
+from .robot_packages import file_of, is_named
 
 _PACKAGE = Path(__file__).resolve().parent
 SUFFIXES = (".xml", ".urdf", ".mjb")
@@ -34,7 +36,8 @@ def resolve(name: str | os.PathLike[str], menagerie: str | os.PathLike[str] | No
     """The file of a model.
 
     Args:
-        name: One of `model_names()`, or a path to an .xml, .urdf or .mjb file.
+        name: One of `model_names()`, a path to an .xml, .urdf or .mjb file, or
+            "menagerie:NAME" or "robot_descriptions:NAME" of the packages of these names.
         menagerie: A menagerie folder. Given, names are looked up there ("so101/scene"
             as robotstudio_so101/scene.xml) and not among ours.
 
@@ -44,15 +47,12 @@ def resolve(name: str | os.PathLike[str], menagerie: str | os.PathLike[str] | No
     Raises:
         ModelFileError: The path or the menagerie folder is not there.
         UnknownNameError: No model has this name.
+        MissingEngineError: The package of robots is not installed.
         TypeError: It is no text and no path.
     """
-    text = os.fspath(name) if isinstance(name, os.PathLike) else name
-    if not isinstance(text, str):
-        raise TypeError(f"a model is given by its name or a path; got {shown(name)}")
-    if "\0" in text or not text.strip():
-        raise ModelFileError(f"{text!r} is neither the name of a model nor a path")
-    if any("\ud800" <= character <= "\udfff" for character in os.fsdecode(text)):
-        raise ModelFileError(f"{text!r} is not UTF-8, and engines open no file of such a name")
+    text = _as_text(name)
+    if is_named(text) and (menagerie is None or ":" in text):
+        return file_of(text)
     try:
         path = Path(text).expanduser()
         path.is_file()
@@ -77,6 +77,17 @@ def resolve(name: str | os.PathLike[str], menagerie: str | os.PathLike[str] | No
     if os.environ.get("MENAGERIE") and "/" in text:
         return _in_menagerie(text, Path(os.environ["MENAGERIE"]).expanduser())
     raise unknown_name("model", text, model_names())
+
+
+def _as_text(name: str | os.PathLike[str]) -> str:
+    text = os.fspath(name) if isinstance(name, os.PathLike) else name
+    if not isinstance(text, str):
+        raise TypeError(f"a model is given by its name or a path; got {shown(name)}")
+    if "\0" in text or not text.strip():
+        raise ModelFileError(f"{text!r} is neither the name of a model nor a path")
+    if any("\ud800" <= character <= "\udfff" for character in os.fsdecode(text)):
+        raise ModelFileError(f"{text!r} is not UTF-8, and engines open no file of such a name")
+    return text
 
 
 def _in_menagerie(name: str, root: Path) -> Path:

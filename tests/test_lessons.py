@@ -384,13 +384,13 @@ _SLIDE = """<mujoco><option timestep="0.001"/><worldbody><body><joint name="s" t
     <geom size=".1"/></body></worldbody><keyframe><key time="2"/></keyframe></mujoco>"""
 
 
-def test_a_slide_is_printed_in_metres_and_a_reset_tells_its_own_time(tmp_path: Path) -> None:
+def test_a_slide_is_printed_in_millimetres_and_a_reset_tells_its_own_time(tmp_path: Path) -> None:
     file = tmp_path / "slide.xml"
     file.write_text(_SLIDE)
     model = sm.load(file)
     options = {"joint": "s", "seconds": 0.5, "longer": 0}
     taken = take(LESSONS["gravity"], model, "mujoco", options, str(file))
-    assert float(taken.printed.split()[0]) == round(taken.result.servos_on.position[-1], 4)
+    assert float(taken.printed.split()[0]) == round(1000 * taken.result.servos_on.position[-1], 2)
     reset = {"mujoco": take(LESSONS["reset"], model, "mujoco", {}, str(file))}
     page = page_of_lesson(LESSONS["reset"], reset)
     assert any(isinstance(b, Text) and "0.1 s is simulated" in b.text for b in page.blocks)

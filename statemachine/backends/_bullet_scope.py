@@ -193,7 +193,7 @@ def _geoms(raw: mujoco.MjModel) -> Found:
 
 def _actuators(raw: mujoco.MjModel) -> Found:
     gain, bias = mujoco.mjtGain, mujoco.mjtBias
-    for a in range(raw.nu):
+    for a in range(raw.nactuator):
         name, joint = _name(raw, "actuator", a), int(raw.actuator_trnid[a, 0])
         if raw.actuator_trntype[a] != int(mujoco.mjtTrn.mjTRN_JOINT):
             yield "actuator transmission", f"actuator {name} does not drive a joint"

@@ -24,6 +24,7 @@ from . import _dense as dense
 _BOX, _SPHERE = int(mujoco.mjtGeom.mjGEOM_BOX), int(mujoco.mjtGeom.mjGEOM_SPHERE)
 _CAPSULE, _CYLINDER = int(mujoco.mjtGeom.mjGEOM_CAPSULE), int(mujoco.mjtGeom.mjGEOM_CYLINDER)
 _MESH, _PLANE = int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_PLANE)
+UNLIMITED = 1e9  # a range or a force where there is none: PyBullet wants a number
 _LONGEST = 200  # PyBullet cuts names at 1,023 bytes
 
 
@@ -270,7 +271,11 @@ def _joints(
         kind = "prismatic" if slide else "revolute" if limited else "continuous"
         # A slide must have a range; PyBullet takes one that is the wrong way round for none.
         low, high = (
-            raw.jnt_range[joint] if limited else (-1e9, 1e9) if dialect.dynamics else (1, -1)
+            raw.jnt_range[joint]
+            if limited
+            else (-UNLIMITED, UNLIMITED)
+            if dialect.dynamics
+            else (1, -1)
         )
         bounds = "" if kind == "continuous" else f'lower="{_number(low)}" upper="{_number(high)}" '
         dof = int(raw.jnt_dofadr[joint])
@@ -316,13 +321,13 @@ def _joint(
 
 
 def _effort(raw: mujoco.MjModel, joint: int) -> float:
-    """The largest force of the actuators on a joint; 1e9 where nothing limits it."""
+    """The largest force of the actuators on a joint; UNLIMITED where nothing limits it."""
     forces = [
         np.abs(raw.actuator_forcerange[a]).max()
-        for a in range(raw.nu)
+        for a in range(raw.nactuator)
         if raw.actuator_trnid[a, 0] == joint and raw.actuator_forcelimited[a]
     ]
-    return float(max(forces, default=1e9))
+    return float(max(forces, default=UNLIMITED))
 
 
 def _tip(raw: mujoco.MjModel, site: int, names: Names) -> Iterator[str]:

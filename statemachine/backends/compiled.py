@@ -208,13 +208,18 @@ def facts(m: mujoco.MjModel) -> dict[str, Any]:
     A backend adds `backend`, `engine_version`, `path`, `raw`, `capabilities`, `timestep` and
     `substeps`.
     """
-    on_joint = m.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
-    servo = (
-        (m.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_FIXED))
-        & (m.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE))
-        & (m.actuator_biasprm[:, 1] == -m.actuator_gainprm[:, 0])
-        & (m.actuator_gainprm[:, 0] != 0)
-    )
+    # An actuator may take several numbers of ctrl: whose each of them is, and which of its own.
+    owner = np.repeat(np.arange(m.nactuator), m.actuator_ctrlnum)
+    on_joint = (m.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT))[owner]
+    gain, bias = m.actuator_gainprm[owner, 0], m.actuator_biasprm[owner]
+    fixed = (m.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_FIXED))[owner]
+    unbiased = (m.actuator_biastype == int(mujoco.mjtBias.mjBIAS_NONE))[owner]
+    affine = (m.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE))[owner]
+    dynamics = m.actuator_dyntype[owner]
+    filtered = (int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT))
+    direct = dynamics == int(mujoco.mjtDyn.mjDYN_NONE)
+    servo = fixed & affine & (bias[:, 1] == -gain) & (gain != 0)
+    servo &= direct | np.isin(dynamics, filtered)  # an integrator's ctrl is a velocity
     return {
         "gravity": gravity(m),
         "nq": m.nq,
@@ -228,17 +233,21 @@ def facts(m: mujoco.MjModel) -> dict[str, Any]:
         "joint_names": tuple(m.joint(i).name for i in range(m.njnt)),
         "site_names": tuple(m.site(i).name for i in range(m.nsite)),
         "geom_names": tuple(m.geom(i).name for i in range(m.ngeom)),
-        "actuator_names": tuple(m.actuator(i).name for i in range(m.nu)),
+        "actuator_names": tuple(_control_names(m)),
         "jnt_type": m.jnt_type.astype(np.int64),
         "jnt_qposadr": m.jnt_qposadr.astype(np.int64),
         "jnt_dofadr": m.jnt_dofadr.astype(np.int64),
         "jnt_limited": m.jnt_limited.astype(bool),
         "jnt_range": m.jnt_range,
-        "actuator_jntid": np.where(on_joint, m.actuator_trnid[:, 0], -1).astype(np.int64),
+        "actuator_jntid": np.where(on_joint, m.actuator_trnid[owner, 0], -1).astype(np.int64),
         "actuator_ctrlrange": _ranges(m.actuator_ctrlrange, m.actuator_ctrllimited),
-        "actuator_forcerange": _ranges(m.actuator_forcerange, m.actuator_forcelimited),
-        "actuator_kp": np.where(servo, m.actuator_gainprm[:, 0], np.nan),
-        "actuator_kv": np.where(servo, -m.actuator_biasprm[:, 2], np.nan),
+        "actuator_forcerange": _ranges(
+            m.actuator_forcerange[owner], m.actuator_forcelimited[owner]
+        ),
+        "actuator_kp": np.where(servo, gain, np.nan),
+        "actuator_kv": np.where(servo, -bias[:, 2], np.nan),
+        "actuator_gain": np.where(fixed & unbiased & direct, gain, np.nan),
+        "actuator_gear": m.actuator_gear[m.actuator_outadr[owner], 0],
         "dof_armature": m.dof_armature,
         "dof_damping": m.dof_damping,
         "dof_frictionloss": m.dof_frictionloss,
@@ -255,6 +264,33 @@ def facts(m: mujoco.MjModel) -> dict[str, Any]:
             for i in range(m.nkey)
         ),
     }
+
+
+# What the controls of an actuator with several are: bits of its ctrlspec, in their order.
+_INPUTS = {
+    int(mujoco.mjtCtrlInput.mjINPUT_POS): "position",
+    int(mujoco.mjtCtrlInput.mjINPUT_VEL): "velocity",
+    int(mujoco.mjtCtrlInput.mjINPUT_FF): "feedforward",
+    int(mujoco.mjtCtrlInput.mjINPUT_VOLTAGE): "voltage",
+    int(mujoco.mjtCtrlInput.mjINPUT_PRESSURE): "pressure",
+}
+_CHARTS = {
+    int(mujoco.mjtCtrlChart.mjCHART_EXPMAP): ("x", "y", "z"),
+    int(mujoco.mjtCtrlChart.mjCHART_QUAT): ("w", "x", "y", "z"),
+}
+
+
+def _control_names(m: mujoco.MjModel) -> Iterator[str]:
+    """A name for each number of ctrl: the actuator's, with a suffix where it takes several."""
+    for i in range(m.nactuator):
+        name, count, spec = m.actuator(i).name, int(m.actuator_ctrlnum[i]), m.actuator_ctrlspec[i]
+        if m.actuator_gaintype[i] == int(mujoco.mjtGain.mjGAIN_SO3):
+            parts = _CHARTS.get(int(spec), ())
+        else:
+            parts = tuple(part for bit, part in _INPUTS.items() if int(spec) & bit)
+        if len(parts) != count:  # a signature of a later engine
+            parts = tuple(str(k) for k in range(count))
+        yield from (f"{name}.{part}" if name and count > 1 else name for part in parts)
 
 
 def _ranges(ranges: Array, limited: Any) -> Array:

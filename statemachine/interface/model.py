@@ -38,7 +38,12 @@ class Model(ABC):
         jnt_limited: (njnt,) bool; jnt_range: (njnt, 2) [rad or m].
         actuator_jntid: (nu,) joint that each actuator drives, -1 if none.
         actuator_ctrlrange, actuator_forcerange: (nu, 2), infinite where unlimited.
+        actuator_names: (nu,) of each number of ctrl; an actuator that takes several has its
+            name in all of them, as "hip.position" and "hip.velocity".
         actuator_kp, actuator_kv: (nu,) gains of a position servo, NaN if it is none.
+        actuator_gain: (nu,) force of a motor for a ctrl of 1, NaN if it is none.
+        actuator_gear: (nu,) what that force is multiplied by on the joint, and the joint's
+            position where a servo compares it with ctrl.
         dof_armature, dof_damping, dof_frictionloss: (nv,) of each degree of freedom.
         body_parentid: (nbody,) the body that carries each body; the world carries itself.
         jnt_bodyid, geom_bodyid, site_bodyid: The body of each joint, geom and site.
@@ -76,6 +81,8 @@ class Model(ABC):
     actuator_forcerange: Array
     actuator_kp: Array
     actuator_kv: Array
+    actuator_gain: Array
+    actuator_gear: Array
     dof_armature: Array
     dof_damping: Array
     dof_frictionloss: Array

@@ -13,8 +13,9 @@ from typing import cast
 
 from .records import Lesson, Module, Option
 
-_JOINT = Option("--joint", "shoulder_lift", "joint to write")
-_VALUE = Option("--value", 0.8, "what to write [rad]", float)
+# What depends on the robot has no default here: `fit` of the lesson's module gives it one.
+_JOINT = Option("--joint", None, "joint to write (default shoulder_lift, if there is one)")
+_VALUE = Option("--value", None, "what to write [rad or m] (default 0.8, if in range)", float)
 
 # The stations of the path, in order, and what comes after it.
 LESSONS = {
@@ -44,7 +45,7 @@ LESSONS = {
             (
                 _JOINT,
                 _VALUE,
-                Option("--site", "gripperframe", "the fingertip"),
+                Option("--site", None, "the fingertip (default gripperframe, or the last site)"),
                 Option("--arrays", False, "show which arrays each call changes", bool, more=True),
                 Option("--lag", False, "show how far behind a step leaves it", bool, more=True),
                 Option("--seconds", None, "simulated time of --lag (default 2)", float),
@@ -64,9 +65,15 @@ LESSONS = {
             "You never wrote ctrl. Who holds the arm up?",
             "so101/scene",
             (
-                Option("--seconds", 4.0, "simulated time", float),
-                Option("--joint", "shoulder_lift", "joint to watch"),
-                Option("--longer", 100.0, "simulated time of the fall; 0 for none", float),
+                Option("--seconds", None, "simulated time (default 4)", float),
+                Option(
+                    "--joint",
+                    None,
+                    "joint to watch (default shoulder_lift, or the one with the largest load)",
+                ),
+                Option(
+                    "--longer", None, "simulated time of the fall; 0 for none (default 100)", float
+                ),
             ),
         ),
         Lesson(

@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison.text import apart, position
+from ..comparison.text import NONE, apart, position
 from ..engines.parts import LeftAlone
 from ..errors import UnsupportedError
 from ..interface import Array, Data, forward
 from ..page import Table, Text, Traces, Verdict
 from ..scenarios.provenance import Provenance
-from ..scenarios.robot import carried_by, scalar_joint, touching
+from ..scenarios.robot import carried_by, dofs_of, touching
 from ..scenarios.runs import Progress, steps_in
+from ._robot import coordinate
 from ._words import where
 
 _BALANCE = 1e-3  # N·m or N; a sum below it is zero
@@ -90,6 +91,10 @@ class Droop:
             runs look at their end only.
         touching: Those that are there at the end.
         ctrl_is_zero: Whether ctrl still is, at the end.
+        others: Of the other joints of the same robot the fastest [rad/s or m/s], and the largest
+            acceleration [rad/s² or m/s²] at the end: while they move, no joint is in balance.
+        diverged: When the engine gave up [s]; what would have been later is NaN. None if it
+            did not.
     """
 
     time: Array
@@ -102,6 +107,15 @@ class Droop:
     touches: dict[str, float]
     touching: tuple[str, ...]
     ctrl_is_zero: bool
+    others: tuple[float, float]
+    diverged: float | None = None
+
+    def at(self, row: int, slide: bool, decimals: int = 2) -> str:
+        """A position of the joint as text; a slower engine's run may be shorter."""
+        if row >= len(self.position):
+            return NONE
+        value = float(self.position[row])
+        return "diverged" if np.isnan(value) else position(value, slide, decimals)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,21 +123,37 @@ class Gravity:
     """The same run with the actuators on and off.
 
     Attributes:
-        joint: The joint that was watched; slide: whether it is one, and no hinge.
+        joint: The joint that was watched; slide: whether it is one, and no hinge. Of a free
+            body it is the height.
         servo: Whether a position servo drives it.
+        drives: What the model has: "servos", "actuators" without any servo, or "".
+        keyframe: Where both runs start; None for the default state.
         longer: The actuators off for longer, under the names "floor" (with contacts) and
-            "no floor" (nothing can touch anything).
+            "no floor" (nothing can touch anything); without a floor in the scene under
+            "contacts" and "no contacts".
         alone: The joint on the engine as it comes, where that differs from the contract.
     """
 
     joint: str
     slide: bool
     servo: bool
+    drives: str
+    keyframe: str | None
     servos_on: Droop
     servos_off: Droop
     longer: dict[str, Droop]
     alone: tuple[LeftAlone, ...]
     provenance: Provenance
+
+    def runs(self) -> dict[str, Droop]:
+        """Both runs by what is on; one where there is nothing to switch off."""
+        if not self.drives:
+            return {"nothing is driven": self.servos_off}
+        return {f"{self.drives} on": self.servos_on, f"{self.drives} off": self.servos_off}
+
+    def off(self) -> str:
+        """What is said of the longer runs."""
+        return f"{self.drives} off" if self.drives else "nothing is driven"
 
 
 class Falling:
@@ -132,7 +162,8 @@ class Falling:
     def __init__(self, data: Data, joint: str, seconds: float, progress: Progress) -> None:
         model = self._model = data.model
         self._data, self._progress = data, progress
-        self._place, self._dof = scalar_joint(model, joint)
+        at = coordinate(model, joint)
+        self._place, self._dof = at.place, at.dof
         self._bodies = carried_by(model, [int(model.jnt_bodyid[model.joint_id(joint)])])
         self._total = steps_in(model, seconds)
         marks = milestones(self._total * model.timestep)
@@ -158,6 +189,7 @@ class Falling:
         for touch in at_end:
             self._touches.setdefault(touch, data.time)
         return Droop(
+            others=self._others(),
             time=np.array(self._times),
             position=np.array(self._positions),
             path=np.array(self._path),
@@ -169,6 +201,37 @@ class Falling:
             touching=at_end,
             ctrl_is_zero=not data.ctrl.any(),
         )
+
+    def gave_up(self, time: float) -> Droop:
+        """The run until the engine diverged; the rows after that are NaN."""
+        marks = np.array(milestones(self._total * self._model.timestep))
+        where = np.full(len(marks), np.nan)
+        where[: len(self._positions)] = self._positions
+        none = float("nan")
+        return Droop(
+            time=marks,
+            position=where,
+            path=np.array(self._path),
+            qpos=np.full(self._model.nq, np.nan),
+            forces=Forces(None, None, None, None, None, None, None),
+            velocity=none,
+            acceleration=none,
+            touches=self._touches,
+            touching=(),
+            ctrl_is_zero=False,
+            others=(none, none),
+            diverged=time,
+        )
+
+    def _others(self) -> tuple[float, float]:
+        """The largest speed and acceleration of the other joints of this robot."""
+        model, data = self._model, self._data
+        root = min(self._bodies)
+        while model.body_parentid[root]:
+            root = int(model.body_parentid[root])
+        mine = [dof for dof in dofs_of(model, carried_by(model, [root])) if dof != self._dof]
+        speeds, pushes = np.abs(data.qvel[mine]), np.abs(data.qacc[mine])
+        return float(speeds.max(initial=0.0)), float(pushes.max(initial=0.0))
 
     def _look(self) -> None:
         row = len(self._path)
@@ -201,32 +264,36 @@ def longer(results: Mapping[str, Gravity]) -> list[Any]:
     if not columns:
         return []
     first = next(iter(results.values()))
-    times = next(iter(columns.values())).time
+    times = max((run.time for run in columns.values()), key=len)
+    what = f"with the {first.drives} off" if first.drives else "of the same"
+    caught = "What caught it? " if first.servos_off.touching else ""
+    several = (
+        f"{caught}Here are two longer runs {what}: one as before, and one with contacts switched "
+        "off."
+    )
     blocks: list[Any] = [
-        Text(
-            "What caught it? Here are two longer runs with the servos off: one as before, and "
-            "one with contacts switched off."
-        ),
+        Text(several if len(first.longer) > 1 else f"Here is a longer run {what}."),
         Table(
             ("time", *(name.replace(": ", "\n") for name in columns)),
             [
-                (
-                    f"{time:.2f} s",
-                    *(position(run.position[k], first.slide) for run in columns.values()),
-                )
+                (f"{time:.2f} s", *(run.at(k, first.slide) for run in columns.values()))
                 for k, time in enumerate(times)
             ],
-            title=f"{first.joint}, servos off, for longer",
+            title=f"{first.joint}, {first.off()}, for longer",
         ),
     ]
+    for name, run in columns.items():
+        if run.diverged is not None:
+            blocks.append(Text(f"{name}: diverged at {run.diverged:.3f} s."))
     for name, result in results.items():
         prefix = where(results, name)
-        floor, free = result.longer.get("floor"), result.longer.get("no floor")
-        if floor is not None and free is not None and result.servos_off.touching:
-            blocks.append(_caught(prefix, result, floor, free))
+        runs = list(result.longer.values())
+        ended = any(run.diverged is not None for run in runs)
+        if len(runs) > 1 and not ended and result.servos_off.touching:
+            blocks.append(_caught(prefix, result, *runs))
     blocks.append(
         Traces(
-            f"{first.joint} with the servos off",
+            f"{first.joint} with the {first.drives} off" if first.drives else first.joint,
             "time [s]",
             "m" if first.slide else "angle [°]",
             {
@@ -242,22 +309,28 @@ def longer(results: Mapping[str, Gravity]) -> list[Any]:
 
 
 def longer_apart(results: Mapping[str, Gravity]) -> list[tuple[str, Any]]:
-    """Rows of the differences: the ends of the longer runs."""
+    """Rows of the differences: the ends of the longer runs, as far as all of them go."""
     first = next(iter(results.values()))
+    rows = []
+    for label in first.longer:
+        runs = [each.longer[label] for each in results.values() if label in each.longer]
+        last = min(len(run.position) for run in runs) - 1
+        rows.append(
+            (f"{first.off()}, {label}, at {first.longer[label].time[last]:g} s", _gap(label, last))
+        )
+    return rows
 
-    def say(label: str) -> Any:
-        def gap(one: Gravity, two: Gravity) -> str:
-            if label not in one.longer or label not in two.longer:
-                return "–"
-            ends = [each.longer[label].position[-1] for each in (one, two)]
-            return apart(abs(float(ends[0] - ends[1])), one.slide)
 
-        return gap
+def _gap(label: str, row: int) -> Any:
+    def say(one: Gravity, two: Gravity) -> str:
+        if label not in one.longer or label not in two.longer:
+            return NONE
+        ends = [each.longer[label].position[row] for each in (one, two)]
+        if not np.isfinite(ends).all():
+            return "one diverged"
+        return apart(abs(float(ends[0] - ends[1])), one.slide)
 
-    return [
-        (f"servos off, {label}, at {run.time[-1]:g} s", say(label))
-        for label, run in first.longer.items()
-    ]
+    return say
 
 
 def _caught(prefix: str, result: Gravity, floor: Droop, free: Droop) -> Text | Verdict:

@@ -13,10 +13,11 @@ from ..comparison.text import count, millimetres, short_time
 from ..engines import part
 from ..interface import INPUTS, Array, Data, Model, forward, make_data, step
 from ..page import Block, Heading, Pipeline, Table, Text, Traces, Verdict
-from ..scenarios import TARGET
+from ..scenarios.commands import hold_ctrl
 from ..scenarios.provenance import Provenance, provenance
 from ..scenarios.runs import Progress
 from ._bytes import read_derived, read_stored
+from ._robot import Tip, is_of_the_arm, the_tip
 from ._words import sentence, where
 
 _STORED = (*INPUTS, "time")
@@ -58,12 +59,13 @@ class Stages:
         same: Derived arrays that the step computed with the bits of the forward.
         time: (n,) of the state that each step started from [s]; n is 0 if it was not asked
             how far behind a step leaves what is derived.
-        lag: (n,) distance [m] between the fingertip that a step leaves in `site_xpos`
-            and the one that `forward` computes right after it.
+        lag: (n,) distance [m] between the fingertip that a step leaves in `site_xpos`, or the
+            body in `xpos`, and the one that `forward` computes right after it.
         of_before: For each derived array, after how many of the n steps it was bit
             for bit what `forward` had computed before the step.
         of_after: And after how many it was what `forward` computes after it.
-        site: The fingertip.
+        site: Name of the fingertip: a site, or a body where there are none.
+        neither: Whether the model's integrator leaves what is derived from a stage of its own.
     """
 
     changes: tuple[Changes, ...]
@@ -73,6 +75,7 @@ class Stages:
     of_before: dict[str, int]
     of_after: dict[str, int]
     site: str
+    neither: bool
     provenance: Provenance
 
 
@@ -93,7 +96,7 @@ def look_at(data: Data) -> Look:
 
 def find_stages(
     model: Model,
-    site: str,
+    tip: Tip,
     place: int,
     value: float,
     forwarded: Sequence[Look],
@@ -104,7 +107,7 @@ def find_stages(
 
     Args:
         model: Of the lesson.
-        site: The fingertip.
+        tip: What is read.
         place: What was written in qpos; value: what was written there [rad or m].
         value: See place.
         forwarded: Looks at a Data: before the write, after it, and after a forward. None at
@@ -124,26 +127,26 @@ def find_stages(
     of_before: dict[str, int] = {}
     of_after: dict[str, int] = {}
     if steps:
-        tip = model.site_id(site)
         with make_data(model) as data:
-            if model.nu == len(TARGET):
-                data.ctrl = TARGET
+            if model.nu:
+                data.ctrl = hold_ctrl(model)
             forward(model, data)
             fresh = read_derived(data)
             of_before, of_after = dict.fromkeys(fresh, 0), dict.fromkeys(fresh, 0)
             for k in range(steps):
                 times.append(data.time)
                 step(model, data)
-                left, at = read_derived(data), np.array(data.site_xpos[tip])
+                left, at = read_derived(data), tip.read(data)
                 forward(model, data)
                 now = read_derived(data)
-                lags.append(float(np.linalg.norm(data.site_xpos[tip] - at)))
+                lags.append(float(np.linalg.norm(tip.read(data) - at)))
                 for name in fresh:
                     of_before[name] += left[name] == fresh[name]
                     of_after[name] += left[name] == now[name]
                 fresh = now
                 if k % 50 == 0:
                     progress(k / steps)
+    stale = model.capabilities.behaviours["stale after a step"]
     return Stages(
         changes=changes,
         same=same,
@@ -151,7 +154,8 @@ def find_stages(
         lag=np.array(lags),
         of_before=of_before,
         of_after=of_after,
-        site=site,
+        site=tip.name,
+        neither=stale.support == "unsupported",
         provenance=provenance(model),
     )
 
@@ -251,9 +255,10 @@ def lag_section(
     blocks: list[Block] = [
         Heading("After a step, of which moment is what you read?"),
         Text(
-            "step computes first and moves afterwards. A command moves the arm for "
-            f"{count(steps, 'step')}; after each, what the step left is compared with what "
-            "forward says before and after it, bit by bit."
+            "step computes first and moves afterwards. A command moves the "
+            f"{'arm' if is_of_the_arm(results) else 'robot'} for {count(steps, 'step')}; after "
+            "each, what the step left is compared with what forward says before and after it, bit "
+            "by bit."
         ),
         Table(
             (
@@ -285,12 +290,20 @@ def lag_section(
             blocks.append(sentence(results, name, f"{stages.site} did not move in this run."))
             continue
         # Contacts of step and forward may be found with another memory of what touched before.
-        left = ["site_xpos"] + ["contacts"] * (stages.of_before["contacts"] == steps)
+        moved = "site_xpos" if stages.of_after["site_xpos"] < steps else "xpos"
+        left = [moved] + ["contacts"] * (stages.of_before["contacts"] == steps)
+        if stages.of_after["contacts"] == steps:  # there were none
+            left = [moved]
+        if stages.neither:
+            text = f"after a step {moved} is neither of the state before it nor of the one after: "
+            text += "an integrator of several stages, as this RK4, leaves those of its last one."
+            blocks.append(sentence(results, name, text))
+            continue
         blocks.append(
             Verdict(
                 f"{where(results, name)}after each step {' and '.join(left)} "
-                f"{'are' if len(left) > 1 else 'is'} of the state before it: the fingertip is "
-                f"{millimetres(lag)} behind at worst (in the step from "
+                f"{'are' if len(left) > 1 else 'is'} of the state before it: "
+                f"{the_tip(stages.site)} is {millimetres(lag)} behind at worst (in the step from "
                 f"{short_time(stages.time[row])}). Drawings in which step delivers the next "
                 "state's xpos and contacts are wrong: call forward before you read",
                 all(stages.of_before[each] == steps > stages.of_after[each] for each in left),

@@ -21,7 +21,7 @@ def ways_back(model: Model, ctrl: Array, steps: int = 100) -> tuple[WayBack, ...
     """
 
     def start(data: Data) -> None:
-        reset(model, data, keyframe=0)
+        reset(model, data, keyframe=0 if model.keyframes else None)
         data.ctrl = ctrl
 
     def future(data: Data, count: int) -> Array:

@@ -12,13 +12,21 @@ from ..page import Code, Page, Printed, Question, Table, Text
 from ..scenarios.runs import steps_in
 from .records import Session
 
-WORDS = (
+_WORDS = (
     "A few words first. A model file says what a robot is made of. A body is a rigid piece of "
     "it; a joint connects two bodies (a hinge turns, a slide shifts; a free body has a free "
-    "joint, and nothing holds it). A geom is a body's shape, which can touch others. A servo, the "
-    "actuator of this arm, pushes a joint towards the number in ctrl. A site is a named place on a "
-    "body, like the fingertip gripperframe. A keyframe is a state that the model file names."
+    "joint, and nothing holds it). A geom is a body's shape, which can touch others. {drive} A "
+    "site is a named place on a body{tip}. A keyframe is a state that the model file names."
 )
+
+
+def words(arm: bool) -> str:
+    """What the words of the lessons mean; of the arm with its own names."""
+    if arm:
+        servo = "A servo, the actuator of this arm, pushes a joint towards the number in ctrl."
+        return _WORDS.format(drive=servo, tip=", like the fingertip gripperframe")
+    servo = "An actuator drives a joint: a servo pushes it towards the number in ctrl, and to a "
+    return _WORDS.format(drive=f"{servo}motor that number is a force.", tip="")
 
 
 def origin(results: Mapping[str, Any]) -> str:

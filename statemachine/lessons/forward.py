@@ -14,8 +14,8 @@ from ..interface import Array, Data, Model
 from ..interface.checks import as_scalar
 from ..page import Page, Question, Table, Text, Verdict
 from ..scenarios.provenance import Provenance, provenance
-from ..scenarios.robot import scalar_joint
 from ..scenarios.runs import Progress, steps_in
+from ._robot import Tip, a_tip, coordinate, the_tip, tip_of, usual_tip, with_joint
 from ._stages import (
     Look,
     OwnAnswer,
@@ -40,25 +40,34 @@ _CHOICES: dict[tuple[tuple[int, int], ...], int] = {
 }
 
 
+def fit(model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
+    """A joint of this robot, a value in its range, and what the joint carries."""
+    values = with_joint(model, options)
+    if values["site"] is None:
+        values["site"] = usual_tip(model, values["joint"])
+    return values
+
+
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """The four readings."""
-    scalar_joint(model, options["joint"])  # says what is wrong with it
-    model.site_id(options["site"])
+    slot = coordinate(model, options["joint"]).slot  # or says what is wrong with it
+    tip = tip_of(model, options["site"])
+    read = f"data.{tip.array}[tip]"
     value = as_scalar(options["value"], "value")
     return f"""\
 import statemachine as sm
 
 model = {load}
-tip = model.site_id({options["site"]!r})
-slot = model.jnt_qposadr[model.joint_id({options["joint"]!r})]
+tip = {tip.found}
+slot = {slot}
 data = sm.make_data(model)
-print(1, data.site_xpos[tip].round(4))
+print(1, {read}.round(4))
 sm.forward(model, data)
-print(2, data.site_xpos[tip].round(4))
+print(2, {read}.round(4))
 data.qpos[slot] = {value}
-print(3, data.site_xpos[tip].round(4))
+print(3, {read}.round(4))
 sm.forward(model, data)
-print(4, data.site_xpos[tip].round(4))
+print(4, {read}.round(4))
 """
 
 
@@ -100,9 +109,9 @@ class Forward:
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Forward:
     """Read the fingertip at each print; then what else was asked for."""
     model, joint, value = play.model, options["joint"], options["value"]
-    place, _ = scalar_joint(model, joint)
+    place, tip = coordinate(model, joint).place, tip_of(model, options["site"])
     arrays, steps = options["arrays"], _steps(model, options)
-    watch = _Readings(model.site_id(options["site"]), arrays)
+    watch = _Readings(tip, arrays)
     names = play(watch)
     labels = ("make_data", "forward", f"qpos[{place}] = {value:g}", "forward again")
     tips = [fingertip for fingertip, _ in watch.read]
@@ -124,7 +133,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Forwar
         contacts=len(found),
         deepest=max(0.0, -float(found.dist.min(initial=0.0))),
         itself=itself,
-        stages=find_stages(model, options["site"], place, value, watch.looks[1:], steps, progress),
+        stages=find_stages(model, tip, place, value, watch.looks[1:], steps, progress),
         provenance=provenance(model),
     )
 
@@ -140,7 +149,7 @@ def _steps(model: Model, options: Mapping[str, Any]) -> int:
 class _Readings(CodeWatch):
     """The fingertip and the time at each print, and, if wanted, every array."""
 
-    def __init__(self, tip: int, arrays: bool) -> None:
+    def __init__(self, tip: Tip, arrays: bool) -> None:
         self._tip, self._arrays = tip, arrays
         self.read: list[tuple[Array, float]] = []
         self.looks: list[Look] = []
@@ -149,7 +158,7 @@ class _Readings(CodeWatch):
         if not source.startswith("print("):
             return
         data: Data = names["data"]
-        self.read.append((np.array(data.site_xpos[self._tip]), data.time))
+        self.read.append((self._tip.read(data), data.time))
         if self._arrays:
             self.looks.append(look_at(data))
 
@@ -158,9 +167,11 @@ def page(results: Mapping[str, Forward], session: Session) -> Page:
     """The readings, which are equal, and what that means; then what was asked for."""
     first = next(iter(results.values()))
     stages = {name: result.stages for name, result in results.items()}
+    tip = first.stages.site
+    sites = "its sites are" if the_tip(tip) == tip else "the fingertip is"
     arrays, lag = len(first.stages.changes) > 0, len(first.stages.lag) > 0
     blocks: list[Any] = [
-        Text("The arm was just made. Where is its fingertip, and when is that computed?"),
+        Text(_opening(tip)),
         *typed(
             session,
             Question(
@@ -172,7 +183,7 @@ def page(results: Mapping[str, Forward], session: Session) -> Page:
         ),
         Text(
             "qpos, qvel, ctrl and time are stored. Everything else is derived from them: where "
-            "the fingertip is (site_xpos), where the bodies are (xpos), what touches what, which "
+            f"{sites} (site_xpos), where the bodies are (xpos), what touches what, which "
             "forces act (qfrc_…). It is computed only when you call forward or step. A write to "
             "qpos marks nothing as out of date: derived arrays keep their old numbers. forward "
             "recomputes them all, and no time passes. step recomputes them too, and then "
@@ -184,7 +195,7 @@ def page(results: Mapping[str, Forward], session: Session) -> Page:
         blocks += _findings(results, name, result)
     promises = ["zeros when fresh", "stale after a write"]
     blocks += emulation(results, *promises, *["stale after a step"] * lag)
-    rows = [(f"fingertip, reading {i + 1}", _apart(i)) for i in range(len(first.readings))]
+    rows = [(f"{a_tip(tip)}, reading {i + 1}", _apart(i)) for i in range(len(first.readings))]
     blocks += differences(results, rows)
     if arrays:
         blocks += arrays_section(stages, _own(results, "write"))
@@ -196,9 +207,15 @@ def page(results: Mapping[str, Forward], session: Session) -> Page:
         )
     if not lag:
         blocks.append(
-            Text("How far behind a step leaves the fingertip: statemachine lesson forward --lag")
+            Text(f"How far behind a step leaves {the_tip(tip)}: statemachine lesson forward --lag")
         )
     return page_of("Stored, derived, integrated", results, blocks)
+
+
+def _opening(site: str) -> str:
+    if the_tip(site) == site:
+        return f"The robot was just made. Where is its {site}, and when is that computed?"
+    return "The arm was just made. Where is its fingertip, and when is that computed?"
 
 
 def _readings(results: Mapping[str, Forward]) -> list[Table | Text]:
@@ -213,8 +230,8 @@ def _readings(results: Mapping[str, Forward]) -> list[Table | Text]:
             )
         )
     twins = {index for result in results.values() for pair in result.equal for index in pair}
-    several = len(results) > 1
-    headers = [f"{name} [m]" for name in results] if several else ["fingertip [m]"]
+    several, said = len(results) > 1, a_tip(first.stages.site)
+    headers = [f"{name} [m]" for name in results] if several else [f"{said} [m]"]
     digits = 3 if several else 4  # so that two columns fit
     blocks.append(
         Table(
@@ -228,7 +245,7 @@ def _readings(results: Mapping[str, Forward]) -> list[Table | Text]:
                 )
                 for i, reading in enumerate(first.readings)
             ],
-            title="The fingertip, read four times",
+            title=f"{'The fingertip' if said == 'fingertip' else said}, read four times",
             words=frozenset({0, 1}),
             emphasis=frozenset(twins),
         )
@@ -245,7 +262,9 @@ def _findings(results: Mapping[str, Forward], name: str, result: Forward) -> lis
             (1, 2) in result.equal,
         )
     ]
-    text = f"the second forward moved the fingertip by {millimetres(result.moved, 1)}"
+    text = (
+        f"the second forward moved {the_tip(result.stages.site)} by {millimetres(result.moved, 1)}"
+    )
     if not result.moved:
         text += f": {result.joint} was there already, or does not carry it"
     blocks.append(sentence(results, name, f"{text}."))

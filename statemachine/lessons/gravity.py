@@ -9,56 +9,85 @@ from typing import Any
 import numpy as np
 
 from ..comparison import largest
-from ..comparison.text import apart, position, short_time, signed
+from ..comparison.text import apart, short_time, signed
 from ..engines import part
 from ..engines.parts import AsItComes
-from ..errors import UnsupportedError
-from ..interface import Data, Model, make_data, step
-from ..page import Page, Question, Table, Text, Verdict
-from ..scenarios import SCENARIOS
+from ..errors import BadInputError, DivergedError, UnsupportedError
+from ..interface import Data, JointType, Model, make_data, reset, step
+from ..page import Page, Question, Table, Text
+from ..scenarios import SCENARIOS, drives
+from ..scenarios.commands import home, is_servo, load_at_start
 from ..scenarios.provenance import provenance
-from ..scenarios.robot import is_slide, scalar_joint
-from ..scenarios.runs import Progress, part_of, steps_in
+from ..scenarios.robot import ARM, has_floor, is_the_arm
+from ..scenarios.runs import Progress, cost_of_a_second, part_of, steps_in
+from ._balance import engine_alone, force, parts_of, unit_of, who_holds
 from ._fall import Droop, Falling, Gravity, longer, longer_apart, milestones
+from ._robot import USUAL, coordinate, start_line, with_joint
 from ._words import differences, emulation, page_of, spans, typed, where
 from .records import Session
 from .session import CodeRun, CodeWatch
 
-_PARTS = (
-    ("gravity (−bias)", "bias"),
-    ("servo", "actuator"),
-    ("damping", "passive"),
-    ("dry friction", "friction"),
-    ("contact", "contact"),
-    ("joint limit", "limit"),
-    ("equality", "equality"),
-)
 _OURS = ("position servo", "joint damping", "dry friction", "joint limits", "forces by part")
 _BALANCE = 1e-3  # N·m or N; a sum below it is zero
-_SLOW = 0.01  # rad/s or m/s; a joint below it is at rest or creeps
-_STARTS = 0.02  # rad/s² or m/s²; a joint beyond it is about to move
+_FALLEN = 30  # degrees
+# The first that is paid is taken; each is a row of the longer ones.
+_SECONDS, _LONGER = (4.0, 2.0, 1.0), (100.0, 50.0, 20.0, 10.0, 4.0)
+_PATIENCE = 15.0  # s by the clock
+
+
+def fit(model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
+    """The joint, and times that a model with slow steps can be run for."""
+    if not model.nv:
+        raise BadInputError(f"{model.path.name} has no joints: nothing in it can fall")
+    values = with_joint(model, options)
+    dof = coordinate(model, values["joint"]).dof
+    usual = options["joint"] is not None or values["joint"] == USUAL
+    values["chosen"] = not usual and bool(load_at_start(model)[dof] > _BALANCE)
+    slow = 0.0 if is_the_arm(model) else cost_of_a_second(model)
+    for name, usual, share in (("seconds", _SECONDS, 2), ("longer", _LONGER, 2)):
+        if values[name] is None:
+            affordable = [t for t in usual if share * t * slow <= _PATIENCE]
+            values[name] = affordable[0] if affordable else usual[-1]
+    return values
 
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """The same seconds with the servos on and off; ctrl is never written."""
-    scalar_joint(model, options["joint"])  # says what is wrong with it
+    at = coordinate(model, options["joint"])  # or says what is wrong with it
     steps_in(model, options["seconds"])  # and this
-    off = ", ".join(f"{name}={value}" for name, value in SCENARIOS["gravity"].options.items())
     loop, nstep = spans(model, milestones(options["seconds"]), options["seconds"])
-    at, numpy = "np.degrees(data.qpos[slot]).round(3)", "import numpy as np\n"
-    if is_slide(model, options["joint"]):  # metres
-        at, numpy = "data.qpos[slot].round(4)", ""
+    shown, numpy = "np.degrees(data.qpos[slot]).round(3)", "import numpy as np\n"
+    if at.slide:
+        shown, numpy = "(1000 * data.qpos[slot]).round(2)", ""  # millimetres
+    slot = at.slot
+    if options["chosen"] and "#" not in slot:
+        slot += "  # the largest load at the start"
+    if not model.nu:
+        start = start_line(model, "model")
+        return f"""\
+{numpy}import statemachine as sm
+
+model = {load}
+slot = {slot}
+data = sm.make_data(model)
+{start}{loop}
+    sm.step(model, data, {nstep})
+    print({shown}, end="  ")
+print()
+"""
+    off = ", ".join(f"{name}={value}" for name, value in SCENARIOS["gravity"].options.items())
+    start = start_line(model, "variant")
     return f"""\
 {numpy}import statemachine as sm
 
 model = {load}
-limp = model.replace({off})  # another Model: servos off
-slot = model.jnt_qposadr[model.joint_id({options["joint"]!r})]
+limp = model.replace({off})  # another Model: {drives(model)} off
+slot = {slot}
 for variant in (model, limp):
     data = sm.make_data(variant)
-    {loop}
+    {start + "    " if start else ""}{loop}
         sm.step(variant, data, {nstep})
-        print({at}, end="  ")
+        print({shown}, end="  ")
     print()
 """
 
@@ -66,30 +95,37 @@ for variant in (model, limp):
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Gravity:
     """Watch both runs; then the servos off for longer, with and without anything to touch."""
     model, joint, seconds = play.model, options["joint"], options["seconds"]
+    at, arm = coordinate(model, joint), is_the_arm(model)
     limp = model.replace(**SCENARIOS["gravity"].options)
     runs = {}
     if options["longer"]:
         steps_in(model, options["longer"])  # says what is wrong with it
-        runs["floor"] = limp
+        touch = "floor" if has_floor(model) else "contacts"
+        runs[touch] = limp
         with suppress(UnsupportedError):
-            runs["no floor"] = model.replace(**SCENARIOS["fall"].options)
+            runs[f"no {touch}"] = model.replace(**SCENARIOS["fall"].options)
     total = 2 * seconds + len(runs) * options["longer"]
     both = _Both(joint, seconds, part_of(progress, 0.0, 2 * seconds / total))
     play(both)
-    on, off = (both.falls[data].end() for _, data in play.worlds)
+    ends = [both.falls[data].end() for _, data in play.worlds]
     fallen = {}
     for number, (name, each) in enumerate(runs.items()):
         start = 2 * seconds + number * options["longer"]
         share = part_of(progress, start / total, options["longer"] / total)
         fallen[name] = _left_alone(each, joint, options["longer"], share)
     which = model.joint_id(joint)
+    driven = model.actuator_jntid == which
     own: AsItComes | None = part(model.backend, "as_it_comes")
+    if int(model.jnt_type[which]) == int(JointType.FREE):
+        own = None  # no motor of the engine's own is on it
     return Gravity(
         joint=joint,
-        slide=is_slide(model, joint),
-        servo=bool(np.isfinite(model.actuator_kp[model.actuator_jntid == which]).any()),
-        servos_on=on,
-        servos_off=off,
+        slide=at.slide,
+        servo=bool(is_servo(model)[driven].any()),
+        drives=drives(model) if model.nu else "",
+        keyframe=None if arm else home(model),
+        servos_on=ends[0],
+        servos_off=ends[-1],
         longer=fallen,
         alone=own.left_alone(model, seconds, which) if own else (),
         provenance=provenance(model),
@@ -114,28 +150,33 @@ class _Both(CodeWatch):
 
 def _left_alone(model: Model, joint: str, seconds: float, progress: Progress) -> Droop:
     with make_data(model) as data:
+        if not is_the_arm(model):
+            reset(model, data, home(model))
         fall = Falling(data, joint, seconds, progress)
-        for _ in range(steps_in(model, seconds)):
-            step(model, data)
-            fall.note(contacts=False)
-        return fall.end()
+        try:
+            for _ in range(steps_in(model, seconds)):
+                step(model, data)
+                fall.note(contacts=False)
+            return fall.end()
+        except DivergedError as error:
+            return fall.gave_up(error.time)
 
 
 def page(results: Mapping[str, Gravity], session: Session) -> Page:
     """The table of the course, and the balance of forces at its end."""
     first = next(iter(results.values()))
     columns = {
-        f"{where(results, name)}servos {state}": droop
+        f"{where(results, name)}{state}": droop
         for name, result in results.items()
-        for state, droop in (("on", result.servos_on), ("off", result.servos_off))
+        for state, droop in result.runs().items()
     }
     headers = [name.replace(": ", "\n") for name in columns]
     digits = {name: 3 if name.endswith("on") else 2 for name in columns}
     end = float(first.servos_on.time[-1])
     parts = [
         (label, part)
-        for label, part in _PARTS
-        if part != "equality" or any(_part(run, part) for run in columns.values())
+        for label, part in parts_of(first)
+        if part != "equality" or any(force(run, part) for run in columns.values())
     ]
     blocks: list[Any] = [
         Text(_introduction(first)),
@@ -145,12 +186,9 @@ def page(results: Mapping[str, Gravity], session: Session) -> Page:
             [
                 (
                     f"{time:.2f} s",
-                    *(
-                        position(run.position[k], first.slide, digits[name])
-                        for name, run in columns.items()
-                    ),
+                    *(run.at(k, first.slide, digits[name]) for name, run in columns.items()),
                 )
-                for k, time in enumerate(first.servos_on.time)
+                for k, time in enumerate(max((run.time for run in columns.values()), key=len))
             ],
             title=f"{first.joint} under gravity",
         ),
@@ -158,32 +196,33 @@ def page(results: Mapping[str, Gravity], session: Session) -> Page:
             ("who", *headers),
             [
                 *(
-                    (label, *(signed(_part(run, part)) for run in columns.values()))
+                    (label, *(signed(force(run, part)) for run in columns.values()))
                     for label, part in parts
                 ),
                 ("sum", *(signed(run.forces.total) for run in columns.values())),
             ],
-            title=f"Who holds {first.joint}, at {end:g} s [{_unit(first)}]",
+            title=f"Who holds {first.joint}, at {end:g} s [{unit_of(first)}]",
             emphasis=frozenset({len(parts)}),
         ),
     ]
     blocks += emulation(results, *_OURS)
     for name, run in columns.items():
-        blocks.append(_finding(name, run, first))
+        blocks.append(who_holds(name, run, first))
         if run.touching:
             touches = (f"{touch} since {run.touches[touch]:.3f} s" for touch in run.touching)
             blocks.append(Text(f"{name}: touching at the end: {', '.join(touches)}."))
     blocks += longer(results)
     for name, result in results.items():
         if result.alone:
-            blocks += _alone(name, result)
+            blocks += engine_alone(name, result)
     blocks += differences(
         results,
         [
-            ("servos on, worst", lambda a, b: _worst(a, b, "servos_on")),
-            ("servos off, until one touches", lambda a, b: _worst(a, b, "servos_off", False)),
+            *[(f"{first.drives} on, worst", lambda a, b: _worst(a, b, "servos_on"))]
+            * bool(first.drives),
+            (f"{first.off()}, until one touches", lambda a, b: _worst(a, b, "servos_off", False)),
             (
-                f"servos off, after that, up to {end:g} s",
+                f"{first.off()}, after that, up to {end:g} s",
                 lambda a, b: _worst(a, b, "servos_off", True),
             ),
             *longer_apart(results),
@@ -193,9 +232,11 @@ def page(results: Mapping[str, Gravity], session: Session) -> Page:
 
 
 def _question(first: Gravity) -> Question | None:
-    if first.slide or not first.servo:
+    if first.slide or not first.servo or first.keyframe is not None:
         return None
-    droop = abs(float(first.servos_on.position[-1]))
+    droop, began = abs(float(first.servos_on.position[-1])), float(first.servos_on.position[0])
+    if began or (np.radians(1) <= droop < np.radians(_FALLEN) and first.joint not in ARM):
+        return None
     return Question(
         f"nobody writes ctrl. Where is {first.joint} after {first.servos_on.time[-1]:g} s "
         "with the servos on?",
@@ -210,7 +251,8 @@ def _worst(one: Gravity, two: Gravity, which: str, touching: bool | None = None)
     """The largest distance between two runs, before or after the first touch of either."""
     runs = [getattr(result, which) for result in (one, two)]
     timestep = one.provenance.timestep
-    gap = np.abs(runs[0].path - runs[1].path)
+    common = min(len(run.path) for run in runs)
+    gap = np.abs(runs[0].path[:common] - runs[1].path[:common])
     touches = [time for run in runs for time in run.touches.values()]
     first = round(min(touches) / timestep) if touches else len(gap)
     if touching is False:
@@ -224,98 +266,30 @@ def _worst(one: Gravity, two: Gravity, which: str, touching: bool | None = None)
     return found if found.startswith("below") else f"{found} at {short_time(row * timestep)}"
 
 
-def _alone(name: str, result: Gravity) -> list[Table | Text]:
-    """The engine without our adapter: what its own defaults do to the joint."""
-    unit = _unit(result)
-    rows = [
-        (
-            each.label,
-            position(each.position, result.slide),
-            f"{signed(each.motor)} {unit}",
-        )
-        for each in result.alone
-    ]
-    time = result.alone[0].time
-    blocks: list[Table | Text] = [
-        Table(
-            (f"{name} itself", result.joint, "its own motor"),
-            rows,
-            title=f"The same model as {name}'s own users load it, left alone, at {time:.3g} s",
-        )
-    ]
-    _, held, limp, undamped = result.alone
-    if held.motor and abs(held.position) < min(abs(limp.position), abs(undamped.position)) / 10:
-        blocks.append(
-            Text(
-                f"At {name}'s own 1/240 s a step. A fresh world of {name} has a gravity of "
-                f"{held.gravity:g} m/s²; and with the model's set, the arm still does not fall, "
-                "not because of its servos: the joints come with motors of the engine's own, which "
-                f"keep them all within {position(held.widest, result.slide)}; that of "
-                f"{result.joint} exerts {abs(held.motor):.4f} {unit}. With the motors off and no "
-                f"joint damping in the URDF it is at {position(undamped.position, result.slide)} "
-                f"then, instead of {position(held.position, result.slide)}."
-            )
-        )
-    if limp.explicit > 2 and limp.turns > limp.steps / 4:
-        blocks.append(
-            Text(
-                f"With the motors off and the damping in, it flails: its velocity changes its sign "
-                f"in {limp.turns} of {limp.steps} steps. {name} takes the damping torque of the "
-                "velocity before the step; that changes the velocity by timestep × damping ÷ "
-                f"inertia, here up to {limp.explicit:.0f} times itself, and from 2 on the joint "
-                "turns round faster than it was."
-            )
-        )
-    return blocks
-
-
 def _introduction(first: Gravity) -> str:
-    runs = (first.servos_on, first.servos_off)
+    runs = tuple(first.runs().values())
+    if not first.drives:
+        return f"Nothing drives this robot. {_watched(first)}".rstrip()
     text = "Nobody writes ctrl in either run"
-    if all(run.ctrl_is_zero for run in runs):
+    if first.keyframe is not None:
+        text += f"; it is what the keyframe {first.keyframe!r} says, where both runs start"
+    elif all(run.ctrl_is_zero for run in runs):
         text += "; it is zero, at the end too"
     if first.servo:
-        return text + (
-            ". To a position servo zero is a target like any other: no value of ctrl means "
+        zero = "zero is a target like any other" if first.keyframe is None else "it is a target"
+        text += (
+            f". To a position servo {zero}: no value of ctrl means "
             '"no command". The second run has the servos switched off.'
         )
-    return f"{text}. No position servo drives {first.joint}."
+    else:
+        text += f". No position servo drives {first.joint}."
+        if np.array_equal(first.servos_on.path, first.servos_off.path):
+            text += " To what drives this robot zero is no force: both runs are the same."
+    return f"{text} {_watched(first)}".rstrip()
 
 
-def _unit(result: Gravity) -> str:
-    return "N" if result.slide else "N·m"
-
-
-def _part(run: Droop, part: str) -> float | None:
-    value = getattr(run.forces, part)
-    return -value if part == "bias" and value is not None else value
-
-
-def _finding(name: str, run: Droop, first: Gravity) -> Text | Verdict:
-    """Who carries the load, if the joint is at rest and its forces balance."""
-    total, load = run.forces.total, _part(run, "bias")
-    if abs(run.velocity) > _SLOW or abs(run.acceleration) > _STARTS:
-        speed = position(run.velocity, first.slide)
-        return Text(f"{name}: {first.joint} still moves, at {speed}/s; no balance is drawn.")
-    if total is None or load is None:
-        return Text(f"{name}: this engine does not tell all the parts, so no sum is drawn.")
-    if abs(total) > _BALANCE:
-        return Verdict(f"{name}: the joint stands, yet its forces do not sum to zero", False)
-    if abs(load) < _BALANCE:
-        return Verdict(f"{name}: no load, so nothing has to hold {first.joint}", True)
-    against = {
-        label: abs(value)
-        for label, part in _PARTS[1:]
-        if (value := _part(run, part)) is not None and value * load < 0
-    }
-    label = max(against, key=lambda each: against[each])
-    unit = _unit(first)
-    text = (
-        f"{name}: {first.joint} is held by the {label}, with {against[label]:.4f} {unit} against "
-        f"gravity's {abs(load):.4f} {unit}, and all forces sum to zero"
-    )
-    if label == "contact":
-        rest = -sum(_part(run, part) or 0.0 for part in ("passive", "friction")) * np.sign(load)
-        how = "hold" if rest >= 0 else "pull the other way, with gravity, by"
-        text += f". Damping and dry friction together {how} {abs(rest):.4f} {unit}"
-    return Verdict(text, True)
+def _watched(first: Gravity) -> str:
+    """Which joint it is about, where that is not the arm's."""
+    if first.joint in ARM:
+        return ""
+    return f"Watched is {first.joint}; --joint takes another."

@@ -18,7 +18,8 @@ from ..interface.checks import as_count
 from ..page import Page, Question, Table, Text, Verdict
 from ..scenarios.provenance import Provenance, provenance
 from ..scenarios.runs import Progress, part_of
-from ._words import WORDS, differences, page_of, sentence, typed, where
+from ._robot import is_of_the_arm
+from ._words import differences, page_of, sentence, typed, where, words
 from .records import Session
 from .session import CodeRun
 
@@ -173,7 +174,7 @@ def page(results: Mapping[str, Objects], session: Session) -> Page:
     first = next(iter(results.values()))
     stepped = first.provenance.timestep * 100
     blocks: list[Any] = [
-        Text(WORDS),
+        Text(words(is_of_the_arm(results))),
         Text(
             "Below, a robot's file is loaded once, into a Model. Two Data are made of it, and one "
             "of them is advanced by 100 steps. What Model and Data are is said after that."

@@ -12,6 +12,7 @@ from ..page import Page, Question, Text, Verdict
 from ..scenarios.provenance import Provenance, provenance
 from ..scenarios.runs import Progress, part_of
 from . import LESSONS, forward, gravity, objects, replay, state, time
+from ._robot import is_of_the_arm
 from ._words import page_of, where
 from .records import Session
 from .session import CodeRun, take
@@ -63,7 +64,14 @@ def page(results: Mapping[str, Answers], session: Session) -> Page:
     blocks: list[Any] = [
         Text("Think first, then read: under each question stands what the run says about it.")
     ]
-    for number, ask in enumerate((_stale, _slots, _truth, _held, _two, _fast), start=1):
+    asks = (_stale, _slots, _truth, _held, _two, _fast)
+    first = next(iter(results.values()))
+    arm = is_of_the_arm(results)  # of which all are asked
+    fitting = [ask for ask in asks if arm or _fits(ask, first)]
+    if len(fitting) < len(asks):
+        left = len(asks) - len(fitting)
+        blocks.append(Text(f"{count(left, 'question')} of {len(asks)} would not fit this model."))
+    for number, ask in enumerate(fitting, start=1):
         found = {name: ask(result) for name, result in results.items()}
         asked, _, holds = next(iter(found.values()))
         right = asked.right if holds else None
@@ -75,6 +83,30 @@ def page(results: Mapping[str, Answers], session: Session) -> Page:
             for name, (_, text, true) in found.items()
         ]
     return page_of("Check yourself", results, blocks)
+
+
+def _fits(ask: Any, answers: Answers) -> bool:
+    """Whether the model of a result has what a question is about."""
+    if ask is _stale:
+        return answers.forward.moved > 0
+    if ask is _slots:
+        return any(
+            (j.qpos_start, j.qpos_stop) != (j.qvel_start, j.qvel_stop) for j in answers.state.joints
+        )
+    found = answers.gravity
+    if ask is _truth:
+        return answers.replay.finer is None or answers.replay.finer.difference > 0
+    if ask is _held:
+        return not found.slide and found.keyframe is None and _is_held(found)
+    return True
+
+
+def _is_held(found: gravity.Gravity) -> bool:
+    """Whether a position servo holds the joint against gravity, without which it falls."""
+    on, off = found.servos_on, found.servos_off
+    servo, load = on.forces.actuator or 0.0, on.forces.bias or 0.0
+    held = abs(servo - load) < 1e-3 < abs(load)
+    return held and abs(off.position[-1]) > abs(on.position[-1])
 
 
 def _stale(answers: Answers) -> _Answered:
@@ -179,8 +211,7 @@ def _held(answers: Answers) -> _Answered:
             ". (The engine without this interface behaves differently: see statemachine lesson "
             "gravity)"
         )
-    held = abs(servo - load) < 1e-3 < abs(load)
-    return asked, text, held and abs(off.position[-1]) > abs(on.position[-1])
+    return asked, text, _is_held(found)
 
 
 def _two(answers: Answers) -> _Answered:

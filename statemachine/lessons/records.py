@@ -56,7 +56,11 @@ class Session:
 
 
 class Module(Protocol):
-    """What a lesson's module offers, in the order in which one reads it."""
+    """What a lesson's module offers, in the order in which one reads it.
+
+    One whose options depend on the robot also has `fit(model, options)`, which gives them back
+    with nothing left open; `code` and `run` are called with these.
+    """
 
     def code(self, model: Any, options: Mapping[str, Any], load: str) -> str:
         """What is typed: the code for this Model; `load` is the call that loads it.

@@ -12,14 +12,15 @@ from ..comparison import largest
 from ..comparison.text import count, degrees, millimetres, vector
 from ..engines import part
 from ..engines.parts import AsItComes, WayBack
-from ..errors import BadInputError, UnsupportedError, unknown_name
+from ..errors import UnsupportedError, unknown_name
 from ..interface import Array, Ints, JointType, Model, get_state
 from ..interface.checks import as_count
 from ..page import Page, Question, Table, Text, Verdict
 from ..scenarios.provenance import Provenance, provenance
-from ..scenarios.robot import command
+from ..scenarios.robot import command, is_the_arm
 from ..scenarios.runs import Progress, part_of
 from ._broken import BREAKS, BROKEN, Broken, Paths, course, growth, in_short, traces
+from ._robot import is_of_the_arm
 from ._ways import of_its_own, through_us, ways_back
 from ._words import differences, page_of, sentence, typed, where
 from .records import Session
@@ -34,10 +35,11 @@ def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """
     if options["break"] is not None and options["break"] not in BREAKS:
         raise unknown_name("way to break a replay", options["break"], BREAKS)
-    if not model.keyframes:
-        raise BadInputError(f"{model.path.name} has no keyframe to start from: try so101/scene_box")
     steps = as_count(options["steps"], "steps")
-    write, said = "data.ctrl[:2] += np.array((0.4, -0.2))[: model.nu]", "  # pan and lift"
+    write, said = (
+        "data.ctrl[:2] += np.array((0.4, -0.2))[: model.nu]",
+        "  # pan and lift" if is_the_arm(model) else "",
+    )
     if options["ctrl"] is not None:
         write, said = f"data.ctrl[:] = {command(model, options['ctrl']).tolist()}", ""
     body = {
@@ -51,6 +53,7 @@ def code(model: Model, options: Mapping[str, Any], load: str) -> str:
         ],
     }[options["break"]]
     lines = "\n".join(f"    {line}" for line in body)
+    start = "    sm.reset(model, data, keyframe=0)\n    data.time = 0\n" if model.keyframes else ""
     argument, first, second = ("broken", "0", "1") if options["break"] else ("", "", "")
     return f"""\
 import numpy as np
@@ -60,9 +63,7 @@ model = {load}
 
 def run({argument}):
     data = sm.make_data(model)
-    sm.reset(model, data, keyframe=0)
-    data.time = 0
-{lines}
+{start}{lines}
     return data.qpos.copy()
 
 one, two = run({first}), run({second})
@@ -102,7 +103,7 @@ class Replay:
         travel: Largest movement of a hinge in the first run [rad].
         contacts: (n,) contacts that each step of the first run found.
         pairs: For each pair of bodies, in how many steps it touched.
-        keyframe: Name of the keyframe; its time was set to zero.
+        keyframe: Name of the keyframe, its time was set to zero; None for the default state.
         breaks: Second runs that were made to differ, if this one was not.
         finer: The same with half the timestep; None where the backend cannot set it.
         state: What a State of this engine holds.
@@ -122,7 +123,7 @@ class Replay:
     travel: float
     contacts: Ints
     pairs: dict[str, int]
-    keyframe: str
+    keyframe: str | None
     breaks: tuple[Broken, ...]
     finer: Finer | None
     state: tuple[str, ...]
@@ -164,7 +165,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Replay
         travel=float(np.ptp(first[:, hinges], axis=0).max(initial=0.0)),
         contacts=np.array(paths.contacts, dtype=np.int64),
         pairs=dict(paths.pairs),
-        keyframe=model.keyframes[0].name,
+        keyframe=model.keyframes[0].name if model.keyframes else None,
         breaks=tuple(broken),
         finer=finer,
         state=tuple(name for name, size in get_state(model, data).layout if size),
@@ -193,10 +194,10 @@ def page(results: Mapping[str, Replay], session: Session) -> Page:
     nstep = len(first.contacts)
     blocks: list[Any] = [
         Text(
-            f"Two runs of {count(nstep, 'step')}, each in a new Data: reset to keyframe 0 "
-            f"({first.keyframe!r}), time set to zero, one fixed command. Equal means "
-            "np.array_equal on all of qpos: every bit, not nearly. Differences are the largest "
-            "over all numbers of qpos: radians, metres and parts of a quaternion."
+            f"Two runs of {count(nstep, 'step')}, each in a new Data: {_start(first)}, one fixed "
+            "command. Equal means np.array_equal on all of qpos: every bit, not nearly. "
+            "Differences are the largest over all numbers of qpos: radians, metres and parts of a "
+            "quaternion."
         ),
         *typed(session, _question(first)),
     ]
@@ -243,6 +244,12 @@ def page(results: Mapping[str, Replay], session: Session) -> Page:
         ],
     )
     return page_of("The same start, the same commands", results, blocks)
+
+
+def _start(first: Replay) -> str:
+    if first.keyframe is None:
+        return "from the default state"
+    return f"reset to keyframe 0 ({first.keyframe!r}), time set to zero"
 
 
 def _question(first: Replay) -> Question:
@@ -292,6 +299,8 @@ def _contacts_apart(one: Replay, two: Replay) -> str:
 
 
 def _outcome(results: Mapping[str, Replay]) -> Table:
+    first = next(iter(results.values()))
+    moves = "the arm moves by" if is_of_the_arm(results) else "a hinge moves by"
     return Table(
         ("", *results),
         [
@@ -299,7 +308,7 @@ def _outcome(results: Mapping[str, Replay]) -> Table:
             ("np.allclose", *(str(r.close) for r in results.values())),
             ("difference at the end", *(f"{r.difference[-1]:.1e}" for r in results.values())),
             ("largest on the way", *(f"{r.difference.max():.1e}" for r in results.values())),
-            ("the arm moves by", *(degrees(r.travel, 1) for r in results.values())),
+            *[(moves, *(degrees(r.travel, 1) for r in results.values()))] * bool(first.hinges),
             # Two of them do not fit side by side; how far they are apart stands at the end.
             *(("qpos[:6] at the end", vector(r.qpos[:6], 3)) for r in _alone(results)),
         ],

@@ -157,8 +157,8 @@ def take(
         calls: Whether to run the code once more, recording what it makes the engine do, if the
             engine's room can tell.
     """
-    values = {option.key: option.default for option in lesson.options} | dict(options or {})
     station = module(lesson.name)
+    values = fitted(lesson, model, options or {})
     code = station.code(model, values, load_line(name or lesson.model, backend, menagerie))
     with CodeRun(code, model) as play:
         result = station.run(play, values, progress)
@@ -166,6 +166,13 @@ def take(
     if not calls or engine not in recorded_engines():
         return Taken(result, code, play.printed)
     return Taken(result, code, play.printed, record(code, engine))
+
+
+def fitted(lesson: Lesson, model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
+    """All options of a lesson; what is left open is what the Model suggests."""
+    values = {option.key: option.default for option in lesson.options} | dict(options)
+    fit = getattr(module(lesson.name), "fit", None)
+    return fit(model, values) if fit else values
 
 
 def page_of_lesson(lesson: Lesson, taken: Mapping[str, Taken]) -> Page:

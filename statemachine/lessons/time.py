@@ -20,6 +20,7 @@ from .records import Session
 from .session import CodeRun, CodeWatch
 
 _BEFORE = "A simulation, a pause of the program, and the time on the simulator's own clock."
+_NAP = 0.2  # s
 _BRIEF, _WATCHED = 0.5, 4.0  # simulated seconds, without and with --realtime
 
 
@@ -201,7 +202,11 @@ def page(results: Mapping[str, Pace], session: Session) -> Page:
             if "sleep(0.2)" not in session.code
             else Question(
                 "what does the second line print?",
-                ("0.5, like the first", "0.7", "it depends on the machine"),
+                (
+                    f"{first.end:g}, like the first",
+                    f"{first.end + _NAP:g}",
+                    "it depends on the machine",
+                ),
                 0 if first.passed == 0 and not first.moved else 1,
                 f"While nobody called anything for {first.nap:.2f} s, nothing moved.",
             ),

@@ -25,17 +25,22 @@ from ..interface import (
 from ..interface.checks import as_scalar
 from ..page import Page, Question, Table, Text, Verdict
 from ..scenarios.provenance import Provenance, provenance
-from ..scenarios.robot import is_slide, scalar_joint
 from ..scenarios.runs import Progress
 from ._bytes import read_derived
+from ._robot import coordinate, with_joint
 from ._words import emulation, page_of, sentence, typed, where
 from .records import Session
 from .session import CodeRun, CodeWatch
 
 
+def fit(model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
+    """A joint of this robot, and a value in its range."""
+    return with_joint(model, options)
+
+
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     """A name for the array, a copy of it, and a write."""
-    scalar_joint(model, options["joint"])  # says what is wrong with it
+    slot = coordinate(model, options["joint"]).slot  # or says what is wrong with it
     value = as_scalar(options["value"], "value")
     return f"""\
 import statemachine as sm
@@ -43,7 +48,7 @@ import statemachine as sm
 model = {load}
 data = sm.make_data(model)
 sm.forward(model, data)  # works out where things are
-slot = model.jnt_qposadr[model.joint_id({options["joint"]!r})]
+slot = {slot}
 view = data.qpos
 copy = data.qpos.copy()
 view[slot] = {value}
@@ -92,7 +97,8 @@ class Write:
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Write:
     """Look who notices the write; then go on with the Data that was written."""
     model, joint = play.model, options["joint"]
-    place, dof = scalar_joint(model, joint)
+    at = coordinate(model, joint)
+    place, dof = at.place, at.dof
     looks = _Looks()
     names = play(looks)
     data, copy = names["data"], names["copy"]
@@ -118,7 +124,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Write:
     data.qpos = copy
     return Write(
         joint=joint,
-        slide=is_slide(model, joint),
+        slide=at.slide,
         place=place,
         value=options["value"],
         view=view,
@@ -180,7 +186,7 @@ def page(results: Mapping[str, Write], session: Session) -> Page:
             session,
             Question(
                 f"view[slot] was set to {first.value:g}. What does data.qpos[slot] say?",
-                (f"{first.value:g}", "0.0, until forward or step is called", "an error"),
+                (f"{first.value:g}", f"{first.copy}, until forward or step is called", "an error"),
                 0 if first.view == first.value else 1,
                 f"The view and data.qpos are one array; the copy still says {first.copy:g}.",
             ),

@@ -18,7 +18,7 @@ from ..installed import DEFAULT
 from ..lessons import LESSONS, module
 from ..lessons.pictures import with_picture
 from ..lessons.records import Lesson
-from ..lessons.session import page_of_lesson, take
+from ..lessons.session import fitted, page_of_lesson, take
 from ..page import LETTERS, Code, Page, Picture, Printed, Question, RobotPicture, Text
 from .figures import svg
 from .markdown import answer, asked, block_as_markdown
@@ -131,9 +131,9 @@ def build() -> str:
         asks = {0: "", 1: f"  # {_letters(questions)}"}.get(len(questions), _SEVERAL)
         if questions:
             cells.append(_cell(f"{lesson.name}-prediction", "code", f'prediction = ""{asks}'))
-        values = {option.key: option.default for option in lesson.options}
         line = f'sm.load("{lesson.model}", backend=BACKEND)'
-        code = module(lesson.name).code(load(lesson.model), values, line)
+        model = load(lesson.model)
+        code = module(lesson.name).code(model, fitted(lesson, model, {}), line)
         if code:
             cells.append(_cell(f"{lesson.name}-code", "code", code))
         given = ", prediction" if questions else ""

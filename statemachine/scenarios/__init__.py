@@ -1,21 +1,26 @@
-"""What the arm can be asked to do on any engine: a start, a command over time, an end.
+"""What a robot can be asked to do on any engine: a start, a command over time, an end.
 
 A scenario says no word about an engine. Recorded on two of them it is what they are compared by.
+It is written for the SO-101; `Scenario.on` gives what it is on another robot.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from ..comparison.text import count, listed
 from ..errors import BadInputError, unknown_name
 from ..interface import Array, Data, Model
+from .commands import TARGET, hold_ctrl, home, is_servo, waves
+from .robot import has_floor, is_the_arm
+
+__all__ = ["MOVING", "SCENARIOS", "TARGET", "Controller", "Scenario", "fitting", "scenario"]
 
 Controller = Callable[[float, Data], Any]  # (time, data) -> ctrl, or None to leave it
-TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)  # a command to the arm [rad]
 # Swings the arm with the box in its jaws by 23 degrees.
 MOVING = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)
 
@@ -30,6 +35,8 @@ class Scenario:
         model: The model that it is meant for.
         seconds: How long it takes [s].
         controller: Makes the controller, from the Model and a seed.
+        elsewhere: The sentence for another robot than the arm; raises BadInputError if the
+            experiment makes no sense on it.
         keyframe: Where it starts; None for the model's default state.
         options: What `Model.replace` is given.
         seeded: Whether the seed changes anything.
@@ -40,23 +47,85 @@ class Scenario:
     model: str
     seconds: float
     controller: Callable[[Model, int], Controller]
+    elsewhere: Callable[[Model], str]
     keyframe: str | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
     seeded: bool = False
 
+    def on(self, model: Model) -> Scenario:
+        """This scenario as it is on a Model: its start, and words that are true of it.
 
-def _command(values: tuple[float, ...]) -> Callable[[Model, int], Controller]:
+        The arm starts where the scenario says; another robot at its keyframe "home" if it has
+        one, else in its default state.
+
+        Raises:
+            BadInputError: It makes no sense on the Model; with the names of those that do.
+        """
+        if is_the_arm(model) and (has_floor(model) or not self.says.count("floor")):
+            return self
+        try:
+            says = self.elsewhere(model)
+        except BadInputError as error:
+            others = fitting(model)
+            known = f"; what makes sense on it: {', '.join(others)}" if others else ""
+            raise BadInputError(f"{error}{known}") from None
+        if is_the_arm(model):
+            return replace(self, says=says)
+        key = home(model)
+        if key is not None:
+            says = f"{says[:-1]}, from the keyframe {key!r}."
+        return replace(self, says=says, keyframe=key)
+
+
+def fitting(model: Model) -> tuple[str, ...]:
+    """Names of the scenarios that make sense on a Model."""
+    names = []
+    for each in SCENARIOS.values():
+        try:
+            each.elsewhere(model)
+        except BadInputError:
+            continue
+        names.append(each.name)
+    return tuple(names)
+
+
+def _hold(model: Model, _seed: int) -> Controller:
     """One command from the beginning on."""
+    target = hold_ctrl(model)
+    return lambda _time, _data: target
 
-    def make(model: Model, _seed: int) -> Controller:
-        if model.nu != len(values):
-            raise BadInputError(
-                f"this is for {len(values)} actuators; {model.path.name} has {model.nu}"
-            )
-        target = np.array(values)
-        return lambda _time, _data: target
 
-    return make
+def _hold_says(model: Model) -> str:
+    _need_actuators(model)
+    if is_the_arm(model):
+        return "The arm is told one pose and goes there."
+    servos = is_servo(model)
+    number, pushes = int(servos.sum()), bool(hold_ctrl(model)[~servos].any())
+    if not number:
+        if not pushes:
+            return "No actuator takes a pose, and all of them are left at the start's ctrl."
+        return "Each motor exerts what holds its joint at the start, and nothing looks after it."
+    says = f"{count(number, 'position servo')} {'is' if number == 1 else 'are'} told a pose"
+    says += f" and {'goes' if number == 1 else 'go'} there"
+    if number < model.nu:
+        rest = "exert what holds at the start" if pushes else "are left at the start's ctrl"
+        says += f"; the other actuators {rest}"
+    return f"{says}."
+
+
+def _box(model: Model, _seed: int) -> Controller:
+    if model.nu != len(MOVING):
+        raise BadInputError(
+            f"this is for {len(MOVING)} actuators; {model.path.name} has {model.nu}"
+        )
+    target = np.array(MOVING)
+    return lambda _time, _data: target
+
+
+def _box_says(model: Model) -> str:
+    if not is_the_arm(model) or all(frame.name != "held" for frame in model.keyframes):
+        raise BadInputError(f"{model.path.name} has no SO-101 that holds a box (so101/scene_box)")
+    return "The jaws hold a box while the arm swings it aside."
 
 
 def _untouched(_model: Model, _seed: int) -> Controller:
@@ -64,24 +133,70 @@ def _untouched(_model: Model, _seed: int) -> Controller:
     return lambda _time, _data: None
 
 
+def _need_joints(model: Model) -> None:
+    if not model.nv:
+        raise BadInputError(f"{model.path.name} has no joints: nothing in it can move")
+
+
+def _need_actuators(model: Model) -> None:
+    _need_joints(model)
+    if not model.nu:
+        raise BadInputError(f"{model.path.name} has no actuators: nothing in it takes a command")
+
+
+def _falls(model: Model, onto: bool) -> str:
+    _need_joints(model)
+    off = "" if not model.nu else f"The {drives(model)} are off"
+    if not onto:
+        off = f"{off} and nothing" if off else "Nothing"
+        off = f"{off} can touch anything"
+    what = "the arm" if is_the_arm(model) else "what can move"
+    if not model.gravity.any():
+        return f"{off or 'Nothing is driven'}, and there is no gravity: {what} coasts."
+    floor = " onto the floor" if onto and has_floor(model) else ""
+    return f"{off or 'Nothing is driven'}: {what} falls{floor}."
+
+
+def drives(model: Model) -> str:
+    """What moves the robot, in a word: "servos" where one is among them, else "actuators"."""
+    return "servos" if is_servo(model).any() else "actuators"
+
+
+def _gravity_says(model: Model) -> str:
+    return _falls(model, onto=True)
+
+
+def _fall_says(model: Model) -> str:
+    return _falls(model, onto=False)
+
+
+def _droop_says(model: Model) -> str:
+    _need_actuators(model)
+    where = "at zero" if home(model) is None else "where the keyframe's ctrl says"
+    servos, says = int(is_servo(model).sum()), []
+    if servos:
+        what = "the arm" if is_the_arm(model) else "their joints"
+        says.append(f"the servos hold {what} {where}")
+    if servos < model.nu:
+        says.append(f"{'other actuators' if servos else 'the actuators'} exert what ctrl says")
+    return f"Nobody writes ctrl: {listed(says)}."
+
+
 def _waves(model: Model, seed: int) -> Controller:
     """Every actuator follows a sum of three sines within the middle of its range."""
-    if seed < 0:
-        raise BadInputError(f"seed must not be negative; got {seed}")
-    low, high = np.nan_to_num(model.actuator_ctrlrange, posinf=1.0, neginf=-1.0).T
-    draw = np.random.default_rng(seed)
-    frequency = draw.uniform(0.2, 1.5, (3, model.nu))  # Hz
-    phase = draw.uniform(0.0, 2 * np.pi, (3, model.nu))
-    size = draw.uniform(0.2, 1.0, (3, model.nu))
-    size *= 0.25 * (high - low) / size.sum(axis=0)
-    middle = (low + high) / 2
+    middle, size, frequency, phase = waves(model, seed)
 
     def controller(time: float, _data: Data) -> Array:
         # From where it stands: the waves grow in over half a second.
-        waves: Array = (size * np.sin(2 * np.pi * frequency * time + phase)).sum(axis=0)
-        return middle + min(1.0, 2 * time) * waves
+        sines: Array = (size * np.sin(2 * np.pi * frequency * time + phase)).sum(axis=0)
+        return middle + min(1.0, 2 * time) * sines
 
     return controller
+
+
+def _waves_says(model: Model) -> str:
+    _need_actuators(model)
+    return "Every actuator follows waves that a seed draws."
 
 
 SCENARIOS = {
@@ -92,7 +207,8 @@ SCENARIOS = {
             "The arm is told one pose and goes there; on the way a finger meets the floor.",
             "so101/scene",
             2.0,
-            _command(TARGET),
+            _hold,
+            _hold_says,
         ),
         Scenario(
             "gravity",
@@ -100,6 +216,7 @@ SCENARIOS = {
             "so101/scene",
             4.0,
             _untouched,
+            _gravity_says,
             options={"actuation": False},
         ),
         Scenario(
@@ -108,6 +225,7 @@ SCENARIOS = {
             "so101/scene",
             2.0,
             _untouched,
+            _droop_says,
         ),
         Scenario(
             "fall",
@@ -115,6 +233,7 @@ SCENARIOS = {
             "so101/scene",
             2.0,
             _untouched,
+            _fall_says,
             options={"actuation": False, "contacts": False},
         ),
         Scenario(
@@ -122,7 +241,8 @@ SCENARIOS = {
             "The jaws hold a box while the arm swings it aside.",
             "so101/scene_box",
             3.0,
-            _command(MOVING),
+            _box,
+            _box_says,
             keyframe="held",
         ),
         Scenario(
@@ -131,6 +251,7 @@ SCENARIOS = {
             "so101",
             4.0,
             _waves,
+            _waves_says,
             seeded=True,
         ),
     )

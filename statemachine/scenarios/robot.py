@@ -12,6 +12,25 @@ from ..errors import BadInputError
 from ..interface import Array, Contacts, JointType, Model
 from ..interface.checks import check_entries
 
+ARM = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
+_PLANE, _HFIELD = 0, 1  # mjtGeom
+
+
+def is_the_arm(model: Model) -> bool:
+    """Whether the robot is an SO-101, ours or another's: that what is driven has its names."""
+    driven = model.actuator_jntid.tolist()
+    return tuple(model.joint_names[joint] for joint in driven if joint >= 0) == ARM
+
+
+def has_floor(model: Model) -> bool:
+    """Whether a plane or a height field that can be touched stands still in the scene."""
+    compiled = model.compiled
+    if compiled is None:
+        return False
+    static = ~np.isin(model.geom_bodyid, list(carried_by(model, set(model.jnt_bodyid.tolist()))))
+    touches = (compiled.geom_contype != 0) | (compiled.geom_conaffinity != 0)
+    return bool((static & touches & np.isin(compiled.geom_type, (_PLANE, _HFIELD))).any())
+
 
 def is_slide(model: Model, joint: str) -> bool:
     """Whether a joint is a slide: its position is in metres."""
@@ -44,6 +63,18 @@ def carried_by(model: Model, bodies: Iterable[int]) -> frozenset[int]:
         if int(model.body_parentid[body]) in carried:
             carried.add(body)
     return frozenset(carried)
+
+
+def dofs_of(model: Model, bodies: frozenset[int]) -> list[int]:
+    """The degrees of freedom of the joints of these bodies."""
+    return [
+        int(start) + k
+        for start, kind, body in zip(
+            model.jnt_dofadr, model.jnt_type, model.jnt_bodyid, strict=True
+        )
+        if int(body) in bodies
+        for k in range(JointType(int(kind)).nv)
+    ]
 
 
 def moved_by_actuators(model: Model) -> frozenset[int]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 import numpy as np
 
-from ..errors import BadInputError
-from ..interface import Model
+from ..errors import BadInputError, DivergedError
+from ..interface import Model, make_data, step
 
 Progress = Callable[[float], None]  # told the fraction that is done
 
@@ -21,8 +22,20 @@ def part_of(progress: Progress, start: float, share: float) -> Progress:
     return lambda fraction: progress(start + share * fraction)
 
 
+_TRIED = 10  # steps
 # A run that would take hours is a slip of the keyboard.
 _STEPS_MOST = 10_000_000
+
+
+def cost_of_a_second(model: Model) -> float:
+    """Roughly what a simulated second costs by the clock [s], from its first steps."""
+    with make_data(model) as data:
+        began = time.perf_counter()
+        try:
+            step(model, data, _TRIED)
+        except DivergedError:
+            return 0.0
+        return (time.perf_counter() - began) / (_TRIED * model.timestep)
 
 
 def steps_in(model: Model, seconds: float) -> int:

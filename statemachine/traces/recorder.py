@@ -144,7 +144,7 @@ def record_scenario(
     """Record a scenario on a model, which is given as loaded.
 
     Args:
-        scenario: What to do; its options are put into the model.
+        scenario: What to do, as it is on that model; its options are put into it.
         model: Of any backend.
         seconds: Simulated time; None for the scenario's own.
         seed: Of what the scenario draws.
@@ -156,8 +156,10 @@ def record_scenario(
     Raises:
         UnsupportedError: The backend lacks one of the options.
         UnknownNameError: The model lacks the keyframe.
-        BadInputError: A timestep is longer than the run.
+        BadInputError: The scenario makes no sense on the model, or a timestep is longer than
+            the run.
     """
+    scenario = scenario.on(model)
     chosen = {**scenario.options, **(options or {})}
     replaced = model.replace(**chosen) if chosen else model
     seconds = scenario.seconds if seconds is None else seconds

@@ -61,6 +61,7 @@ def attribute(
         BadInputError: The models have other joints, or one of them cannot do the experiment.
         UnknownNameError: There is no such quantity.
     """
+    scenario = scenario.on(one)
     sides = [side_of(model, scenario.options) for model in (one, two)]
     if sides[0].fresh and not sides[1].fresh:
         sides.reverse()

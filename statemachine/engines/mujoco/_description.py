@@ -62,7 +62,7 @@ def description_of(raw: Any, name: str, reader: str, form: str) -> Robot:
     for body in range(raw.nbody):
         links += _links(mujoco, raw, body, names[body], bottom)
         bottom[body] = names[body]
-    actuators = tuple(drives.actuator(mujoco, raw, i) for i in range(raw.nu))
+    actuators = tuple(drives.actuator(mujoco, raw, i) for i in range(raw.nactuator))
     empty = _empty(mujoco)
     return Robot(
         name=name,
@@ -246,7 +246,7 @@ def _notes(raw: Any) -> list[str]:
     for name in ("dof_dampingpoly", "jnt_stiffnesspoly"):
         if np.any(getattr(raw, name, 0)):
             notes.append("it has damping or springs that are not linear, which are not compared")
-    notes += [text for i in range(raw.nu) if (text := drives.beyond(raw, i))]
+    notes += [text for i in range(raw.nactuator) if (text := drives.beyond(raw, i))]
     if np.any(raw.body_gravcomp):
         notes.append(
             f"it frees {np.count_nonzero(raw.body_gravcomp)} bodies of their weight (gravcomp), "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...backends import load
+from ...backends._bullet_urdf import UNLIMITED
 from ...description import urdf
 from ...description.meshes import volume_of
 from ...description.records import (
@@ -180,9 +182,9 @@ def _joint(info: Sequence[Any], inner: Placement) -> RobotJoint:
         kind=_KINDS[info[2]],
         axis=inner.mat @ np.array(info[13]),
         anchor=np.zeros(3),
-        limits=(low, high) if low <= high else None,
+        limits=(low, high) if low <= high and high - low < UNLIMITED else None,
         velocity=info[11],
-        effort=info[10],
+        effort=info[10] if info[10] < UNLIMITED else math.inf,
         damping=info[6],
     )
 

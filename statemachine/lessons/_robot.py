@@ -1,0 +1,191 @@
+"""What a lesson watches and writes on a robot of any kind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import BadInputError
+from ..interface import Array, Data, JointType, Model, make_data
+from ..scenarios.commands import home, load_at_start
+from ..scenarios.robot import ARM, carried_by, is_the_arm, scalar_joint
+
+USUAL = "shoulder_lift"  # the arm's joint that lessons are about
+_VALUE = 0.8  # rad
+_SHIFT = 0.05  # m; of a slide without a range, or up
+_FINGERTIP = "gripperframe"
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One number of qpos: of a hinge or a slide, or the height of a free body.
+
+    Attributes:
+        joint: Its joint.
+        place, dof: Where it is in qpos and in qvel.
+        slide: Whether it is a length, and no angle.
+        slot: How it is typed.
+    """
+
+    joint: str
+    place: int
+    dof: int
+    slide: bool
+    slot: str
+
+
+def coordinate(model: Model, joint: str) -> Coordinate:
+    """The coordinate that a lesson watches of a joint.
+
+    Raises:
+        UnknownNameError: There is no such joint.
+        BadInputError: It is a ball joint.
+    """
+    number = model.joint_id(joint)
+    slot = f"model.jnt_qposadr[model.joint_id({joint!r})]"
+    kind = JointType(int(model.jnt_type[number]))
+    if kind is JointType.FREE:
+        place, dof = int(model.jnt_qposadr[number]) + 2, int(model.jnt_dofadr[number]) + 2
+        return Coordinate(joint, place, dof, True, f"{slot} + 2  # the height of a free body")
+    place, dof = scalar_joint(model, joint)
+    return Coordinate(joint, place, dof, kind is JointType.SLIDE, slot)
+
+
+def usual_joint(model: Model) -> str:
+    """The joint that a lesson takes where nobody names one.
+
+    shoulder_lift if there is one; else of the driven hinges and slides the one that takes the
+    largest force to keep where it starts. Of a robot without any, a joint that nothing drives.
+
+    Raises:
+        BadInputError: There is none with a name.
+    """
+    if USUAL in model.joint_names:
+        return USUAL
+    driven = set(model.actuator_jntid.tolist())
+    scalar = (int(JointType.HINGE), int(JointType.SLIDE))
+    kinds, names = model.jnt_type.tolist(), model.joint_names
+    named = [j for j, name in enumerate(names) if name and kinds[j] != int(JointType.BALL)]
+    groups = (
+        [j for j in named if kinds[j] in scalar and j in driven],
+        [j for j in named if kinds[j] in scalar],
+        named,
+    )
+    found = next((group for group in groups if group), None)
+    if found is None:
+        what = "names none of its joints" if model.njnt else "has no joints"
+        raise BadInputError(f"{model.path.name} {what}, and this lesson is about one")
+    load = load_at_start(model)
+    return names[max(found, key=lambda j: load[coordinate(model, names[j]).dof])]
+
+
+def usual_value(model: Model, joint: str) -> float:
+    """What a lesson writes into a joint where nobody says it [rad; of a length, m]."""
+    at = coordinate(model, joint)
+    number = model.joint_id(joint)
+    low, high = (float(end) for end in model.jnt_range[number])
+    limited = bool(model.jnt_limited[number])
+    if not at.slide and (not limited or low <= _VALUE <= high):
+        return _VALUE
+    with make_data(model) as data:
+        begin = float(data.qpos[at.place])
+    if limited and low < high:
+        begin = min(max(begin, low), high)
+        far = (high - low) / 4
+        return _short(begin + far if high - begin >= begin - low else begin - far)
+    return _short(begin + _SHIFT)
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.3g}")
+
+
+@dataclass(frozen=True)
+class Tip:
+    """The place on a robot that a lesson reads: a site, or a body where it has no sites.
+
+    Attributes:
+        name: Its name.
+        array: Where its position is in a Data.
+        number: Its row there.
+    """
+
+    name: str
+    array: str
+    number: int
+
+    @property
+    def found(self) -> str:
+        """How its number is typed."""
+        kind = "site" if self.array == "site_xpos" else "body"
+        return f"model.{kind}_id({self.name!r})"
+
+    def read(self, data: Data) -> Array:
+        """Where it is (3,) [m], by what was last computed."""
+        return np.array(getattr(data, self.array)[self.number])
+
+
+def tip_of(model: Model, name: str) -> Tip:
+    """A site by name, else a body of that name.
+
+    Raises:
+        UnknownNameError: There is neither.
+    """
+    if name not in model.site_names and name in model.body_names:
+        return Tip(name, "xpos", model.body_id(name))
+    return Tip(name, "site_xpos", model.site_id(name))
+
+
+def a_tip(name: str) -> str:
+    """What the place of this name is called: the arm's is its fingertip."""
+    return "fingertip" if name == _FINGERTIP else name
+
+
+def the_tip(name: str) -> str:
+    """The same, in a sentence."""
+    return "the fingertip" if name == _FINGERTIP else name
+
+
+def usual_tip(model: Model, joint: str) -> str:
+    """The fingertip if there is one; else the last site or body that a joint carries."""
+    if _FINGERTIP in model.site_names:
+        return _FINGERTIP
+    carried = carried_by(model, [int(model.jnt_bodyid[model.joint_id(joint)])])
+    bodies = list(enumerate(model.body_names))[1:]  # without the world
+    sites = list(zip(model.site_bodyid.tolist(), model.site_names, strict=True))
+    for places in (sites, bodies):
+        for inside in (True, False):
+            names = [name for body, name in places if name and (body in carried) is inside]
+            if names and (inside or places is bodies):
+                return names[-1]
+    raise BadInputError(f"{model.path.name} names no site and no body, and this lesson reads one")
+
+
+def with_joint(model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options with a joint, if none is named, and with a value to write to it."""
+    values = dict(options)
+    if values["joint"] is None:
+        values["joint"] = usual_joint(model)
+    if "value" in values and values["value"] is None:
+        values["value"] = usual_value(model, values["joint"])
+    return values
+
+
+def start_line(model: Model, name: str) -> str:
+    """What is typed after make_data of a Model of some name, so that it starts at home."""
+    key = None if is_the_arm(model) else home(model)
+    return f"sm.reset({name}, data, keyframe={key!r})\n" if key else ""
+
+
+def is_of_the_arm(results: Mapping[str, Any]) -> bool:
+    """Whether results are of an SO-101, ours or another's."""
+    file = next(iter(results.values())).provenance.model_file
+    return file.partition("/")[0] in ("so101", "robotstudio_so101")
+
+
+def robot_word(joint: str) -> str:
+    """What the robot of a joint is called."""
+    return "arm" if joint in ARM else "robot"

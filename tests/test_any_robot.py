@@ -1,0 +1,415 @@
+"""Experiments and lessons on robots of other kinds than the arm: what they ask for and say."""
+
+from __future__ import annotations
+
+import sys
+import types
+import urllib.error
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine import errors, models, robot_packages
+from statemachine.cli import main
+from statemachine.compare import compare
+from statemachine.lessons import LESSONS
+from statemachine.lessons.session import page_of_lesson, take
+from statemachine.page import Page, Table, Text, Verdict
+from statemachine.scenarios import SCENARIOS, fitting
+from statemachine.scenarios.commands import hold_ctrl, is_servo
+from statemachine.traces import record_scenario
+
+from .conftest import need_engine
+
+# A slide with a servo whose gear is 2, a hinge with a motor of gear 3 that holds a load, and a
+# hinge that a velocity servo drives.
+MIXED = """<mujoco><worldbody>
+  <body name="cart"><joint name="rail" type="slide" axis="1 0 0" range="-1 1" limited="true"/>
+    <geom size=".1" mass="1"/>
+    <body name="arm" pos="0 0 .5"><joint name="lift" axis="0 1 0" damping="1"/>
+      <geom type="capsule" fromto="0 0 0 .4 0 0" size=".03" mass="1"/>
+      <body name="wheel" pos=".4 0 0"><joint name="spin" axis="1 0 0"/><geom size=".05"/></body>
+    </body></body></worldbody>
+  <actuator><position name="p" joint="rail" kp="500" kv="50" gear="2" ctrlrange="-1 1.4"/>
+    <motor name="m" joint="lift" gear="3" ctrlrange="-9 9" ctrllimited="true"/>
+    <velocity name="v" joint="spin" kv=".05"/></actuator>
+  {rest}</mujoco>"""
+HOME = '<keyframe><key name="home" qpos=".2 0 0" ctrl=".4 0 1"/></keyframe>'
+# A robot of a floating base and two legs on a floor.
+FLOATING = """<mujoco><worldbody><geom name="ground" type="plane" size="5 5 .1"/>
+  <body name="trunk" pos="0 0 .5"><freejoint name="root"/><geom size=".1" mass="2"/>
+    <body name="leg" pos=".1 0 0"><joint name="hip" axis="0 1 0" damping=".1"/>
+      <geom type="capsule" fromto="0 0 0 .3 0 -.1" size=".03" mass="1"/></body></body></worldbody>
+  <actuator><motor name="hip" joint="hip"/></actuator></mujoco>"""
+BOX = """<mujoco><worldbody><body name="box" pos="0 0 1"><freejoint name="float"/>
+  <geom type="box" size=".1 .1 .1"/></body></worldbody></mujoco>"""
+STILL = '<mujoco><worldbody><geom name="rock" size="1"/></worldbody></mujoco>'
+PASSIVE = """<mujoco><worldbody><body name="beam"><joint name="swing" axis="0 1 0"/>
+  <geom type="capsule" fromto="0 0 0 .4 0 0" size=".03"/></body></worldbody></mujoco>"""
+# A joint on a base that swings on, held still by a limit: at rest beside what moves.
+COUPLED = """<mujoco><option timestep=".002"/><worldbody>
+  <body name="swing" euler="0 60 0"><joint name="pivot" axis="0 1 0"/>
+    <geom type="capsule" fromto="0 0 0 0 0 -1" size=".02" mass="1"/>
+    <body name="load" pos="0 0 -1"><joint name="rail" type="slide" axis="1 0 0" damping="1e6"/>
+      <geom size=".05" mass="5"/></body></body></worldbody>
+  <actuator><motor name="m" joint="rail"/></actuator></mujoco>"""
+SEVERAL = """<mujoco><worldbody><body name="b"><joint name="ball" type="ball"/><geom size=".1"/>
+    <body name="c" pos="1 0 0"><joint name="k"/><geom size=".1"/></body></body></worldbody>
+  <actuator><orientation name="o" joint="ball" kp="10"/>
+    <pid name="p" joint="k" kp="3" ki="1" kv=".1"/><motor name="m" joint="k" gear="3"/>
+    <position name="s" joint="k" kp="4" forcerange="-7 7"/>
+    <intvelocity name="i" joint="k" kp="4" actrange="-1 1"/></actuator>
+  <keyframe><key name="home" ctrl="0 0 .1 0 1 0 0 0"/></keyframe></mujoco>"""
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Any:
+    def make(text: str, name: str = "robot.xml") -> sm.Model:
+        file = tmp_path / name
+        file.write_text(text)
+        return sm.load(file)
+
+    return make
+
+
+def lesson(name: str, model: sm.Model, **options: Any) -> tuple[Any, Page, str]:
+    """What a lesson finds on a model, its page, and its code."""
+    taken = take(LESSONS[name], model, "mujoco", options, model.path.name)
+    return taken.result, page_of_lesson(LESSONS[name], {"mujoco": taken}), taken.code
+
+
+def words(page: Page) -> str:
+    """All text of a page."""
+    found = [page.title]
+    for block in page.blocks:
+        if isinstance(block, (Text, Verdict)):
+            found.append(block.text)
+        elif isinstance(block, Table):
+            found += [str(block.title), *map(str, block.headers)]
+            found += [str(cell) for row in block.rows for cell in row]
+    return "\n".join(found)
+
+
+def test_a_pose_is_asked_of_servos_and_a_force_of_motors(model: Any) -> None:
+    robot = model(MIXED.format(rest=""))
+    assert is_servo(robot).tolist() == [True, False, False]
+    ctrl = hold_ctrl(robot)
+    # The servo stands at 0; a quarter of its 2.4 is beyond what 0.1 m of the joint are.
+    assert ctrl[0] == pytest.approx(0.2)
+    with sm.make_data(robot) as data:
+        sm.forward(robot, data)
+        load = float(data.qfrc_bias[1])
+        assert ctrl[1] == pytest.approx(load / 3, rel=1e-3)
+        data.ctrl[:] = ctrl
+        sm.forward(robot, data)
+        assert data.qacc[1] == pytest.approx(0, abs=1e-2)  # the motor holds the arm up
+    assert ctrl[2] == 0
+
+
+def test_home_is_where_another_robot_starts(model: Any) -> None:
+    robot = model(MIXED.format(rest=HOME))
+    trace = record_scenario(SCENARIOS["hold"], robot, seconds=0.02)
+    assert trace.header.keyframe == "home"
+    assert trace.header.says.endswith("from the keyframe 'home'.")
+    assert trace.qpos[0].tolist() == [0.2, 0, 0]
+    assert trace.ctrl[0, 0] == pytest.approx(0.2)  # from 0.4 towards the farther end
+    assert trace.ctrl[0, 2] == 1  # a velocity servo is left at the keyframe's
+    found, page, code = lesson("hold", robot, seconds=0.1)
+    assert "sm.reset(model, data, keyframe='home')" in code
+    assert found.qpos[0, 0] == 0.2
+    assert "keyframe 'home'" in words(page)
+
+
+def test_a_force_is_never_read_as_a_place(model: Any) -> None:
+    found, page, _ = lesson("hold", model(MIXED.format(rest="")), target=[0.4, 40, 0], seconds=0.5)
+    assert found.goal[0] == pytest.approx(0.2)  # of the joint: the gear is 2
+    assert np.isnan(found.goal[1:]).all()
+    table = next(b for b in page.blocks if isinstance(b, Table) and "joint" in b.headers)
+    assert [row[2] for row in table.rows] == ["200.00 mm", "–", "–"]
+    assert page.title == "3 numbers in"
+    assert "1 of 3 are position servos" in words(page)
+
+
+def test_what_makes_no_sense_is_refused_with_what_does(model: Any) -> None:
+    passive = model(PASSIVE, "passive.xml")
+    assert fitting(passive) == ("gravity", "fall")
+    for name in ("hold", "droop", "waves"):
+        with pytest.raises(
+            errors.BadInputError, match=r"no actuators.*makes sense.*: gravity, fall"
+        ):
+            record_scenario(SCENARIOS[name], passive)
+    with pytest.raises(errors.BadInputError, match="no SO-101 that holds a box"):
+        record_scenario(SCENARIOS["box"], passive)
+    still = model(STILL, "still.xml")
+    assert fitting(still) == ()
+    with pytest.raises(errors.BadInputError, match=r"no joints: nothing in it can move$"):
+        record_scenario(SCENARIOS["gravity"], still)
+    with pytest.raises(errors.BadInputError, match="no joints"):
+        lesson("gravity", still)
+    with pytest.raises(errors.BadInputError, match="no actuators"):
+        lesson("hold", passive)
+
+
+def test_the_command_says_it_in_a_line(model: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    file = str(model(PASSIVE).path)
+    assert main(["compare", "hold", "--model", file, "--backends", "mujoco", "mujoco"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "what makes sense on it: gravity, fall" in said
+
+
+def test_sentences_are_true_of_the_robot(model: Any) -> None:
+    says = {name: SCENARIOS[name].on(model(FLOATING)).says for name in ("hold", "gravity", "fall")}
+    assert says["hold"] == "No actuator takes a pose, and all of them are left at the start's ctrl."
+    assert says["gravity"] == "The actuators are off: what can move falls onto the floor."
+    assert says["fall"].endswith("nothing can touch anything: what can move falls.")
+    bare = sm.load("so101")  # the arm, without a floor
+    assert SCENARIOS["hold"].on(bare).says == "The arm is told one pose and goes there."
+    assert "floor" not in SCENARIOS["gravity"].on(bare).says
+    scene = sm.load("so101/scene")
+    assert all(each.on(scene) is each for each in SCENARIOS.values())
+
+
+def test_gravity_takes_the_joint_with_the_largest_load(model: Any) -> None:
+    robot = model(MIXED.format(rest=""))
+    found, page, code = lesson("gravity", robot, seconds=0.5, longer=0.0)
+    assert found.joint == "lift"
+    assert "# the largest load at the start" in code
+    text = words(page)
+    assert "Watched is lift; --joint takes another." in text
+    assert "arm" not in text.replace("harm", "")
+    assert "floor" not in text
+    found, page, code = lesson("gravity", robot, seconds=0.5, longer=0.5, joint="rail")
+    assert "1000 * data.qpos[slot]" in code  # millimetres, as in the table
+    assert set(found.longer) == {"contacts", "no contacts"}
+    assert "[N]" in words(page)
+
+
+def test_a_floating_base_gets_no_wrong_verdict(model: Any) -> None:
+    found, page, _ = lesson("gravity", model(FLOATING), longer=1.0)
+    assert set(found.longer) == {"floor", "no floor"}
+    assert page.holds
+
+
+def test_no_balance_is_drawn_while_the_rest_moves(model: Any) -> None:
+    found, page, _ = lesson("gravity", model(COUPLED), seconds=0.3, longer=0.0)
+    end = found.servos_on
+    assert found.joint == "rail"
+    assert abs(end.velocity) < 0.01  # stands on its rail, which swings
+    assert abs(end.forces.total) > 0.1
+    assert page.holds
+    assert "but the robot still moves" in words(page)
+
+
+def test_a_sum_that_is_none_is_still_found(model: Any) -> None:
+    import dataclasses
+
+    taken = take(LESSONS["gravity"], sm.load("so101/scene"), "mujoco", {"longer": 0.0})
+    run = taken.result.servos_on
+    forces = dataclasses.replace(run.forces, actuator=0.1)
+    belied = dataclasses.replace(
+        taken.result, servos_on=dataclasses.replace(run, forces=forces, others=(0.0, 0.0))
+    )
+    page = page_of_lesson(LESSONS["gravity"], {"mujoco": dataclasses.replace(taken, result=belied)})
+    assert not page.holds
+
+
+def test_a_divergence_costs_its_row(model: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from statemachine.lessons import gravity
+
+    steps = [0]
+
+    def step(model: sm.Model, data: sm.Data) -> None:
+        steps[0] += 1
+        if steps[0] > 700:
+            raise errors.DivergedError("gone", time=data.time, quantity="qpos", index=0)
+        sm.step(model, data)
+
+    monkeypatch.setattr(gravity, "step", step)
+    found, page, _ = lesson("gravity", model(PASSIVE), seconds=0.1, longer=2.0)
+    run = found.longer["contacts"]
+    assert run.diverged == pytest.approx(1.4)
+    assert run.position.tolist()[:2] == run.path[[0, 500]].tolist()
+    text = words(page)
+    assert "diverged" in text
+    assert "contacts: diverged at 1.400 s" in text
+
+
+def test_a_free_body_is_watched_by_its_height(model: Any) -> None:
+    found, page, code = lesson("gravity", model(BOX), seconds=0.4, longer=0.0)
+    assert found.slide
+    assert "+ 2  # the height of a free body" in code
+    assert found.servos_off.position[-1] == pytest.approx(1 - 9.81 * 0.4**2 / 2, abs=0.01)
+    assert page.holds
+    assert next(b for b in page.blocks if isinstance(b, Table)).headers == (
+        "time",
+        "nothing is driven",
+    )
+
+
+ROBOTS = {"mixed": MIXED.format(rest=HOME), "floating": FLOATING, "box": BOX, "passive": PASSIVE}
+_QUICK: dict[str, dict[str, Any]] = {
+    "gravity": {"seconds": 0.2, "longer": 0.2},
+    "hold": {"seconds": 0.2},
+    "replay": {"steps": 30},
+    "forward": {"arrays": True, "lag": True, "seconds": 0.1},
+}
+
+
+@pytest.mark.parametrize("robot", list(ROBOTS))
+@pytest.mark.parametrize(
+    "name", ["state", "write", "forward", "hold", "gravity", "reset", "replay"]
+)
+def test_every_lesson_that_makes_sense_holds(model: Any, robot: str, name: str) -> None:
+    made = model(ROBOTS[robot])
+    if name == "hold" and not made.nu:
+        return
+    _, page, _ = lesson(name, made, **_QUICK.get(name, {}))
+    assert page.holds, words(page)
+    assert "1e+" not in words(page)
+
+
+def test_a_value_is_in_the_range_of_its_joint(model: Any) -> None:
+    robot = model(MIXED.format(rest=""))
+    found, _, _ = lesson("write", robot, joint="rail")
+    assert found.value == 0.5  # a quarter of the 2 m
+    assert lesson("write", robot)[0].value == 0.8
+
+
+def test_two_runs_of_what_does_not_move_agree(model: Any) -> None:
+    held = model(PASSIVE.replace("axis=", "limited='true' range='0 1e-9' damping='1e9' axis="))
+    still = held.replace(gravity=(0, 0, 0))
+    traces = [record_scenario(SCENARIOS["fall"], still, seconds=0.1) for _ in range(2)]
+    found = compare(*traces)
+    assert found.agrees
+    assert all(each.tolerances() == 0 for each in found.agreements)
+
+
+def test_an_actuator_may_take_several_numbers_of_ctrl(model: Any) -> None:
+    robot = model(SEVERAL)
+    names = ("o.x", "o.y", "o.z", "p.position", "p.velocity", "m", "s", "i")
+    assert robot.actuator_names == names
+    assert robot.nu == len(names) == len(robot.keyframes[0].ctrl)
+    assert robot.actuator_jntid.tolist() == [-1, -1, -1, 1, 1, 1, 1, 1]
+    assert np.flatnonzero(np.isfinite(robot.actuator_kp)).tolist() == [6]
+    assert np.flatnonzero(np.isfinite(robot.actuator_gain)).tolist() == [5]
+    assert robot.actuator_gear[5] == 3
+    assert robot.actuator_forcerange[6].tolist() == [-7, 7]
+    with sm.make_data(robot) as data:
+        sm.reset(robot, data, keyframe="home")
+        data.ctrl[robot.actuator_id("m")] = 2.0
+        sm.forward(robot, data)
+        assert data.raw.actuator_force[-3] == 2.0  # its gain is 1
+        sm.step(robot, data, 10)
+    trace = record_scenario(SCENARIOS["waves"], robot, seconds=0.05)
+    assert trace.header.actuators == names
+    assert main(["compare", "--models", str(robot.path), str(robot.path)]) == 0
+
+
+def test_no_filler_of_ours_is_shown(model: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    need_engine("pybullet")
+    file = str(model(MIXED.format(rest="").replace(' range="-1 1" limited="true"', "")).path)
+    # The robots are the same; a motor whose ctrl has a range may differ in what it can exert.
+    main(["compare", "--models", file, "--backends", "mujoco", "pybullet"])
+    said = capsys.readouterr().out
+    assert "e+09" not in said
+    assert "e+12" not in said
+
+
+class _Registry(types.ModuleType):
+    """Stands for the package mujoco_menagerie."""
+
+    class MenagerieError(Exception):
+        pass
+
+    class Cache:
+        root = None
+        base_url = "https://nowhere.invalid/assets"
+
+        @staticmethod
+        def is_cached(robot: Any) -> bool:
+            return robot.here
+
+    here, folder = True, Path()
+
+    def names(self) -> list[str]:
+        return ["unitree_g1", "unitree_go2"]
+
+    def get(self, name: str) -> Any:
+        def xml(entry: str | None) -> Path:
+            if not self.here:
+                raise self.MenagerieError("no archive")
+            return self.folder / f"{entry or 'scene'}.xml"
+
+        return types.SimpleNamespace(here=self.here, entry_names=("scene", "g1"), xml=xml)
+
+
+@pytest.fixture
+def menagerie_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> _Registry:
+    package = _Registry("mujoco_menagerie")
+    package.folder = tmp_path
+    for name in ("scene", "g1"):
+        (tmp_path / f"{name}.xml").write_text(PASSIVE)
+    monkeypatch.setitem(sys.modules, "mujoco_menagerie", package)
+    return package
+
+
+def test_a_robot_by_name(menagerie_package: _Registry) -> None:
+    folder = menagerie_package.folder
+    assert models.resolve("menagerie:unitree_g1") == folder / "scene.xml"
+    assert models.resolve("menagerie:unitree_g1/g1") == folder / "g1.xml"
+    assert models.resolve("menagerie:unitree_g1/g1", menagerie="elsewhere") == folder / "g1.xml"
+    assert sm.load("menagerie:unitree_g1").joint_names == ("swing",)
+    with pytest.raises(errors.UnknownNameError, match="Did you mean 'unitree_g1'"):
+        models.resolve("menagerie:unitre_g1")
+    with pytest.raises(errors.UnknownNameError, match="scene, g1"):
+        models.resolve("menagerie:unitree_g1/nope")
+
+
+def test_a_robot_by_name_without_a_network(
+    menagerie_package: _Registry, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    menagerie_package.here = False
+    asked: list[float] = []
+
+    def urlopen(_request: Any, timeout: float) -> Any:
+        asked.append(timeout)
+        raise urllib.error.URLError("Name or service not known")
+
+    monkeypatch.setattr(robot_packages.urllib.request, "urlopen", urlopen)
+    with pytest.raises(errors.ModelFileError, match=r"could not be downloaded .*not known"):
+        models.resolve("menagerie:unitree_g1")
+    assert asked == [5.0]  # and no further try
+
+
+@pytest.mark.parametrize(
+    ("name", "extra"),
+    [("menagerie:unitree_g1", "menagerie"), ("robot_descriptions:panda_description", "robots"),
+     ("panda_mj_description", "robots")],
+)  # fmt: skip
+def test_a_package_that_is_missing_is_named(
+    name: str, extra: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in ("mujoco_menagerie", "robot_descriptions"):
+        monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(errors.MissingEngineError, match=rf"statemachine-sim\[{extra}\]"):
+        models.resolve(name)
+
+
+def test_robot_descriptions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package = types.ModuleType("robot_descriptions")
+    vars(package).update(DESCRIPTIONS={"a_mj_description": None, "b_description": None})
+    one = types.ModuleType("robot_descriptions.a_mj_description")
+    vars(one).update(MJCF_PATH=str(tmp_path / "a.xml"), URDF_PATH="a.urdf")
+    two = types.ModuleType("robot_descriptions.b_description")
+    for module in (package, one, two):
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+    assert models.resolve("a_mj_description") == tmp_path / "a.xml"
+    assert models.resolve("robot_descriptions:a_mj_description") == tmp_path / "a.xml"
+    with pytest.raises(errors.ModelFileError, match="neither MJCF nor URDF"):
+        models.resolve("b_description")
+    with pytest.raises(errors.UnknownNameError, match="a_mj_description"):
+        models.resolve("c_description")
