@@ -470,7 +470,7 @@ def test_the_command(cli: Cli) -> None:
     done = cli("compare", "hold")
     assert (done.returncode, done.stderr) == (1, "")
     assert max(map(len, done.stdout.splitlines())) <= 80
-    for text in ("wrist_flex", "2.59", "DIFFER", "12-bit encoder", "✗"):
+    for text in ("wrist_flex", "2.58", "DIFFER", "12-bit encoder", "✗"):
         assert text in done.stdout
     if has_witness():
         assert "a third party was asked where gripperframe is" in " ".join(done.stdout.split())
