@@ -14,8 +14,11 @@ from functools import cache
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from ..interface import Array
+
+Faces = NDArray[np.int64]  # (m, 3) numbers of vertices
 
 _MESH, ELLIPSOID = int(mujoco.mjtGeom.mjGEOM_MESH), int(mujoco.mjtGeom.mjGEOM_ELLIPSOID)
 HULLS = (_MESH, ELLIPSOID)
@@ -54,7 +57,7 @@ def roughness(size: Array) -> float:
     return float((np.linalg.norm(ball, axis=1).max() - 1) * size.max())
 
 
-def _hull(raw: mujoco.MjModel, geom: int) -> tuple[Array, Array]:
+def _hull(raw: mujoco.MjModel, geom: int) -> tuple[Array, Faces]:
     """Vertices (n, 3) [m] and triangles (m, 3), which turn outwards."""
     if raw.geom_type[geom] == ELLIPSOID:
         ball, faces = _sphere()
@@ -73,7 +76,7 @@ def _hull(raw: mujoco.MjModel, geom: int) -> tuple[Array, Array]:
     return vertices[kept], places[faces]
 
 
-def _planes(vertices: Array, faces: Array) -> tuple[Array, Array]:
+def _planes(vertices: Array, faces: Faces) -> tuple[Array, Array]:
     """Outward normals (m, 3) of the faces, and how far along them the faces are [m]."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
@@ -84,7 +87,7 @@ def _planes(vertices: Array, faces: Array) -> tuple[Array, Array]:
     return normals, np.einsum("ij,ij->i", normals, a[~flat])
 
 
-def _inset(vertices: Array, faces: Array, distance: float) -> Array:
+def _inset(vertices: Array, faces: Faces, distance: float) -> Array:
     """A hull whose planes are a distance [m] further in, as well as its vertices allow."""
     normals, offsets = _planes(vertices, faces)
     scale = float(np.abs(vertices).max())
@@ -98,7 +101,7 @@ def _inset(vertices: Array, faces: Array, distance: float) -> Array:
 
 
 @cache
-def _sphere() -> tuple[Array, Array]:
+def _sphere() -> tuple[Array, Faces]:
     """Vertices (n, 3) and triangles (m, 3) about a unit sphere, as far in as out of it."""
     golden = (1 + 5**0.5) / 2
     corners = [[-1, golden, 0], [1, golden, 0], [-1, -golden, 0], [1, -golden, 0]]

@@ -86,7 +86,7 @@ class Plan:
 
     def _room_for_tips(self, root: int) -> bool:
         raw = self.raw
-        sites = np.count_nonzero(raw.body_rootid[raw.site_bodyid] == root)
+        sites = int(np.count_nonzero(raw.body_rootid[raw.site_bodyid] == root))
         return urdf.parts(raw, root) + sites <= MOST_PARTS
 
     def _hull_geoms(self, kind: str) -> frozenset[int]:
