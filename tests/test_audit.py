@@ -516,7 +516,7 @@ def test_a_restore_of_pybullet_that_depends_on_the_past(monkeypatch: pytest.Monk
     from statemachine.backends._bullet_world import World
 
     monkeypatch.setattr(World, "place", World.put)
-    found = asked("restore", "pybullet", only=("keyframe",))
+    found = asked("restore", "pybullet", only=("keyframe", "limp"))
     assert broken(found) == {("interface", STATE)}
     among = {each.into for each in found if not each.holds}
     assert among == {"each other"}

@@ -38,7 +38,8 @@ def obj(raw: mujoco.MjModel, geom: int, smaller: bool) -> str:
     vertices, faces = _hull(raw, geom)
     if smaller:
         vertices = _inset(vertices, faces, allowance(raw, geom))
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in (vertices + 0.0).tolist()]
+    # Rounded: the last bits of NumPy's sums are those of the processor.
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in (np.round(vertices, 10) + 0.0).tolist()]
     lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
     return "\n".join([*lines, ""])
 
@@ -48,7 +49,7 @@ def allowance(raw: mujoco.MjModel, geom: int) -> float:
     vertices, faces = _hull(raw, geom)
     normals, offsets = _planes(vertices, faces)
     widths = offsets - (vertices @ normals.T).min(axis=0)
-    return min(MARGIN, _THINNEST * float(widths.min()))
+    return min(MARGIN, round(_THINNEST * float(widths.min()), 10))
 
 
 def roughness(size: Array) -> float:

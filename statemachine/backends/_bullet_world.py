@@ -24,7 +24,7 @@ from ._bullet_plan import Plan, floats
 from ._bullet_surfaces import Solid
 from .compiled import gravity
 
-_PUSHES = 0.02  # of an overlap that a contact undoes in a step; the engine's own is 0.08
+_PUSHES = 0.03  # of an overlap that a contact undoes in a step; the engine's own is 0.08
 _AWAY = 1000.0  # [m] between bodies that a reset has set apart
 _TILT = 5e-4  # half the angle [rad] by which it tilts a free body to find its contacts
 _REST = math.sqrt(1 - 2 * _TILT**2)
@@ -353,4 +353,4 @@ class World:
 
 
 ENGINE_TIMESTEP = 1 / 240
-_FAST = 1e9  # [rad/s] PyBullet clamps joint speeds at 100 unless told otherwise
+_FAST = 1e12  # [rad/s] beyond HUGE: PyBullet clamps joint speeds at 100 unless told otherwise

@@ -63,7 +63,7 @@ def who_holds(name: str, run: Droop, first: Gravity) -> Text | Verdict:
         if max(abs(run.acceleration), *run.others) > _AT_REST:
             return Text(
                 f"{name}: {first.joint} stands, but the robot still moves: the {total:+.4f} {unit} "
-                "that are left over accelerate it (M·q̈). No balance is drawn."
+                "that are left over accelerate it (M·qacc). No balance is drawn."
             )
         return Verdict(f"{name}: the joint stands, yet its forces do not sum to zero", False)
     if abs(load) < _BALANCE:

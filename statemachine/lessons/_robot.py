@@ -104,7 +104,7 @@ def _short(value: float) -> float:
 
 
 @dataclass(frozen=True)
-class Tip:
+class ReadPlace:
     """The place on a robot that a lesson reads: a site, or a body where it has no sites.
 
     Attributes:
@@ -128,15 +128,15 @@ class Tip:
         return np.array(getattr(data, self.array)[self.number])
 
 
-def tip_of(model: Model, name: str) -> Tip:
+def tip_of(model: Model, name: str) -> ReadPlace:
     """A site by name, else a body of that name.
 
     Raises:
         UnknownNameError: There is neither.
     """
     if name not in model.site_names and name in model.body_names:
-        return Tip(name, "xpos", model.body_id(name))
-    return Tip(name, "site_xpos", model.site_id(name))
+        return ReadPlace(name, "xpos", model.body_id(name))
+    return ReadPlace(name, "site_xpos", model.site_id(name))
 
 
 def a_tip(name: str) -> str:

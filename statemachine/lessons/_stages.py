@@ -17,7 +17,7 @@ from ..scenarios.commands import hold_ctrl
 from ..scenarios.provenance import Provenance, provenance
 from ..scenarios.runs import Progress
 from ._bytes import read_derived, read_stored
-from ._robot import Tip, is_of_the_arm, the_tip
+from ._robot import ReadPlace, is_of_the_arm, the_tip
 from ._words import sentence, where
 
 _STORED = (*INPUTS, "time")
@@ -96,7 +96,7 @@ def look_at(data: Data) -> Look:
 
 def find_stages(
     model: Model,
-    tip: Tip,
+    tip: ReadPlace,
     place: int,
     value: float,
     forwarded: Sequence[Look],

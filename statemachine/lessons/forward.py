@@ -15,7 +15,7 @@ from ..interface.checks import as_scalar
 from ..page import Page, Question, Table, Text, Verdict
 from ..scenarios.provenance import Provenance, provenance
 from ..scenarios.runs import Progress, steps_in
-from ._robot import Tip, a_tip, coordinate, the_tip, tip_of, usual_tip, with_joint
+from ._robot import ReadPlace, a_tip, coordinate, the_tip, tip_of, usual_tip, with_joint
 from ._stages import (
     Look,
     OwnAnswer,
@@ -149,7 +149,7 @@ def _steps(model: Model, options: Mapping[str, Any]) -> int:
 class _Readings(CodeWatch):
     """The fingertip and the time at each print, and, if wanted, every array."""
 
-    def __init__(self, tip: Tip, arrays: bool) -> None:
+    def __init__(self, tip: ReadPlace, arrays: bool) -> None:
         self._tip, self._arrays = tip, arrays
         self.read: list[tuple[Array, float]] = []
         self.looks: list[Look] = []

@@ -200,7 +200,7 @@ def _figures(comparison: Comparison, witness: Witness | None) -> list[Block]:
             f"Compared at {comparison.moments} moments over {comparison.until:g} s. Settled: the "
             f"mean over {window(comparison)} (of forces: how far apart the means are). From: when "
             "first beyond tolerance. A quantity agrees if it never is; it settles if it is within "
-            "its tolerance at the end; otherwise it differs."
+            "its tolerance at the end, and DIFFERS otherwise."
         ),
         Table(
             ("quantities", "tolerance", "because"),

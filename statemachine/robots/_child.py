@@ -14,11 +14,11 @@ from .records import ExaminedModel
 
 def main(job: str, answer: str) -> None:
     """Examine, and keep what is known in the file `answer`, whole at any moment."""
-    asked = json.loads(Path(job).read_text("utf-8"))
+    asked = json.loads(Path(job).read_text(encoding="utf-8"))
 
     def tell(row: ExaminedModel, part: str) -> None:
         beside = Path(f"{answer}.new")
-        beside.write_text(json.dumps({"part": part, "row": asdict(row)}), "utf-8")
+        beside.write_text(json.dumps({"part": part, "row": asdict(row)}), encoding="utf-8")
         os.replace(beside, answer)
 
     row = ExaminedModel(asked["file"], asked["sha256"], asked["made_with"])

@@ -139,7 +139,7 @@ def _examined(
             "quick": quick,
             "seed": seed,
         }
-        job.write_text(json.dumps(asked), "utf-8")
+        job.write_text(json.dumps(asked), encoding="utf-8")
         child = f"{__package__}._child"
         outcome = sandbox.run(
             [sys.executable, "-P", "-m", child, os.fspath(job), os.fspath(answer)],
@@ -154,7 +154,7 @@ def _examined(
             return None
         part, row = "start", empty
         with suppress(OSError, ValueError):
-            told = json.loads(answer.read_text("utf-8"))
+            told = json.loads(answer.read_text(encoding="utf-8"))
             part, row = told["part"], tables.row_of(told["row"])
     how = "" if outcome.returncode == 0 and not part else _how_it_ended(outcome, seconds, part)
     return replace(

@@ -51,7 +51,7 @@ def read(target: Path) -> dict[tuple[str, str, str], ExaminedModel]:
     """
     try:
         if target.suffix.lower() == ".json":
-            plain = json.loads(target.read_text("utf-8"))
+            plain = json.loads(target.read_text(encoding="utf-8"))
         else:
             with target.open(newline="", encoding="utf-8-sig") as text:
                 plain = [_nested(row) for row in csv.DictReader(text)]

@@ -32,7 +32,7 @@ from ..parts import Setting
 BODY_DAMPING = float(np.float32(0.04))
 FRICTION = 0.5
 CONTACT_ERP = 0.08
-_FASTEST, _UNCLAMPED = 100.0, 1e9  # [rad/s]
+_FASTEST, _UNCLAMPED = 100.0, 1e12  # [rad/s]
 _WIDE = 1e6  # [rad or m] a range that no joint leaves
 _CLOSE = 1e-6  # relative: the engine reports some figures in single precision
 
