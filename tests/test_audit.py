@@ -146,7 +146,8 @@ def test_pybullet_forgets_its_contacts(of_pybullet: audit.Audit) -> None:
     engine, interface = of_pybullet.audited
     found = engine.conclusion
     assert found.suffice == ()
-    assert set(found.agree) == {"saveState + targets", "taken apart + targets"}
+    # Of a held box even two restores of a saved world part.
+    assert set(found.agree) == {"taken apart + targets"}
     assert set(found.in_contact) >= {"keyframe"}
     assert "motion" not in found.in_contact
     for way in ("written", "saveState", "saveBullet"):
