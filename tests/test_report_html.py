@@ -917,7 +917,7 @@ def test_what_a_screen_reader_hears(page: Path) -> None:
             '- region "How far apart, over time"',
             '- columnheader "largest"',
             '- rowheader "wrist_flex"',
-            'img "wrist_flex, difference over time: at most 2.58° at 0.370 s',
+            'img "wrist_flex, difference over time: at most 2.58° at 0.355 s',
             '- img "Both runs in three dimensions',
         ):
             assert part in heard, part

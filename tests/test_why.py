@@ -661,7 +661,7 @@ def test_the_parts_are_said_to_be_of_one_order(attributions: Any) -> None:
     said = " ".join(report.conclusion(found))
     assert "In another order the parts are others: servo law" in said
     assert "and armature, dry friction and joint limits with it" in said
-    assert "; timestep 8.4 % if it comes first, -0.1 % if last" in said
+    assert "; timestep 8.4 % if it comes first, -3e-2 % if last" in said
     # Where one thing explains it all, there is no order.
     emulated = report.conclusion(attributions["hold", "model"])
     assert "order" not in " ".join(emulated)
