@@ -348,3 +348,18 @@ def test_versions_and_settings_are_part_of_the_table(monkeypatch: pytest.MonkeyP
     assert quick.endswith(", quick")
     assert "seed 1" in whole
     assert "mujoco" in whole
+
+
+def test_a_file_that_the_engine_alone_cannot_open_is_no_contradiction(tmp_path: Path) -> None:
+    """Its mesh is in a ROS package, which the interface finds and MuJoCo does not look for."""
+    inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+    (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\n")
+    (tmp_path / "r.urdf").write_text(
+        '<robot name="r"><link name="base"/><link name="arm"><inertial><mass value="1"/>'
+        f'{inertia}</inertial><collision><geometry><mesh filename="package://r/m.obj"/></geometry>'
+        '</collision></link><joint name="j" type="continuous"><parent link="base"/>'
+        '<child link="arm"/></joint></robot>'
+    )
+    survey = examine_all(find([tmp_path]), quick=True)
+    assert survey.models[0].backends["mujoco"].equals_engine is None
+    assert not survey.wrong

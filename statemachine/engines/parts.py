@@ -186,13 +186,16 @@ class PlainPart(Protocol):
     An engine has it where the interface promises the engine's own bits.
     """
 
-    def run(self, path: Path, commands: Array, keyframe: int | None) -> Array:
+    def run(self, path: Path, commands: Array, keyframe: int | None) -> Array | None:
         """Positions and velocities (n + 1, nq + nv) at the start and after each step.
 
         Args:
             path: The file.
             commands: (n, nu) ctrl of each step.
             keyframe: Where to start; None for the default state.
+
+        Returns:
+            None where the engine alone cannot open the file.
         """
         ...
 

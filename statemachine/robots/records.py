@@ -65,7 +65,8 @@ class BackendRow:
         features: What of the model is refused, each in a few words.
         warnings: What was told when it was loaded, and the default backend did not tell.
         warnings_without: The same with contacts off.
-        equals_engine: Whether a run has the bits of the engine without us; None if not asked.
+        equals_engine: Whether a run has the bits of the engine without us; None if not
+            asked, and where the engine alone cannot open the file.
         restores: Whether two futures of one State are the same bits, and, where the backend
             promises it, those of the run itself; None if not asked.
         without_contacts: Gap to the default backend where nothing touches anything.

@@ -10,19 +10,25 @@ from ...installed import require
 from ...interface import Array
 
 
-def run(path: Path, commands: Array, keyframe: int | None) -> Array:
+def run(path: Path, commands: Array, keyframe: int | None) -> Array | None:
     """Positions and velocities (n + 1, nq + nv) at the start and after each step.
 
     Args:
         path: The file.
         commands: (n, nu) ctrl of each step.
         keyframe: Where to start; None for the default state.
+
+    Returns:
+        None where MuJoCo alone cannot open the file: it looks for no ROS packages.
     """
     mujoco = require("mujoco")
     open_file = mujoco.MjModel.from_xml_path
     if path.suffix.lower() == ".mjb":
         open_file = mujoco.MjModel.from_binary_path
-    model = open_file(str(path))
+    try:
+        model = open_file(str(path))
+    except ValueError:
+        return None
     data = mujoco.MjData(model)
     if keyframe is not None:
         mujoco.mj_resetDataKeyframe(model, data, keyframe)
