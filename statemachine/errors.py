@@ -87,6 +87,7 @@ class UnsupportedError(StateMachineError, NotImplementedError):
     backend: str
     feature: str
     reason: str
+    features: tuple[str, ...] = ()
 
 
 class TraceError(StateMachineError, ValueError):

@@ -27,29 +27,32 @@ _THINNEST = 0.25  # a hull is made smaller by this part of its smallest width at
 _FINENESS = 3  # an icosahedron is divided so often; 642 vertices
 
 
-def obj(raw: mujoco.MjModel, geom: int, smaller: bool) -> str:
-    """OBJ of the hull of a geom, in the geom's own frame [m].
+class Hull:
+    """The hull of a mesh or an ellipsoid, in the geom's own frame.
 
-    Args:
-        raw: The compiled model.
-        geom: A mesh or an ellipsoid.
-        smaller: Whether to take PyBullet's margin off.
+    Attributes:
+        allowance: How much smaller it can be made [m]: the margin, or what its thickness allows.
     """
-    vertices, faces = _hull(raw, geom)
-    if smaller:
-        vertices = _inset(vertices, faces, allowance(raw, geom))
-    # Rounded: the last bits of NumPy's sums are those of the processor.
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in (np.round(vertices, 10) + 0.0).tolist()]
-    lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
-    return "\n".join([*lines, ""])
 
+    def __init__(self, raw: mujoco.MjModel, geom: int) -> None:
+        self._vertices, self._faces = _solid(raw, geom)
+        self._planes = normals, offsets = _planes(self._vertices, self._faces)
+        widths = offsets - (self._vertices @ normals.T).min(axis=0)
+        self.allowance = min(MARGIN, round(_THINNEST * float(widths.min()), 10))
 
-def allowance(raw: mujoco.MjModel, geom: int) -> float:
-    """How much smaller a hull can be made [m]: the margin, or what its thickness allows."""
-    vertices, faces = _hull(raw, geom)
-    normals, offsets = _planes(vertices, faces)
-    widths = offsets - (vertices @ normals.T).min(axis=0)
-    return min(MARGIN, round(_THINNEST * float(widths.min()), 10))
+    def obj(self, smaller: bool) -> str:
+        """OBJ of it [m].
+
+        Args:
+            smaller: Whether to take PyBullet's margin off.
+        """
+        vertices = self._vertices
+        if smaller:
+            vertices = _inset(vertices, *self._planes, self.allowance)
+        # Rounded: the last bits of NumPy's sums are those of the processor.
+        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in (np.round(vertices, 10) + 0.0).tolist()]
+        lines += [f"f {a} {b} {c}" for a, b, c in (self._faces + 1).tolist()]
+        return "\n".join([*lines, ""])
 
 
 def roughness(size: Array) -> float:
@@ -58,7 +61,7 @@ def roughness(size: Array) -> float:
     return float((np.linalg.norm(ball, axis=1).max() - 1) * size.max())
 
 
-def _hull(raw: mujoco.MjModel, geom: int) -> tuple[Array, Faces]:
+def _solid(raw: mujoco.MjModel, geom: int) -> tuple[Array, Faces]:
     """Vertices (n, 3) [m] and triangles (m, 3), which turn outwards."""
     if raw.geom_type[geom] == ELLIPSOID:
         ball, faces = _sphere()
@@ -88,9 +91,8 @@ def _planes(vertices: Array, faces: Faces) -> tuple[Array, Array]:
     return normals, np.einsum("ij,ij->i", normals, a[~flat])
 
 
-def _inset(vertices: Array, faces: Faces, distance: float) -> Array:
-    """A hull whose planes are a distance [m] further in, as well as its vertices allow."""
-    normals, offsets = _planes(vertices, faces)
+def _inset(vertices: Array, normals: Array, offsets: Array, distance: float) -> Array:
+    """Vertices of a hull whose planes are a distance [m] further in, as well as they allow."""
     scale = float(np.abs(vertices).max())
     moved = vertices.copy()
     for k, vertex in enumerate(vertices):

@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 
 from ..interface import Array
-from . import _bullet_hulls as hulls
 from . import _bullet_urdf as urdf
+from ._bullet_hulls import HULLS, Hull
 from ._bullet_surfaces import Surfaces
 
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
@@ -36,7 +36,7 @@ class Plan:
         self.surfaces = Surfaces(raw)
         self.names = urdf.Names(raw)
         self._texts: dict[tuple[int, str], str] = {}
-        self._hulls: dict[tuple[int, str], dict[str, str]] = {}
+        self._files: dict[tuple[int, str], dict[str, str]] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Plan, (self.raw,)
@@ -74,15 +74,20 @@ class Plan:
 
     def beside(self, root: int, kind: str) -> dict[str, str]:
         """The files that the URDF of a tree names: the hulls of its geoms."""
-        if (root, kind) not in self._hulls:
-            text, raw = self.described(root, kind), self.raw
-            names = {urdf.hull_file(geom): geom for geom in self._hull_geoms(kind)}
-            self._hulls[root, kind] = {
-                name: hulls.obj(raw, geom, kind == "stepped")
-                for name, geom in names.items()
-                if f'"{name}"' in text
+        if (root, kind) not in self._files:
+            owner = self.raw.body_rootid[self.raw.geom_bodyid]
+            self._files[root, kind] = {
+                urdf.hull_file(geom): self.hulls[geom].obj(smaller=kind == "stepped")
+                for geom in self._hull_geoms(kind)
+                if owner[geom] == root
             }
-        return self._hulls[root, kind]
+        return self._files[root, kind]
+
+    @cached_property
+    def hulls(self) -> dict[int, Hull]:
+        """Hulls of the geoms that touch and are meshes or ellipsoids."""
+        geoms = (geom for solid in self.surfaces.solids for geom in solid.geoms)
+        return {g: Hull(self.raw, g) for g in geoms if int(self.raw.geom_type[g]) in HULLS}
 
     def _room_for_tips(self, root: int) -> bool:
         raw = self.raw
@@ -90,15 +95,14 @@ class Plan:
         return urdf.parts(raw, root) + sites <= MOST_PARTS
 
     def _hull_geoms(self, kind: str) -> frozenset[int]:
-        """Geoms that touch and are read as hulls; as it comes, meshes come from their files."""
-        raw, found = self.raw, set[int]()
-        for solid in self.surfaces.solids:
-            for geom in solid.geoms:
-                if int(raw.geom_type[geom]) in hulls.HULLS:
-                    mesh = int(raw.geom_dataid[geom])
-                    if kind == "stepped" or mesh < 0 or raw.mesh_pathadr[mesh] < 0:
-                        found.add(geom)
-        return frozenset(found)
+        """Geoms that are read as hulls; as it comes, meshes come from their files."""
+        if kind != "engine":
+            return frozenset(self.hulls if kind == "stepped" else ())
+        raw = self.raw
+        meshes = {geom: int(raw.geom_dataid[geom]) for geom in self.hulls}
+        return frozenset(
+            geom for geom, mesh in meshes.items() if mesh < 0 or raw.mesh_pathadr[mesh] < 0
+        )
 
     def _write(self, root: int, kind: str) -> str:
         dialect = urdf.Dialect(

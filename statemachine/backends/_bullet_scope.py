@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import UnsupportedError
 from ..interface import Array, JointType
-from ._bullet_hulls import ELLIPSOID, HULLS, MARGIN, allowance, roughness
+from ._bullet_hulls import ELLIPSOID, HULLS, MARGIN, roughness
 from ._bullet_plan import MOST_PARTS, Plan
 from ._bullet_surfaces import NO_CONTACT, PLANE
 from ._bullet_urdf import axes, parts, tree
@@ -75,8 +75,9 @@ def _parts(raw: mujoco.MjModel) -> Found:
         yield "fluid", "density or viscosity is not zero"
 
 
-def ignored(raw: mujoco.MjModel) -> list[str]:
+def ignored(plan: Plan) -> list[str]:
     """Settings of a model that have no counterpart, and do not make it another robot."""
+    raw = plan.raw
     override, sleep = mujoco.mjtEnableBit.mjENBL_OVERRIDE, mujoco.mjtEnableBit.mjENBL_SLEEP
     integrator = {
         int(mujoco.mjtIntegrator.mjINT_IMPLICIT): "implicit acts as implicitfast",
@@ -103,27 +104,26 @@ def ignored(raw: mujoco.MjModel) -> list[str]:
                 f"{int(np.count_nonzero(margins))} geoms (the largest: "
                 f"{1e3 * margins[largest]:.3g} mm, {_name(raw, 'geom', largest)})"
             )
-        found += _hull_differences(raw, touching)
+        found += _hull_differences(plan)
         belts = np.sqrt((raw.geom_surfacevel[:, :3] ** 2).sum(axis=1)) * touching
         if belts.any():
             found.append(f"surfacevel has no effect ({_list(raw, 'geom', belts)})")
     return found
 
 
-def _hull_differences(raw: mujoco.MjModel, touching: Array) -> list[str]:
+def _hull_differences(plan: Plan) -> list[str]:
     """Where a hull is not its shape: ellipsoids, and what is thinner than the engine's margin."""
-    found = []
-    rough = np.where(raw.geom_type == ELLIPSOID, raw.geom_size.max(axis=1), 0.0) * touching
-    if rough.any():
-        largest = int(rough.argmax())
+    raw, found = plan.raw, []
+    eggs = [geom for geom in plan.hulls if int(raw.geom_type[geom]) == ELLIPSOID]
+    if eggs:
+        largest = max(eggs, key=lambda geom: raw.geom_size[geom].max())
         size = 1e3 * roughness(raw.geom_size[largest])
         found.append(
             f"ellipsoids touch as hulls, which are up to {size:.2g} mm off "
             f"({_name(raw, 'geom', largest)})"
         )
-    solid = [int(g) for g in np.flatnonzero(touching) if int(raw.geom_type[g]) in HULLS]
-    excess = {geom: MARGIN - allowance(raw, geom) for geom in solid}
-    thin = [geom for geom in solid if excess[geom] > 1e-6]
+    excess = {geom: MARGIN - hull.allowance for geom, hull in plan.hulls.items()}
+    thin = [geom for geom in excess if excess[geom] > 1e-6]
     if thin:
         worst = max(thin, key=lambda geom: excess[geom])
         found.append(

@@ -180,7 +180,7 @@ class World:
                 link,
                 linearDamping=0,
                 angularDamping=0,
-                maxJointVelocity=_FAST,
+                maxJointVelocity=UNCLAMPED,
                 physicsClientId=self.client,
             )
         for index in tree.joints:  # each comes with a motor that holds it
@@ -353,4 +353,4 @@ class World:
 
 
 ENGINE_TIMESTEP = 1 / 240
-_FAST = 1e12  # [rad/s] beyond HUGE: PyBullet clamps joint speeds at 100 unless told otherwise
+UNCLAMPED = 1e12  # [rad/s] beyond HUGE: PyBullet clamps joint speeds at 100 unless told otherwise

@@ -304,14 +304,11 @@ def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:
     starts = [start for _, start in model._quaternions]
     if not starts:
         return advance
-    first, others = starts[0], starts[1:]
 
     def checked(nstep: int = 1) -> None:
         # MuJoCo takes a zero quaternion for the identity without a word. One whose first
         # number is not zero is none, which is the cheapest look; others are looked at again.
-        if low < qpos[first] < high:
-            model._check_quaternions(raw.qpos)
-        for start in others:
+        for start in starts:
             if low < qpos[start] < high:
                 model._check_quaternions(raw.qpos)
         advance(nstep)

@@ -132,7 +132,7 @@ def load(
     check(plan, "pybullet")
     model = PybulletModel(plan, Path(path), substeps, defaults)
     World(plan, model._shared.kind).close()  # what PyBullet cannot read shows now
-    differences = [*ignored(raw), *plan.surfaces.differences]
+    differences = [*ignored(plan), *plan.surfaces.differences]
     if differences and defaults == "model":
         warnings.warn(f"PyBullet: {'; '.join(differences)}", EngineWarning, stacklevel=3)
     return model

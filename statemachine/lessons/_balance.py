@@ -7,7 +7,7 @@ import numpy as np
 from ..comparison.text import position, signed
 from ..page import Table, Text, Verdict
 from ..scenarios.robot import ARM
-from ._fall import Droop, Gravity
+from ._fall import BALANCE, Droop, Gravity
 from ._robot import robot_word
 
 _PARTS = (
@@ -19,7 +19,6 @@ _PARTS = (
     ("joint limit", "limit"),
     ("equality", "equality"),
 )
-_BALANCE = 1e-3  # N·m or N; a sum below it is zero
 _SLOW = 0.01  # rad/s or m/s; a joint below it is at rest or creeps
 _STARTS = 0.02  # rad/s² or m/s²; a joint beyond it is about to move
 _AT_REST = 1e-4  # the same; below it nothing of the robot moves
@@ -59,14 +58,14 @@ def who_holds(name: str, run: Droop, first: Gravity) -> Text | Verdict:
         return Text(f"{name}: this engine does not tell all the parts, so no sum is drawn.")
     unit = unit_of(first)
     largest_part = max(abs(force(run, part) or 0.0) for _, part in _PARTS)
-    if abs(total) > max(_BALANCE, _SHARE * largest_part):
+    if abs(total) > max(BALANCE, _SHARE * largest_part):
         if max(abs(run.acceleration), *run.others) > _AT_REST:
             return Text(
                 f"{name}: {first.joint} stands, but the robot still moves: the {total:+.4f} {unit} "
                 "that are left over accelerate it (M·qacc). No balance is drawn."
             )
         return Verdict(f"{name}: the joint stands, yet its forces do not sum to zero", False)
-    if abs(load) < _BALANCE:
+    if abs(load) < BALANCE:
         return Verdict(f"{name}: no load, so nothing has to hold {first.joint}", True)
     against = {
         label: abs(value)

@@ -19,7 +19,7 @@ from ..scenarios.runs import Progress, steps_in
 from ._robot import coordinate
 from ._words import where
 
-_BALANCE = 1e-3  # N·m or N; a sum below it is zero
+BALANCE = 1e-3  # N·m or N; a sum below it is zero
 _CREEP = 0.05  # of the way; a joint that goes on by more has not settled
 _FURTHER = 0.02  # rad or m; less is not worth a cause
 
@@ -348,7 +348,7 @@ def _caught(prefix: str, result: Gravity, floor: Droop, free: Droop) -> Text | V
         f"{prefix}it is the contact that catches {result.joint}, not damping or friction: without "
         f"contacts it runs on to {position(alone, slide)}"
     )
-    if abs(free.forces.limit or 0.0) > _BALANCE:
+    if abs(free.forces.limit or 0.0) > BALANCE:
         unit = "N" if slide else "N·m"
         text += f", where its limit stops it with {abs(free.forces.limit or 0):.4f} {unit}"
     if abs(float(floor.position[-1]) - then) > abs(then) * _CREEP:

@@ -10,13 +10,13 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..interface import Array, Data, JointType, Model, make_data
-from ..scenarios.commands import home, load_at_start
-from ..scenarios.robot import ARM, carried_by, is_the_arm, scalar_joint
+from ..scenarios.commands import load_at_start, start_keyframe
+from ..scenarios.robot import ARM, carried_by, scalar_joint
 
 USUAL = "shoulder_lift"  # the arm's joint that lessons are about
 _VALUE = 0.8  # rad
 _SHIFT = 0.05  # m; of a slide without a range, or up
-_FINGERTIP = "gripperframe"
+FINGERTIP = "gripperframe"
 
 
 @dataclass(frozen=True)
@@ -141,18 +141,18 @@ def tip_of(model: Model, name: str) -> ReadPlace:
 
 def a_tip(name: str) -> str:
     """What the place of this name is called: the arm's is its fingertip."""
-    return "fingertip" if name == _FINGERTIP else name
+    return "fingertip" if name == FINGERTIP else name
 
 
 def the_tip(name: str) -> str:
     """The same, in a sentence."""
-    return "the fingertip" if name == _FINGERTIP else name
+    return "the fingertip" if name == FINGERTIP else name
 
 
 def usual_tip(model: Model, joint: str) -> str:
     """The fingertip if there is one; else the last site or body that a joint carries."""
-    if _FINGERTIP in model.site_names:
-        return _FINGERTIP
+    if FINGERTIP in model.site_names:
+        return FINGERTIP
     carried = carried_by(model, [int(model.jnt_bodyid[model.joint_id(joint)])])
     bodies = list(enumerate(model.body_names))[1:]  # without the world
     sites = list(zip(model.site_bodyid.tolist(), model.site_names, strict=True))
@@ -176,7 +176,7 @@ def with_joint(model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
 
 def start_line(model: Model, name: str) -> str:
     """What is typed after make_data of a Model of some name, so that it starts at home."""
-    key = None if is_the_arm(model) else home(model)
+    key = start_keyframe(model)
     return f"sm.reset({name}, data, keyframe={key!r})\n" if key else ""
 
 

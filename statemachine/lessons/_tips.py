@@ -12,8 +12,8 @@ from ..interface import Array, JointType, Model, make_data
 from ..kinematics import Kind
 from ..scenarios.robot import carried_by
 from ..witness import labels
+from ._robot import FINGERTIP
 
-_USUAL = "gripperframe"
 _WIDE = 100.0  # a range beyond this [m or rad] is no limit
 
 
@@ -49,7 +49,7 @@ def tips_of(model: Model, name: str | None) -> list[Tip]:
     """
     sites = labels("site", model.site_names)
     bodies = labels("body", model.body_names)
-    wanted = _USUAL if name is None and _USUAL in sites else name
+    wanted = FINGERTIP if name is None and FINGERTIP in sites else name
     if wanted is None:
         parents = set(model.body_parentid.tolist())
         moved = carried_by(model, model.jnt_bodyid.tolist())

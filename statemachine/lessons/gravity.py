@@ -16,19 +16,18 @@ from ..errors import BadInputError, DivergedError, UnsupportedError
 from ..interface import Data, JointType, Model, make_data, reset, step
 from ..page import Page, Question, Table, Text
 from ..scenarios import SCENARIOS, drives
-from ..scenarios.commands import home, is_servo, load_at_start
+from ..scenarios.commands import is_servo, load_at_start, start_keyframe
 from ..scenarios.provenance import provenance
 from ..scenarios.robot import ARM, has_floor, is_the_arm
 from ..scenarios.runs import Progress, cost_of_a_second, part_of, steps_in
 from ._balance import engine_alone, force, parts_of, unit_of, who_holds
-from ._fall import Droop, Falling, Gravity, longer, longer_apart, milestones
+from ._fall import BALANCE, Droop, Falling, Gravity, longer, longer_apart, milestones
 from ._robot import USUAL, coordinate, start_line, with_joint
 from ._words import differences, emulation, page_of, spans, typed, where
 from .records import Session
 from .session import CodeRun, CodeWatch
 
 _OURS = ("position servo", "joint damping", "dry friction", "joint limits", "forces by part")
-_BALANCE = 1e-3  # N·m or N; a sum below it is zero
 _FALLEN = 30  # degrees
 # The first that is paid is taken; each is a row of the longer ones.
 _SECONDS, _LONGER = (4.0, 2.0, 1.0), (100.0, 50.0, 20.0, 10.0, 4.0)
@@ -42,12 +41,12 @@ def fit(model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
     values = with_joint(model, options)
     dof = coordinate(model, values["joint"]).dof
     usual = options["joint"] is not None or values["joint"] == USUAL
-    values["chosen"] = not usual and bool(load_at_start(model)[dof] > _BALANCE)
-    slow = 0.0 if is_the_arm(model) else cost_of_a_second(model)
-    for name, usual, share in (("seconds", _SECONDS, 2), ("longer", _LONGER, 2)):
-        if values[name] is None:
-            affordable = [t for t in usual if share * t * slow <= _PATIENCE]
-            values[name] = affordable[0] if affordable else usual[-1]
+    values["chosen"] = not usual and bool(load_at_start(model)[dof] > BALANCE)
+    open_ones = {"seconds": _SECONDS, "longer": _LONGER}
+    open_ones = {name: times for name, times in open_ones.items() if values[name] is None}
+    slow = 0.0 if is_the_arm(model) or not open_ones else cost_of_a_second(model)
+    for name, times in open_ones.items():  # there are two runs of each
+        values[name] = next((time for time in times if 2 * time * slow <= _PATIENCE), times[-1])
     return values
 
 
@@ -95,7 +94,7 @@ for variant in (model, limp):
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Gravity:
     """Watch both runs; then the servos off for longer, with and without anything to touch."""
     model, joint, seconds = play.model, options["joint"], options["seconds"]
-    at, arm = coordinate(model, joint), is_the_arm(model)
+    at = coordinate(model, joint)
     limp = model.replace(**SCENARIOS["gravity"].options)
     runs = {}
     if options["longer"]:
@@ -123,7 +122,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Gravit
         slide=at.slide,
         servo=bool(is_servo(model)[driven].any()),
         drives=drives(model) if model.nu else "",
-        keyframe=None if arm else home(model),
+        keyframe=start_keyframe(model),
         servos_on=ends[0],
         servos_off=ends[-1],
         longer=fallen,
@@ -150,8 +149,7 @@ class _Both(CodeWatch):
 
 def _left_alone(model: Model, joint: str, seconds: float, progress: Progress) -> Droop:
     with make_data(model) as data:
-        if not is_the_arm(model):
-            reset(model, data, home(model))
+        reset(model, data, start_keyframe(model))
         fall = Falling(data, joint, seconds, progress)
         try:
             for _ in range(steps_in(model, seconds)):

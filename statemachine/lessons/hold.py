@@ -11,9 +11,9 @@ from ..comparison.text import NONE
 from ..errors import BadInputError, DivergedError, UnsupportedError
 from ..interface import Array, Data, Ints, JointType, Model, forward, make_data, reset, step
 from ..page import Page, Table, Text
-from ..scenarios.commands import hold_ctrl, home, is_servo
+from ..scenarios.commands import hold_ctrl, is_servo, start_keyframe
 from ..scenarios.provenance import provenance
-from ..scenarios.robot import ARM, command, is_the_arm, moved_by_actuators, touching
+from ..scenarios.robot import ARM, command, moved_by_actuators, touching
 from ..scenarios.runs import Progress, steps_in
 from ._hold import Hold, apart_freely, apart_until, at, at_end, gap, question, row, traces
 from ._robot import Coordinate, coordinate, start_line
@@ -23,10 +23,8 @@ from .session import CodeRun, CodeWatch
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
 _PRINTED = (0.1, 0.2, 0.3, 0.4)  # s; and at the end
-_THERE = np.radians(0.1)  # rad, or m
 _SHOWN = 12  # numbers of qpos that fit in a line
 _NUMBERS = {1: "One number", 6: "Six numbers"}
-_STILL = 1e-6  # rad/s or m/s
 
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
@@ -80,7 +78,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Hold:
         slides=tuple(at.slide for at, _ in driven.values()),
         servo=bool(is_servo(model).all()),
         actuators=model.nu,
-        keyframe=None if is_the_arm(model) else home(model),
+        keyframe=start_keyframe(model),
         provenance=provenance(model),
     )
 
@@ -152,8 +150,7 @@ def _freely(model: Model, ctrl: Array, steps: int, addresses: Ints) -> Array | N
     except UnsupportedError:
         return None
     with make_data(alone) as data:
-        if not is_the_arm(model):
-            reset(alone, data, home(model))
+        reset(alone, data, start_keyframe(model))
         data.ctrl = ctrl
         try:
             step(alone, data, steps)
@@ -203,7 +200,8 @@ def page(results: Mapping[str, Hold], session: Session) -> Page:
                 f"range: the servo takes {at(first, first.goal[k], k)} for it."
             )
         )
-    if first.told():
+    told = first.told()
+    if told:
         blocks.append(
             Table(
                 ("time", *results),
@@ -211,7 +209,6 @@ def page(results: Mapping[str, Hold], session: Session) -> Page:
                 title="The worst joint on the way: how far from its goal",
             )
         )
-    told = first.told()
     begins = len(told) < len(first.joints)  # of what has no goal the start is of interest
     blocks.append(
         Table(
@@ -220,8 +217,7 @@ def page(results: Mapping[str, Hold], session: Session) -> Page:
                 (
                     joint,
                     *[at(first, first.qpos[0, k], k)] * begins,
-                    *[at(first, first.goal[k], k) if k in first.told() else NONE]
-                    * bool(first.told()),
+                    *[at(first, first.goal[k], k) if k in told else NONE] * bool(told),
                     *(at(result, result.qpos[-1, k], k) for result in results.values()),
                 )
                 for k, joint in enumerate(first.joints)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from ..comparison.text import count, figure, listed, rough, sentence
 from ..page import Block, Page, Table, Text, Verdict
-from ..robots.examine import SCENARIOS
+from ..robots.examine import TRIED
 from ..robots.gaps import STEPS
 from ..robots.records import RUNS, TOLERANCE, BackendRow, ExaminedModel, RunGap, Survey
 
@@ -148,7 +148,7 @@ def _legend(survey: Survey, tried: bool) -> str:
     )
     if not tried:
         return text
-    return f"{text} runs: of {', '.join(SCENARIOS)}, how many run on {listed(backends)}."
+    return f"{text} runs: of {', '.join(TRIED)}, how many run on {listed(backends)}."
 
 
 def _sums(survey: Survey, others: Sequence[str]) -> Iterator[str]:
@@ -221,7 +221,7 @@ def _one(survey: Survey, row: ExaminedModel) -> Page:
         ("gap without contacts", [_whole(row.backends[n].without_contacts) for n in names]),
         ("gap with contacts", [_whole(row.backends[n].with_contacts) for n in names]),
     ]
-    for name in SCENARIOS:
+    for name in TRIED:
         cells = [row.backends[n].scenarios.get(name) for n in names]
         marks = [_NOTHING if cell is None else "✓" if cell == RUNS else "no" for cell in cells]
         lines.append((f"scenario {name}", marks))

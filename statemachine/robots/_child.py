@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 from dataclasses import asdict
 from pathlib import Path
 
+from ..traces.whole import replace_text
 from .examine import examine
 from .records import ExaminedModel
 
@@ -17,9 +17,7 @@ def main(job: str, answer: str) -> None:
     asked = json.loads(Path(job).read_text(encoding="utf-8"))
 
     def tell(row: ExaminedModel, part: str) -> None:
-        beside = Path(f"{answer}.new")
-        beside.write_text(json.dumps({"part": part, "row": asdict(row)}), encoding="utf-8")
-        os.replace(beside, answer)
+        replace_text(Path(answer), json.dumps({"part": part, "row": asdict(row)}))
 
     row = ExaminedModel(asked["file"], asked["sha256"], asked["made_with"])
     tell(examine(Path(asked["path"]), row, asked["quick"], asked["seed"], tell), "")

@@ -36,7 +36,7 @@ from . import gaps
 from .places import witness_row
 from .records import RUNS, BackendRow, ExaminedModel
 
-SCENARIOS = ("hold", "gravity", "droop", "waves")
+TRIED = ("hold", "gravity", "droop", "waves")
 _SHORT = 40  # steps of a scenario
 _SAME = 200  # steps of the run that is compared with the engine without us
 _FUTURE = 60  # steps of each future of a State
@@ -83,7 +83,7 @@ class _Examination:
         self._gaps()
         if not quick:
             for backend, model in self._any().items():
-                for name in SCENARIOS:
+                for name in TRIED:
                     with self._part(f"scenario {name}, {backend}"):
                         known = self.row.backends[backend].scenarios
                         self._put(backend, scenarios={**known, name: self._scenario(name, model)})
@@ -244,5 +244,5 @@ class _Examination:
 def _features(error: StateMachineError) -> tuple[str, ...]:
     """What of a model is refused, in a few words each."""
     if isinstance(error, UnsupportedError):
-        return tuple(getattr(error, "features", ())) or (error.feature,)
+        return error.features or (error.feature,)
     return ("not read",) if isinstance(error, ModelError) else (type(error).__name__,)

@@ -75,8 +75,9 @@ def examine_all(
         if known is not None and not (known.ended and known.limit != seconds):
             rows[model.name] = replace(known, part_of=model.part_of)
         else:
+            empty = ExaminedModel(model.name, model.sha256, made_with)
             work[model.name] = partial(
-                _examined, model, quick=quick, seconds=seconds, seed=seed, stop=stop
+                _examined, model, empty, quick=quick, seconds=seconds, seed=seed, stop=stop
             )
 
     def in_order() -> list[ExaminedModel]:
@@ -114,9 +115,15 @@ def _made_with(quick: bool, seed: int) -> str:
 
 
 def _examined(
-    model: ModelFile, *, quick: bool, seconds: float, seed: int, stop: threading.Event
+    model: ModelFile,
+    empty: ExaminedModel,
+    *,
+    quick: bool,
+    seconds: float,
+    seed: int,
+    stop: threading.Event,
 ) -> ExaminedModel | None:
-    """A model's row, from a process of its own; None if it was stopped."""
+    """A model's row, from a process of its own, which fills an empty one; None if stopped."""
     if stop.is_set():
         return None
     package = Path(__file__).resolve().parents[2]
@@ -126,15 +133,13 @@ def _examined(
         **dict.fromkeys(_ALONE, "1"),
         "PYTHONPATH": os.pathsep.join(paths),
     }
-    made_with = _made_with(quick, seed)
-    empty = ExaminedModel(model.name, model.sha256, made_with)
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="statemachine-", ignore_cleanup_errors=True) as folder:
         job, answer = Path(folder) / "job", Path(folder) / "answer"
         asked = {
             "file": model.name,
             "sha256": model.sha256,
-            "made_with": made_with,
+            "made_with": empty.made_with,
             "path": os.fspath(model.path),
             "quick": quick,
             "seed": seed,

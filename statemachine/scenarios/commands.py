@@ -25,6 +25,11 @@ def home(model: Model) -> str | None:
     return "home" if any(frame.name == "home" for frame in model.keyframes) else None
 
 
+def start_keyframe(model: Model) -> str | None:
+    """Where a lesson starts: the arm in its default state, another robot at home."""
+    return None if is_the_arm(model) else home(model)
+
+
 def is_servo(model: Model) -> NDArray[np.bool_]:
     """(nu,) whether each number of ctrl is the target of a position servo on a hinge or slide."""
     return np.isfinite(model.actuator_kp) & _on_scalar_joint(model)

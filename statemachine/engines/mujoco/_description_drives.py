@@ -24,13 +24,22 @@ def effort(raw: Any, joint: int) -> float | None:
         for i in range(raw.nactuator)
         if raw.actuator_trntype[i] in (0, 1) and raw.actuator_trnid[i, 0] == joint
     ]
-    most = sum(
-        _most(raw, i) * abs(float(raw.actuator_gear[raw.actuator_outadr[i], 0])) for i in drives
-    )
+    most = sum(_most(raw, i) * abs(_gear(raw, i)) for i in drives)
     if raw.jnt_actfrclimited[joint]:
         bound = float(np.abs(raw.jnt_actfrcrange[joint]).max())
         return min(most, bound) if drives else bound
     return most if drives else None
+
+
+def _gear(raw: Any, i: int) -> float:
+    """That of an actuator's first output."""
+    return float(raw.actuator_gear[raw.actuator_outadr[i], 0])
+
+
+def _controls(raw: Any, i: int) -> Range | None:
+    """The range of an actuator's first control; None without one."""
+    first = raw.actuator_ctrladr[i]
+    return limited(raw.actuator_ctrlrange[first], raw.actuator_ctrllimited[first])
 
 
 def _most(raw: Any, i: int) -> float:
@@ -38,10 +47,8 @@ def _most(raw: Any, i: int) -> float:
     if raw.actuator_forcelimited[i]:
         return float(np.abs(raw.actuator_forcerange[i]).max())
     constant = not raw.actuator_biastype[i] and not raw.actuator_gaintype[i]
-    if constant and raw.actuator_ctrllimited[raw.actuator_ctrladr[i]]:
-        return abs(float(raw.actuator_gainprm[i, 0])) * float(
-            np.abs(raw.actuator_ctrlrange[raw.actuator_ctrladr[i]]).max()
-        )
+    if constant and (controls := _controls(raw, i)):
+        return abs(float(raw.actuator_gainprm[i, 0])) * float(np.abs(controls).max())
     return math.inf
 
 
@@ -67,12 +74,9 @@ def actuator(mujoco: Any, raw: Any, i: int) -> Actuator:
         kp=float(gain[0]) if position else None,
         kv=float(-bias[2]) if position else None,
         gain=None if position else float(gain[0]),
-        gear=float(raw.actuator_gear[raw.actuator_outadr[i], 0]),
+        gear=_gear(raw, i),
         forces=limited(raw.actuator_forcerange[i], raw.actuator_forcelimited[i]),
-        controls=limited(
-            raw.actuator_ctrlrange[raw.actuator_ctrladr[i]],
-            raw.actuator_ctrllimited[raw.actuator_ctrladr[i]],
-        ),
+        controls=_controls(raw, i),
     )
 
 
@@ -83,18 +87,12 @@ def beyond(raw: Any, i: int) -> str:
         raw.actuator_trntype[i] == 0 and raw.actuator_biasprm[i, 1] == -raw.actuator_gainprm[i, 0]
     )
     turns = servo and raw.actuator_biasprm[i, 1] and raw.jnt_type[joint] == _HINGE
-    if (
-        not turns
-        or not raw.jnt_limited[joint]
-        or not raw.actuator_ctrllimited[raw.actuator_ctrladr[i]]
-    ):
+    controls = _controls(raw, i)
+    if not turns or not raw.jnt_limited[joint] or controls is None:
         return ""
-    (low, high), (least, most) = (
-        raw.jnt_range[joint],
-        raw.actuator_ctrlrange[raw.actuator_ctrladr[i]],
-    )
+    (low, high), (least, most) = raw.jnt_range[joint], controls
     passed = max(low - least, most - high)
-    if raw.actuator_gear[raw.actuator_outadr[i], 0] != 1 or passed <= 1e-5 * (high - low):
+    if _gear(raw, i) != 1 or passed <= 1e-5 * (high - low):
         return ""
     return (
         f"the ctrlrange of {raw.actuator(i).name!r} passes the range of its joint by "

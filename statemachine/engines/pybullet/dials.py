@@ -22,7 +22,7 @@ from ...backends._bullet_driven import DrivenWorld
 from ...backends._bullet_plan import Plan
 from ...backends._bullet_shared import Shared
 from ...backends._bullet_surfaces import Surfaces
-from ...backends._bullet_world import World
+from ...backends._bullet_world import UNCLAMPED, World
 from ...backends.pybullet_backend import PybulletData, PybulletModel
 from ...errors import EngineError
 from ...interface import Model
@@ -32,7 +32,7 @@ from ..parts import Setting
 BODY_DAMPING = float(np.float32(0.04))
 FRICTION = 0.5
 CONTACT_ERP = 0.08
-_FASTEST, _UNCLAMPED = 100.0, 1e12  # [rad/s]
+_FASTEST = 100.0  # [rad/s]
 _WIDE = 1e6  # [rad or m] a range that no joint leaves
 _CLOSE = 1e-6  # relative: the engine reports some figures in single precision
 
@@ -269,7 +269,7 @@ def _set_limits(world: World, ranges: Mapping[int, tuple[float, float]] | None) 
     for body, index, dof in _joints(world):
         low, high = (-_WIDE, _WIDE) if ranges is None else ranges.get(dof, (-_WIDE, _WIDE))
         _change(world, body, index, jointLowerLimit=low, jointUpperLimit=high)
-    fastest = _UNCLAMPED if ranges is None else _FASTEST
+    fastest = UNCLAMPED if ranges is None else _FASTEST
     for tree in world.trees:
         for link in range(-1, pb.getNumJoints(tree.body, world.client)):
             _change(world, tree.body, link, maxJointVelocity=fastest)
