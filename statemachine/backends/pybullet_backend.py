@@ -33,7 +33,7 @@ from ._bullet_scope import check, ignored
 from ._bullet_shared import Shared
 from ._bullet_world import ENGINE_TIMESTEP, World
 from ._hidden_data import HiddenData, HiddenModel
-from .compiled import compile_file, compiler_warnings, edited, facts, step_length
+from .compiled import check_numbers, compile_file, compiler_warnings, edited, facts, step_length
 
 _EMULATED = {
     "stale after a write": "by copies of the adapter; the engine's own values follow a write",
@@ -183,6 +183,10 @@ class PybulletModel(HiddenModel):
     def compiled(self) -> mujoco.MjModel:
         return self.plan.raw
 
+    def with_compiled(self, compiled: mujoco.MjModel) -> PybulletModel:
+        check_numbers(compiled, str(self.path))
+        return self._of(compiled, self.substeps)
+
     @property
     def shared_worlds(self) -> dict[str, World]:
         """Worlds that its Data share, of those that were needed so far, by what they are."""
@@ -197,6 +201,9 @@ class PybulletModel(HiddenModel):
         raw = edited(self.plan.raw, options)
         substeps = options.get("substeps", self.substeps)
         raw.opt.timestep = step_length(self.timestep, substeps, options)
+        return self._of(raw, substeps)
+
+    def _of(self, raw: mujoco.MjModel, substeps: int) -> PybulletModel:
         plan = Plan(raw)
         check(plan, "pybullet")
         return PybulletModel(plan, self.path, substeps, self.defaults)
