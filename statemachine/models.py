@@ -127,3 +127,17 @@ def mesh_file(name: str, folder: Path) -> Path | None:
         except (OSError, ValueError):
             continue
     return None
+
+
+def included_file(name: str, main: Path, includer: Path) -> Path | None:
+    """The file that an MJCF includes, or None where there is none.
+
+    MuJoCo looks in the folder of the main file, then in that of the file with the <include>.
+
+    Args:
+        name: As the <include> has it.
+        main: The main file.
+        includer: The file with the <include>.
+    """
+    choices = [file.parent / name for file in (main, includer) if name]
+    return next((choice for choice in choices if choice.is_file()), None)

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from statemachine.backends import load
 from statemachine.errors import BadInputError
 from statemachine.report.robots import page
 from statemachine.report.terminal import show
@@ -28,6 +29,7 @@ from statemachine.robots import (
     many,
 )
 from statemachine.robots import table as tables
+from statemachine.scenarios.provenance import model_files
 
 from .conftest import ROOT, Cli, need_engine
 
@@ -107,6 +109,30 @@ def test_what_is_a_model(folder: Path) -> None:
     after = {each.name: each.sha256 for each in find([folder])}
     assert after["scene.xml"] != before  # what it includes has changed
     assert after["good.xml"] == found["good.xml"].sha256
+
+
+def test_an_include_is_looked_for_beside_the_main_file_then_beside_its_includer(
+    tmp_path: Path,
+) -> None:
+    need_engine("mujoco")
+
+    def put(file: str, inside: str) -> None:
+        (tmp_path / file).parent.mkdir(exist_ok=True)
+        (tmp_path / file).write_text(f"<mujoco>{inside}</mujoco>")
+
+    put("main.xml", "<include file='parts/hand.xml'/>")
+    put("parts/hand.xml", "<include file='finger.xml'/>")
+    put("parts/finger.xml", "<worldbody><body name='beside its includer'/></worldbody>")
+
+    def files() -> list[str]:
+        paths = model_files(tmp_path / "main.xml")
+        return [path.relative_to(tmp_path).as_posix() for path in paths]
+
+    assert files() == ["main.xml", "parts/hand.xml", "parts/finger.xml"]
+    assert "beside its includer" in load(tmp_path / "main.xml").body_names
+    put("finger.xml", "<worldbody><body name='beside main'/></worldbody>")
+    assert files() == ["main.xml", "parts/hand.xml", "finger.xml"]
+    assert "beside main" in load(tmp_path / "main.xml").body_names
 
 
 def test_files_are_named_too(folder: Path) -> None:

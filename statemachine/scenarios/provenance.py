@@ -13,6 +13,7 @@ import numpy as np
 
 from .. import __version__
 from ..interface import Model
+from ..models import included_file
 
 
 @dataclass(frozen=True)
@@ -58,19 +59,19 @@ def model_digest(path: Path) -> str:
 
 
 def model_files(path: Path) -> Iterator[Path]:
-    """A model's file, then those it includes, theirs and so on, each once.
-
-    MuJoCo looks an included file up beside the one that was loaded.
-    """
-    waiting, seen = [path], set()
+    """A model's file, then those it includes, theirs and so on, each once."""
+    if not path.is_file():
+        return
+    waiting, seen = [path], set[Path]()
     while waiting:
         file = waiting.pop(0)
-        if file in seen or not file.is_file():
+        if file.resolve() in seen:
             continue
-        seen.add(file)
+        seen.add(file.resolve())
         yield file
         try:
             includes = ElementTree.parse(file).iter("include")
         except ElementTree.ParseError:  # a binary model
             continue
-        waiting += [path.parent / name for i in includes if (name := i.get("file"))]
+        found = [included_file(element.get("file", ""), path, file) for element in includes]
+        waiting += [each for each in found if each is not None]

@@ -8,6 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from ..errors import ModelError
+from ..models import included_file
 from .mjcf_places import Compiler
 
 Element = ElementTree.Element
@@ -30,32 +31,29 @@ def parse(path: Path) -> Element:
 def with_includes(root: Element, path: Path) -> tuple[Element, int]:
     """A file with each <include> replaced by what it names, and how many there were.
 
-    A file is looked for from the folder of the main file, then from that of the file that
-    includes it, as MuJoCo does.
-
     Raises:
         ModelError: An included file is not there, is no XML, or is included twice.
     """
     seen: list[Path] = []
 
-    def resolved(element: Element, folder: Path) -> None:
+    def resolved(element: Element, includer: Path) -> None:
         for place, child in reversed(list(enumerate(element))):
             if child.tag != "include":
-                resolved(child, folder)
+                resolved(child, includer)
                 continue
             name = child.get("file", "")
-            found = [at / name for at in (path.parent, folder) if name and (at / name).is_file()]
-            if not found:
+            file = included_file(name, path, includer)
+            if file is None:
                 raise ModelError(f"{path.name} includes {name!r}, which is not there")
-            if (file := found[0].resolve()) in seen:
+            if file.resolve() in seen:
                 raise ModelError(f"{path.name} includes {name!r} more than once")
-            seen.append(file)
+            seen.append(file.resolve())
             inside = parse(file)
-            resolved(inside, file.parent)
+            resolved(inside, file)
             element[place : place + 1] = list(inside)
 
     root = copy.deepcopy(root)
-    resolved(root, path.parent)
+    resolved(root, path)
     return root, len(seen)
 
 
