@@ -165,6 +165,10 @@ class CompilerPart(ReadingPart, Protocol):
         """What an MJCF says itself; meshes may be missing. Arguments and errors as of `read`."""
         ...
 
+    def describe(self, compiled: Any, name: str) -> Robot:
+        """The description in a compiled model; its joints are in the order of the model's."""
+        ...
+
 
 class EnergyPart(Protocol):
     """The part "energy" of the engine by which all are measured."""

@@ -142,7 +142,7 @@ def _joint(raw: Any, joint: int, body: str) -> RobotJoint:
     spring = int(raw.jnt_qposadr[joint])
     scalar = kind in ("slide", "hinge")
     return RobotJoint(
-        name=raw.joint(joint).name or f"the joint of {body}",
+        name=raw.joint(joint).name or _unnamed(raw, joint, body),
         kind=kind,
         axis=np.array(raw.jnt_axis[joint]),
         anchor=np.array(raw.jnt_pos[joint]),
@@ -156,6 +156,13 @@ def _joint(raw: Any, joint: int, body: str) -> RobotJoint:
         rest=float(raw.qpos_spring[spring]) if scalar else None,
         follows=_follows(raw, joint),
     )
+
+
+def _unnamed(raw: Any, joint: int, body: str) -> str:
+    """What a joint without a name is called; a body may have several."""
+    carries = int(raw.jnt_bodyid[joint])
+    first, count = int(raw.body_jntadr[carries]), int(raw.body_jntnum[carries])
+    return f"the joint of {body}" if count == 1 else f"joint {joint - first + 1} of {body}"
 
 
 def _follows(raw: Any, joint: int) -> tuple[str, float, float] | None:

@@ -52,6 +52,17 @@ def read_file(path: Path, name: str) -> Robot:
         return robot
 
 
+def describe(compiled: Any, name: str) -> Robot:
+    """The description in a compiled model; joints are in the order of its own.
+
+    Args:
+        compiled: An mjModel.
+        name: What the description goes by.
+    """
+    version = require("mujoco").__version__
+    return description_of(compiled, name, f"mujoco {version}", "MJCF")
+
+
 def _loaded(path: Path, name: str, form: str) -> Robot:
     model = load(path, backend="mujoco", defaults="engine")
     return description_of(model.raw, name, f"mujoco {model.engine_version}", form)

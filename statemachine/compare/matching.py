@@ -1,0 +1,265 @@
+"""Which joint, body, site and actuator of one Model is which of another.
+
+By name, then by structure: `models.match` says how, and `names` overrules it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..description.records import Placement, Robot
+from ..engines import needed_part
+from ..engines.parts import CompilerPart
+from ..errors import BadInputError, unknown_name
+from ..installed import DEFAULT
+from ..interface import Array, Model
+from .models.match import Matching, Pair, match, renamed
+from .models.tree import GroupTree
+
+Pairs = tuple[tuple[int, int], ...]
+Only = Mapping[str, tuple[str, ...]]
+
+
+@dataclass(frozen=True, eq=False)
+class BodyPair:
+    """A moving body of one Model, or the world, and its counterpart.
+
+    Attributes:
+        one, two: Ids of the bodies.
+        align: The frame of `one` in that of `two`, as the same solid.
+        moved: Whether it hangs on another part in the other Model.
+    """
+
+    one: int
+    two: int
+    align: Placement
+    moved: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Matched:
+    """What of one Model is what of another.
+
+    Attributes:
+        one, two: The Models.
+        joints, bodies, sites: Pairs of ids.
+        actuators: Pairs of places in ctrl.
+        solids: The rigid parts that both have, parents first; the world is the first.
+        only: For each Model what it alone has: names, by "joint", "site" and "actuator".
+        notes: What a reader should know, in sentences.
+    """
+
+    one: Model
+    two: Model
+    joints: Pairs
+    bodies: Pairs
+    sites: Pairs
+    actuators: Pairs
+    solids: tuple[BodyPair, ...]
+    only: tuple[Only, Only]
+    notes: tuple[str, ...]
+
+    @property
+    def whole(self) -> bool:
+        """Whether every joint and every actuator has its counterpart."""
+        return not any(only.get(kind) for only in self.only for kind in ("joint", "actuator"))
+
+    def qpos(self, values: Array, start: Array) -> Array:
+        """Positions of the second Model, from those of the first.
+
+        Args:
+            values: (nq,) or (n, nq) of the first.
+            start: (nq,) of the second, for the joints that have no counterpart.
+        """
+        return self._moved(values, start, ("jnt_qposadr", "nq"))
+
+    def qvel(self, values: Array, start: Array) -> Array:
+        """Velocities of the second Model (nv,) or (n, nv), as `qpos`."""
+        return self._moved(values, start, ("jnt_dofadr", "nv"))
+
+    def ctrl(self, values: Array, start: Array) -> Array:
+        """Commands to the second Model (nu,) or (n, nu), as `qpos`."""
+        found = _rows(values, start)
+        for a, b in self.actuators:
+            found[..., b] = values[..., a]
+        return found
+
+    def _moved(self, values: Array, start: Array, which: tuple[str, str]) -> Array:
+        found = _rows(values, start)
+        for a, b in self.joints:
+            here = _span(self.one, a, *which)
+            there = _span(self.two, b, *which)
+            found[..., there] = values[..., here]
+        return found
+
+
+def match_models(one: Model, two: Model, names: Mapping[str, str] | None = None) -> Matched:
+    """Pair what two Models have.
+
+    Args:
+        one: A Model.
+        two: Another, of any engine.
+        names: Joints, bodies, sites and actuators of `one` that go by other names in `two`.
+
+    Raises:
+        UnknownNameError: A name that was given is not there.
+        BadInputError: A backend tells nothing of the bodies of its Model.
+    """
+    given = dict(names or {})
+    trees = [GroupTree(_description(model)) for model in (one, two)]
+    drives = _check_names(given, one, two, trees)
+    trees[0] = GroupTree(
+        renamed(trees[0].robot, {a: b for a, b in given.items() if a not in drives})
+    )
+    found = match(trees[0], trees[1])
+    joints = _joints(found, trees)
+    solids = tuple(_solid(pair, trees, one, two) for pair in found.pairs)
+    sites = _by_name(one.site_names, two.site_names, given)
+    actuators = _actuators(one, two, joints, given)
+    only = tuple(
+        {
+            "joint": _rest(model.joint_names, joints, k),
+            "actuator": _rest(model.actuator_names, actuators, k),
+            "site": _rest(model.site_names, sites, k),
+        }
+        for k, model in enumerate((one, two))
+    )
+    return Matched(
+        one=one,
+        two=two,
+        joints=joints,
+        bodies=_bodies(one, two, solids, given),
+        sites=sites,
+        actuators=actuators,
+        solids=solids,
+        only=(only[0], only[1]),
+        notes=tuple(_notes(found)),
+    )
+
+
+def _description(model: Model) -> Robot:
+    if model.compiled is None:
+        raise BadInputError(
+            f"{model.backend} does not tell what the bodies of its models are: they cannot be "
+            "matched with those of another file"
+        )
+    reading: CompilerPart = needed_part(DEFAULT, "reading")
+    return reading.describe(model.compiled, model.path.name)
+
+
+def _check_names(
+    given: Mapping[str, str], one: Model, two: Model, trees: Sequence[GroupTree]
+) -> set[str]:
+    """Names that only actuators have; raises UnknownNameError for one that nothing has."""
+    drives = set()
+    for a, b in given.items():
+        for name, model, tree in ((a, one, trees[0]), (b, two, trees[1])):
+            robot = tree.robot
+            parts = {each.name for each in (*robot.joints, *robot.links, *robot.frames)}
+            known = parts | {name for name in model.actuator_names if name}
+            if name not in known:
+                raise unknown_name(f"name in {model.path.name}", name, sorted(known))
+            if name not in parts:
+                drives.add(a)
+    return drives
+
+
+def _joints(found: Matching, trees: Sequence[GroupTree]) -> Pairs:
+    """Ids of the joints of one kind; a description has them in the order of the model."""
+    places = [{id(joint): k for k, joint in enumerate(tree.robot.joints)} for tree in trees]
+    pairs = []
+    for pair in found.pairs:
+        a, b = pair.one.joint, pair.two.joint
+        if a is not None and b is not None and a.kind == b.kind:
+            pairs.append((places[0][id(a)], places[1][id(b)]))
+    return tuple(sorted(pairs))
+
+
+def _solid(pair: Pair, trees: Sequence[GroupTree], one: Model, two: Model) -> BodyPair:
+    bodies = [
+        _body_of(group.links[0][0].name, tree, model)
+        for group, tree, model in ((pair.one, trees[0], one), (pair.two, trees[1], two))
+    ]
+    return BodyPair(bodies[0], bodies[1], pair.align, pair.moved)
+
+
+def _body_of(link: str, tree: GroupTree, model: Model) -> int:
+    """The body whose link this is; of the links of a body with several joints, the last."""
+    names = [each.name for each in tree.robot.links]
+    place, body = names.index(link), 0
+    # A body with n joints is n links, one without is one.
+    counts = np.maximum(np.bincount(model.jnt_bodyid, minlength=model.nbody), 1)
+    ends = np.cumsum(counts)
+    body = int(np.searchsorted(ends, place, side="right"))
+    return body
+
+
+def _by_name(ours: Sequence[str], theirs: Sequence[str], given: Mapping[str, str]) -> Pairs:
+    there = {name: k for k, name in enumerate(theirs) if name}
+    wanted = [given.get(name, name) for name in ours]
+    return tuple((k, there[name]) for k, name in enumerate(wanted) if name in there)
+
+
+def _actuators(one: Model, two: Model, joints: Pairs, given: Mapping[str, str]) -> Pairs:
+    """By name, then by the joint: the n-th of a joint is the n-th of its counterpart."""
+    pairs = dict(_by_name(one.actuator_names, two.actuator_names, given))
+    left = [k for k in range(two.nu) if k not in pairs.values()]
+    counterpart = dict(joints)
+    for k in range(one.nu):
+        joint = counterpart.get(int(one.actuator_jntid[k]))
+        if k in pairs or joint is None:
+            continue
+        fits = [m for m in left if int(two.actuator_jntid[m]) == joint]
+        if fits:
+            pairs[k] = fits[0]
+            left.remove(fits[0])
+    return tuple(sorted(pairs.items()))
+
+
+def _bodies(one: Model, two: Model, solids: Sequence[BodyPair], given: Mapping[str, str]) -> Pairs:
+    """The rigid parts, and the bodies fixed to them by their names."""
+    pairs = {solid.one: solid.two for solid in solids}
+    taken = set(pairs.values())
+    for a, b in _by_name(one.body_names, two.body_names, given):
+        if a not in pairs and b not in taken:
+            pairs[a] = b
+            taken.add(b)
+    return tuple(sorted(pairs.items()))
+
+
+def _rest(names: Sequence[str], pairs: Pairs, side: int) -> tuple[str, ...]:
+    taken = {pair[side] for pair in pairs}
+    return tuple(name or f"number {k}" for k, name in enumerate(names) if k not in taken)
+
+
+def _notes(found: Matching) -> list[str]:
+    notes = []
+    for pair in found.pairs:
+        a, b = pair.one.joint, pair.two.joint
+        if pair.by == "place" and a and b and a.name != b.name:
+            notes.append(
+                f"joint {a.name!r} on the left is taken for {b.name!r} on the right: one kind, "
+                f"one place, one axis (--map {a.name}=NAME says otherwise)"
+            )
+        elif a and b and a.kind != b.kind:
+            notes.append(f"joint {a.name!r} is a {a.kind} on the left and a {b.kind} on the right")
+    return notes
+
+
+def _rows(values: Array, start: Array) -> Array:
+    shape = (*np.shape(values)[:-1], len(start))
+    return np.array(np.broadcast_to(start, shape))
+
+
+def _span(model: Model, joint: int, start: str, end: str) -> NDArray[Any]:
+    """The places of a joint in qpos or qvel."""
+    starts = np.append(getattr(model, start), getattr(model, end))
+    return np.arange(starts[joint], starts[joint + 1])
+
+
+__all__ = ["BodyPair", "Matched", "match_models"]
