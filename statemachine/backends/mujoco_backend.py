@@ -30,7 +30,7 @@ from ..interface import (
     Model,
     State,
 )
-from ..interface.checks import TINY, check_finite
+from ..interface.checks import HUGE, TINY, check_finite
 from ._mujoco_alarms import AlarmError, Alarms, pass_on
 from .compiled import check_numbers, compile_file, compiler_warnings, edited, facts, step_length
 
@@ -67,7 +67,11 @@ _NOTES = {
     ),
     "forces by part": Behaviour("native", "rows of the constraint solver, by their type"),
     "exact restore": Behaviour("native", "mjSTATE_INTEGRATION, warm start included"),
-    "no automatic reset": Behaviour("native", "the engine's flag mjDSBL_AUTORESET"),
+    "no automatic reset": Behaviour(
+        "native",
+        "the engine's flag mjDSBL_AUTORESET; DivergedError where qpos, qvel or qacc is beyond "
+        f"{HUGE:g}, the engine's own bound",
+    ),
 }
 _WITH_RK4 = Behaviour("unsupported", "with RK4 derived values are those of its fourth stage")
 _WITH_SLEEP = Behaviour("unsupported", "the counters of sleeping bodies are in no State")
@@ -87,7 +91,7 @@ def _capabilities(raw: mujoco.MjModel) -> Capabilities:
     if asleep:
         behaviours["exact restore"] = _WITH_SLEEP
     return Capabilities(
-        options=OPTIONS,
+        options=tuple(name for name in OPTIONS if name != "max_qvel"),
         integrators=tuple(_INTEGRATORS),
         behaviours=behaviours,
         shared_model=True,

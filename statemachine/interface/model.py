@@ -173,7 +173,9 @@ class Model(ABC):
                 timestep: > 0 [s]; substeps: engine steps within it, at least 1;
                 armature, damping, frictionloss: ≥ 0, (nv,) or one number for every
                 hinge and slide joint;
-                integrator: a name of `capabilities.integrators`.
+                integrator: a name of `capabilities.integrators`;
+                max_qvel: > 0 [rad/s or m/s], (nv,) or one number: beyond it a step raises
+                DivergedError. By default it is computed for each Model.
 
         Raises:
             UnsupportedError: This backend has no such option.
