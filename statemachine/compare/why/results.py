@@ -8,6 +8,8 @@ from typing import Literal
 from ...scenarios.provenance import Provenance
 from .gap import Deviation
 
+UNEXPLAINED = 0.05  # of the gap: where more stays, the answer is no
+
 Way = Literal["parity", "off", "one side", "alike", "none"]
 
 

@@ -44,7 +44,7 @@ class Runs:
         watches = [_Watch(model) for model in models]
         traces = [self._record(*pair) for pair in zip(models, watches, strict=True)]
         self.provenance = provenance(models[0]), provenance(models[1])
-        self.ruler = Ruler(models[0], *traces)
+        self.ruler = Ruler(models[0], traces[0], traces[1])
         for place, trace in enumerate(traces):
             self._curves[place, ()] = self.ruler.curves(trace)
             self.ended = self.ended or trace.header.ended
