@@ -7,7 +7,7 @@ from typing import Any
 
 from ..errors import BadInputError
 from ..installed import PAIR
-from . import _compare_html, _compare_models
+from . import _compare_floor, _compare_html, _compare_models
 from . import _compare_pictures as pictures
 from ._common import PROGRAM, add_json, add_menagerie, complain, show
 
@@ -52,6 +52,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quantity", default=None, metavar="NAME", help="of --why: what the gap is measured in"
     )
+    _compare_floor.add_options(parser)
     _compare_html.add_options(parser)
     pictures.add(parser)
     _compare_models.add_options(parser)
@@ -118,6 +119,7 @@ def request_of(options: argparse.Namespace) -> Any:
 def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
     _compare_html.check(options)
+    _compare_floor.check(options)
     pictures.complete(options)
     if options.models:
         if options.why or options.quantity:
@@ -166,10 +168,16 @@ def _run_compare(options: argparse.Namespace) -> int:
         for line in said:
             complain(line, 0)
     asked = witness(one, two)
+    floor = _compare_floor.floor_of(options, request, found, (one, two))
     if options.html:
-        _compare_html.write(options, request, found, (one, two), said, asked)
-    page = report.page(found, one, two, said=said, witness=asked)
-    result = {"comparison": found, "witness": asked, "touches": touches(one, two)}
+        _compare_html.write(options, request, found, (one, two), said, asked, floor)
+    page = report.page(found, one, two, said=said, witness=asked, floor=floor)
+    result = {
+        "comparison": found,
+        "witness": asked,
+        "touches": touches(one, two),
+        "floor": floor,
+    }
     code = show(page, result, options.json)
-    pictures.write(wanted, options, one, two, found)
+    pictures.write(wanted, options, one, two, found, floor)
     return code
