@@ -95,9 +95,19 @@ def compile_file(path: str | os.PathLike[str]) -> mujoco.MjModel:
     except (ValueError, MemoryError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split()) or "out of memory"
         raise ModelError(f"MuJoCo cannot read {text}: {reason}") from error
-    for problem in _problems(raw):
-        raise ModelError(f"{text} has a number that nothing can be computed with: {problem}")
+    check_numbers(raw, text)
     return raw
+
+
+def check_numbers(raw: mujoco.MjModel, name: str) -> None:
+    """Raise ModelError if a number of a compiled model is none, or has an impossible sign.
+
+    Args:
+        raw: The compiled model.
+        name: What the message calls it.
+    """
+    for problem in _problems(raw):
+        raise ModelError(f"{name} has a number that nothing can be computed with: {problem}")
 
 
 _PACKAGE = re.compile(r"(?<=[\"'])package://[^\"']*")

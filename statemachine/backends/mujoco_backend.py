@@ -32,7 +32,7 @@ from ..interface import (
 )
 from ..interface.checks import HUGE, TINY, check_finite
 from ._mujoco_alarms import AlarmError, Alarms, pass_on
-from .compiled import compile_file, compiler_warnings, edited, facts, step_length
+from .compiled import check_numbers, compile_file, compiler_warnings, edited, facts, step_length
 
 _DISABLE = mujoco.mjtDisableBit
 # Not RK4: after its step the derived values are neither of the state before nor after.
@@ -141,6 +141,10 @@ class MujocoModel(Model):
     @property
     def compiled(self) -> mujoco.MjModel:
         return self.raw
+
+    def with_compiled(self, compiled: mujoco.MjModel) -> MujocoModel:
+        check_numbers(compiled, str(self.path))
+        return MujocoModel(compiled, self.path, self.substeps)
 
     def _make_data(self) -> MujocoData:
         try:

@@ -35,7 +35,15 @@ from ._bullet_scope import check, ignored
 from ._bullet_shared import Shared
 from ._bullet_world import ENGINE_TIMESTEP, World
 from ._hidden_data import HiddenData, HiddenModel
-from .compiled import compile_file, compiler_warnings, edited, facts, fastest, step_length
+from .compiled import (
+    check_numbers,
+    compile_file,
+    compiler_warnings,
+    edited,
+    facts,
+    fastest,
+    step_length,
+)
 
 _EMULATED = {
     "stale after a write": "by copies of the adapter; the engine's own values follow a write",
@@ -203,6 +211,10 @@ class PybulletModel(HiddenModel):
     def compiled(self) -> mujoco.MjModel:
         return self.plan.raw
 
+    def with_compiled(self, compiled: mujoco.MjModel) -> PybulletModel:
+        check_numbers(compiled, str(self.path))
+        return self._of(compiled, self.substeps, self._asked)
+
     @property
     def shared_worlds(self) -> dict[str, World]:
         """Worlds that its Data share, of those that were needed so far, by what they are."""
@@ -217,9 +229,11 @@ class PybulletModel(HiddenModel):
         raw = edited(self.plan.raw, options)
         substeps = options.get("substeps", self.substeps)
         raw.opt.timestep = step_length(self.timestep, substeps, options)
+        return self._of(raw, substeps, options.get("max_qvel", self._asked))
+
+    def _of(self, raw: mujoco.MjModel, substeps: int, asked: Array | None) -> PybulletModel:
         plan = Plan(raw)
         check(plan, "pybullet")
-        asked = options.get("max_qvel", self._asked)
         return PybulletModel(plan, self.path, substeps, self.defaults, asked)
 
 

@@ -49,6 +49,7 @@ def write(
     traces: tuple[Any, Any],
     said: tuple[str, ...],
     witness: Any = None,
+    floor: Any = None,
 ) -> None:
     """Look for causes and shapes, and write the page.
 
@@ -59,6 +60,7 @@ def write(
         traces: Both sides.
         said: What stood in for a run.
         witness: The third party's figures, or None.
+        floor: The chaos floor, or None.
     """
     from ..report import compare as pages
     from ..report.html import report, write_report
@@ -75,6 +77,7 @@ def write(
         why_not=why_not,
         models=_models(request, traces),
         command=_typed(options, request),
+        floor=floor,
     )
     text = report(page, _looks(request, traces))
     target = write_report(options.html, text)
@@ -164,6 +167,8 @@ def _typed(options: argparse.Namespace, request: Any) -> str:
         ("--timestep", request.options.get("timestep"), None),
         ("--seed", request.seed, 0),
         *(("--tolerance", text, None) for text in options.tolerance),
+        *(("--floor", text, None) for text in options.floor),
+        ("--no-floor", options.no_floor, False),
         ("--quantity", options.quantity or None, None),
         ("--no-why", options.no_why, False),
         ("--html", Path(options.html).name, None),

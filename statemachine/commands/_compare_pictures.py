@@ -103,7 +103,12 @@ def checked(options: argparse.Namespace) -> Pictures:
 
 
 def write(
-    pictures: Pictures, options: Any, one: Any, two: Any = None, comparison: Any = None
+    pictures: Pictures,
+    options: Any,
+    one: Any,
+    two: Any = None,
+    comparison: Any = None,
+    floor: Any = None,
 ) -> None:
     """Write what was asked for; a line for each file on standard error.
 
@@ -113,6 +118,7 @@ def write(
         one: A trace.
         two: The other one; None for pictures of one trace.
         comparison: Of the two.
+        floor: The chaos floor of the comparison, or None.
     """
     from ..report.progress import progress
 
@@ -120,7 +126,11 @@ def write(
         from ..report import plot as plots
 
         with progress("figure"):
-            figure = plots.plot_trace(one) if two is None else plots.plot(one, two, comparison)
+            figure = (
+                plots.plot_trace(one)
+                if two is None
+                else plots.plot(one, two, comparison, floor=floor)
+            )
             size = plots.write_plot(figure, pictures.plot)
         complain(f"{pictures.plot}: a figure, {_bytes(size)}", 0)
     if pictures.film is not None:

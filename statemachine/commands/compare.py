@@ -7,7 +7,7 @@ from typing import Any
 
 from ..errors import BadInputError, EndedEarlyError
 from ..installed import PAIR
-from . import _compare_html, _compare_models
+from . import _compare_floor, _compare_html, _compare_models
 from . import _compare_pictures as pictures
 from ._common import PROGRAM, add_json, add_menagerie, complain, show
 
@@ -53,6 +53,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quantity", default=None, metavar="NAME", help="of --why: what the gap is measured in"
     )
+    _compare_floor.add_options(parser)
     _compare_html.add_options(parser)
     pictures.add(parser)
     _compare_models.add_options(parser)
@@ -119,6 +120,7 @@ def request_of(options: argparse.Namespace) -> Any:
 def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
     _compare_html.check(options)
+    _compare_floor.check(options)
     pictures.complete(options)
     if options.models:
         if options.why or options.quantity:
@@ -170,11 +172,17 @@ def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
         for line in said:
             complain(line, 0)
     asked = witness(one, two)
+    floor = _compare_floor.floor_of(options, request, found, (one, two))
     if options.html:
-        _compare_html.write(options, request, found, (one, two), said, asked)
+        _compare_html.write(options, request, found, (one, two), said, asked, floor)
     why_not = "" if found.ended else why_not  # which the page says itself
-    page = report.page(found, one, two, said=said, witness=asked, why_not=why_not)
-    result = {"comparison": found, "witness": asked, "touches": touches(one, two)}
+    page = report.page(found, one, two, said=said, witness=asked, floor=floor, why_not=why_not)
+    result = {
+        "comparison": found,
+        "witness": asked,
+        "touches": touches(one, two),
+        "floor": floor,
+    }
     code = show(page, result, options.json)
-    pictures.write(wanted, options, one, two, found)
+    pictures.write(wanted, options, one, two, found, floor)
     return code

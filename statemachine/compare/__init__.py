@@ -10,6 +10,8 @@ Two engines that agree prove nothing; neither side is the truth.
 from __future__ import annotations
 
 from .agreement import Agreement, Comparison, Side, compare
+from .floor import ChaosFloor, FloorBand, chaos_floor
+from .perturbed import Rerun, Uncertainty, perturbed_runs, rerun_of
 from .series import Series, default_tip, series
 from .sides import Request, sides_of
 from .touches import Contact, Touch, touches
@@ -17,15 +19,22 @@ from .witness import Witness, witness
 
 __all__ = [
     "Agreement",
+    "ChaosFloor",
     "Comparison",
     "Contact",
+    "FloorBand",
     "Request",
+    "Rerun",
     "Series",
     "Side",
     "Touch",
+    "Uncertainty",
     "Witness",
+    "chaos_floor",
     "compare",
     "default_tip",
+    "perturbed_runs",
+    "rerun_of",
     "series",
     "sides_of",
     "touches",

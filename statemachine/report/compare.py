@@ -6,7 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..compare import Agreement, Comparison, Series, Witness, default_tip, series, touches
+from ..compare import (
+    Agreement,
+    ChaosFloor,
+    Comparison,
+    Series,
+    Witness,
+    default_tip,
+    series,
+    touches,
+)
 from ..compare.why import Attribution
 from ..comparison import QUANTITIES
 from ..comparison.text import NONE, milliseconds, quantity, sentence
@@ -27,10 +36,12 @@ from .finding import (
     subject,
     window,
 )
+from .floor import floor_words
 from .over_time import BothRuns, QuantityChart, chart_of, foot_of
 from .provenance import emulated, provenance
 
 _ROUNDING = 1e-6  # of a tolerance: what is less is shown as nothing
+_HEADERS = ("quantity", "verdict", "largest", "at, s", "RMS", "settled", "from, s", "tolerance")
 _EMULATED = ("emulated", "What is emulated")
 
 
@@ -46,6 +57,7 @@ def page(
     why_not: str = "",
     models: Page | None = None,
     command: str = "",
+    floor: ChaosFloor | None = None,
 ) -> Page:
     """What was found in comparing two runs.
 
@@ -60,6 +72,7 @@ def page(
         why_not: Why there is none, as a sentence.
         models: The differences between what the engines make of the model, if asked.
         command: What makes the page again.
+        floor: The chaos floor, if it was looked for.
     """
     labels = long_labels(comparison)
     curves = series(one, two, tip)
@@ -73,7 +86,7 @@ def page(
         *(() if comparison.ended else contact_words(comparison, touching)),
         *([Items(notes)] if notes else []),
     ]
-    both = _over_time(comparison, one, two, curves, events, attribution, tip)
+    both = _over_time(comparison, one, two, curves, events, attribution, tip, floor)
     blocks.append(both)
     if attribution is not None:
         blocks.append(
@@ -82,7 +95,7 @@ def page(
     elif why_not:
         blocks.append(Section("why", "What causes it", [Text(why_not)]))
     blocks.append(Section("curves", "How far apart, over time", _sorted(both.charts), detail=True))
-    blocks.append(Section("figures", "The figures", _figures(comparison, witness)))
+    blocks.append(Section("figures", "The figures", _figures(comparison, witness, floor)))
     table = events_table(events, (comparison.one.label, comparison.two.label))
     blocks.append(Section("events", "What happens when", [table], detail=True))
     kept = emulated(comparison)
@@ -112,12 +125,20 @@ def _over_time(
     events: Sequence[Event],
     attribution: Attribution | None,
     tip: str | None,
+    floor: ChaosFloor | None,
 ) -> BothRuns:
     """The scene and a chart for each quantity that is a number throughout."""
     labels = long_labels(comparison)
     found = {each.name: each for each in comparison.agreements}
+    bands = {} if floor is None else {band.name: band.width for band in floor.bands}
     charts = tuple(
-        chart_of(curve, found[curve.name], labels, foot_of(curve, one, two, labels))
+        chart_of(
+            curve,
+            found[curve.name],
+            labels,
+            foot_of(curve, one, two, labels),
+            bands.get(curve.name),
+        )
         for curve in curves
         if np.isfinite(curve.difference).all()
     )
@@ -166,8 +187,10 @@ def _sorted(charts: Sequence[QuantityChart]) -> list[Block]:
     return [*beyond, Section("", told, within, folded=True)]
 
 
-def _figures(comparison: Comparison, witness: Witness | None) -> list[Block]:
-    """Figures and verdicts, the reasons of the tolerances, and what a third party says."""
+def _figures(
+    comparison: Comparison, witness: Witness | None, floor: ChaosFloor | None
+) -> list[Block]:
+    """Figures and verdicts, the floor, the reasons of tolerances, what a third party says."""
     one, two = short_labels(comparison)
     agreements = comparison.agreements
     more: list[Block] = []
@@ -187,14 +210,14 @@ def _figures(comparison: Comparison, witness: Witness | None) -> list[Block]:
         more.append(Section("", "", [Text(checked)], detail=True))
     return [
         Table(
-            ("quantity", "verdict", "largest", "at, s", "RMS", "settled", "from, s", "tolerance"),
-            [_row(found) for found in agreements],
+            _HEADERS if floor is None else (*_HEADERS, "floor", "inside from, s"),
+            [(*_row(found), *_floor_cells(found, floor)) for found in agreements],
             f"{one} against {two}: how far apart",
             words=frozenset({0, 1}),
             emphasis=frozenset(
                 k for k, found in enumerate(agreements) if found.verdict == "differs"
             ),
-            wide=frozenset({7}),
+            wide=frozenset({7, 8, 9}) if floor else frozenset({7}),
         ),
         Text(
             f"Compared at {comparison.moments} moments over {comparison.until:g} s. Settled: the "
@@ -202,6 +225,7 @@ def _figures(comparison: Comparison, witness: Witness | None) -> list[Block]:
             "first beyond tolerance. A quantity agrees if it never is; it settles if it is within "
             "its tolerance at the end, and DIFFERS otherwise."
         ),
+        *(floor_words(comparison, floor) if floor else []),
         Table(
             ("quantities", "tolerance", "because"),
             _reasons(comparison),
@@ -230,6 +254,17 @@ def _row(found: Agreement) -> tuple[str, ...]:
         "never" if found.since is None else _moment(found.since),
         tolerance,
     )
+
+
+def _floor_cells(found: Agreement, floor: ChaosFloor | None) -> tuple[str, ...]:
+    """How high the chaos floor is, and from when on the gap is inside."""
+    if floor is None:
+        return ()
+    band = floor.of(found.name)
+    if band is None:
+        return NONE, NONE
+    inside = "never" if band.inside_from is None else _moment(band.inside_from)
+    return quantity(band.most, found.unit), inside
 
 
 def _moment(time: float) -> TableCell:

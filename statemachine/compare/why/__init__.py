@@ -1,18 +1,23 @@
-"""Why two simulations differ: see `attribute`."""
+"""Why two simulations differ: of two files `explain`, of two engines `attribute`."""
 
 from __future__ import annotations
 
 from .attribute import attribute
+from .explain import CauseShare, Explanation, explain
 from .factors import FACTORS, Factor
 from .gap import Deviation
-from .results import Attribution, FactorTrial, FirstTouch
+from .results import UNEXPLAINED, Attribution, FactorTrial, FirstTouch
 
 __all__ = [
     "FACTORS",
+    "UNEXPLAINED",
     "Attribution",
+    "CauseShare",
     "Deviation",
+    "Explanation",
     "Factor",
     "FactorTrial",
     "FirstTouch",
     "attribute",
+    "explain",
 ]

@@ -8,6 +8,8 @@ from typing import Literal
 from ...scenarios.provenance import Provenance
 from .gap import Deviation
 
+UNEXPLAINED = 0.05  # of the gap: where more stays, the answer is no
+
 Way = Literal["parity", "off", "one side", "alike", "none"]
 
 
@@ -114,7 +116,7 @@ class Attribution:
     @property
     def settings_same(self) -> float:
         """The gap where all settings are the same and nothing is left out."""
-        rungs = [trial for trial in self.ladder if trial.way == "parity"]
+        rungs = [trial for trial in self.ladder if trial.way in ("parity", "one side")]
         known = [trial.worst for trial in rungs if trial.worst is not None]
         return known[-1] if known else self.gap
 
@@ -123,6 +125,16 @@ class Attribution:
         if trial.put_back is None or not self.gap:
             return None
         return (trial.put_back - self.settings_same) / self.gap
+
+    @property
+    def explained(self) -> float:
+        """The part of it that goes where settings are brought to the same."""
+        return (self.gap - self.settings_same) / self.gap if self.gap else 0.0
+
+    @property
+    def located(self) -> float:
+        """The part that goes only where something is left out on both sides."""
+        return (self.settings_same - self.left) / self.gap if self.gap else 0.0
 
     @property
     def unexplained(self) -> float:
