@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from .agreement import Agreement, Comparison, Side, compare
 from .floor import ChaosFloor, FloorBand, chaos_floor
+from .one_step import StepComparison, one_step
 from .perturbed import Rerun, Uncertainty, perturbed_runs, rerun_of
 from .series import Series, default_tip, series
 from .sides import Request, sides_of
@@ -27,12 +28,14 @@ __all__ = [
     "Rerun",
     "Series",
     "Side",
+    "StepComparison",
     "Touch",
     "Uncertainty",
     "Witness",
     "chaos_floor",
     "compare",
     "default_tip",
+    "one_step",
     "perturbed_runs",
     "rerun_of",
     "series",

@@ -9,7 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..interface import Array
-from .stages import AFTER, FORCE, FOUND, MASS, STAGES, Reading, StageGroup, StageReader, Touching
+from .stages import (
+    AFTER,
+    FORCE,
+    FOUND,
+    KINEMATICS,
+    MASS,
+    STAGES,
+    Reading,
+    StageGroup,
+    StageReader,
+    Touching,
+)
 
 _STANDS_OUT = 10.0  # times the median
 _MOST_SPIKES = 5
@@ -29,7 +40,8 @@ class StageGap:
             at which that is at least a thousandth of what it ever is.
         tolerance: What does not count.
         null: How far the left side, put back to its own states, gets from its own run.
-        worst: The largest difference; at: when [s from the start]; where: joint, body or pair.
+        worst: The largest difference; at: when [s from the start].
+        where: The joint, body or pair to look at then.
         beyond: At how many moments it is beyond the tolerance and beyond the null.
         first: The first of them [s]; None if there is none.
     """
@@ -183,7 +195,8 @@ class StepSamples:
                 touches = stage == FOUND
                 reason = "nothing touches" if touches else "an engine does not tell it"
                 own = [StageGap(stage, touches, reason)]
-            found.append(max(own, key=_how_far))
+            # Of the measures of one stage that of pairs comes last, and says more than joints do.
+            found.append(max(reversed(own), key=_how_far if stage != FORCE else _differs))
         return tuple(found)
 
     def _gap(self, each: StageMeasure) -> StageGap:
@@ -198,7 +211,7 @@ class StepSamples:
             null=float(each.null.max()),
             worst=worst,
             at=self.times[int(row)] if worst else None,
-            where=each.group.names[int(place)] if worst else "",
+            where=_culprit(each, int(row)) if worst else "",
             beyond=int(hits.sum()),
             first=self.times[int(np.argmax(hits))] if hits.any() else None,
         )
@@ -226,11 +239,23 @@ class StepSamples:
         """For each moment the first stage beyond its tolerance, and its worst element."""
         found = [(AFTER, "")] * len(self.times)
         for each in sorted(measures, key=lambda m: -STAGES.index(m.group.stage)):
-            beyond = each.beyond
-            for row in np.flatnonzero(beyond.any(axis=1)).tolist():
-                place = int(np.argmax(np.where(beyond[row], each.apart[row], -1.0)))
-                found[row] = each.group.stage, each.group.names[place]
+            for row in np.flatnonzero(each.beyond.any(axis=1)).tolist():
+                found[row] = each.group.stage, _culprit(each, row)
         return found
+
+
+def _culprit(each: StageMeasure, row: int) -> str:
+    """What to look at in a moment: the element that differs most, or where that comes from.
+
+    A body that is elsewhere takes along all that hangs on it, so that the first one counts; a
+    mass shows in the entries of every joint that carries it, so that the last of these counts.
+    """
+    names, hits = each.group.names, np.flatnonzero(each.beyond[row])
+    if each.group.stage == MASS:
+        hits = np.array([k for k in hits.tolist() if " and " not in names[k]], dtype=np.int64)
+    if len(hits) and each.group.stage in (KINEMATICS, MASS):
+        return names[int(hits[0] if each.group.stage == KINEMATICS else hits[-1])]
+    return names[int(np.argmax(each.apart[row]))]
 
 
 def _usual(sizes: Array) -> float:
@@ -243,6 +268,11 @@ def _largest(measures: Sequence[StageMeasure], stages: Sequence[str], unit: str)
     """The largest scale of some stages in a unit."""
     scales = (m.scale for m in measures if m.group.stage in stages and m.group.unit == unit)
     return max(scales, default=0.0)
+
+
+def _differs(gap: StageGap) -> tuple[bool, bool]:
+    """Whether it differs, and whether at all."""
+    return gap.beyond > 0, gap.worst > 0
 
 
 def _how_far(gap: StageGap) -> tuple[bool, float]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import mujoco
 import numpy as np
 
+from ...installed import require
 from ...interface import Array, Data, Model
 
 PRIMES = "qacc_warmstart, the accelerations of the step before"
@@ -23,7 +23,7 @@ def mass_matrix(model: Model, data: Data, qpos: Array) -> Array:
     del qpos
     mass = np.zeros((model.nv, model.nv))
     if model.nv:
-        mujoco.mj_fullM(model.raw, data.raw, mass)
+        require("mujoco").mj_fullM(model.raw, data.raw, mass)
     return mass
 
 

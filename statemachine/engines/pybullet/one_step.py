@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-import pybullet as pb
 
+from ...backends._bullet_client import pb
 from ...interface import Array, Data, Model, get_state, set_state
 
 # Of the servo law, which the backend solves. The engine's own impulses of the step before can be
