@@ -52,37 +52,21 @@ def floor_of(
     one, two = traces
     if options.no_floor:
         return None
-    if request.is_traces or one.header.recorded:
+    if (request.is_traces and not request.sides) or one.header.recorded:
         if options.floor:
             raise BadInputError("--floor runs the left side again, and it is a recorded run")
         return None
-    from ..backends import load
-    from ..compare import chaos_floor, rerun_of
+    from ..compare import chaos_floor
     from ..compare.perturbed import parse_uncertainty
     from ..report.progress import progress
-    from ..scenarios import scenario
+    from ._compare_rerun import left_of
 
-    asked = scenario(request.what[0])
-    model = load(
-        request.model or asked.model,
-        backend=request.backends[0],
-        defaults=request.defaults,
-        menagerie=request.menagerie,
-    )
-    rerun = rerun_of(
-        asked,
-        model,
-        seconds=request.seconds,
-        seed=request.seed,
-        defaults=request.defaults,
-        options=request.options,
-    )
     with progress("chaos floor") as told:
         return chaos_floor(
             comparison,
             one,
             two,
-            rerun,
+            left_of(request),
             seed=request.seed,
             uncertain=parse_uncertainty(options.floor),
             progress=told,

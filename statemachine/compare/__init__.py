@@ -10,6 +10,7 @@ Two engines that agree prove nothing; neither side is the truth.
 from __future__ import annotations
 
 from .agreement import Agreement, Comparison, Side, compare
+from .convergence import QuantityLimit, TimestepConvergence, convergence
 from .floor import ChaosFloor, FloorBand, chaos_floor
 from .one_step import StepComparison, one_step
 from .perturbed import Rerun, Uncertainty, perturbed_runs, rerun_of
@@ -24,16 +25,19 @@ __all__ = [
     "Comparison",
     "Contact",
     "FloorBand",
+    "QuantityLimit",
     "Request",
     "Rerun",
     "Series",
     "Side",
     "StepComparison",
+    "TimestepConvergence",
     "Touch",
     "Uncertainty",
     "Witness",
     "chaos_floor",
     "compare",
+    "convergence",
     "default_tip",
     "one_step",
     "perturbed_runs",
