@@ -4,30 +4,46 @@
     comparison = compare(one, two)
     comparison.agrees, comparison.agreements
 
+A side is a file, an engine and options, typed or from Python:
+
+    run = run_sides(Request(("hold",), sides=(Side("a.xml"), Side("b.urdf", "pybullet"))))
+    compare(run.left, run.right)
+
 Two engines that agree prove nothing; neither side is the truth.
 """
 
 from __future__ import annotations
 
-from .agreement import Agreement, Comparison, Side, compare
+from .agreement import Agreement, Comparison, SideRun, compare
+from .labels import Labels, labels_of
+from .request import Request, split_words
 from .series import Series, default_tip, series
-from .sides import Request, sides_of
+from .side import Side, parse_sides
+from .sides import sides_of
 from .touches import Contact, Touch, touches
+from .two_sides import SidesRun, run_sides
 from .witness import Witness, witness
 
 __all__ = [
     "Agreement",
     "Comparison",
     "Contact",
+    "Labels",
     "Request",
     "Series",
     "Side",
+    "SideRun",
+    "SidesRun",
     "Touch",
     "Witness",
     "compare",
     "default_tip",
+    "labels_of",
+    "parse_sides",
+    "run_sides",
     "series",
     "sides_of",
+    "split_words",
     "touches",
     "witness",
 ]

@@ -6,7 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..compare import Agreement, Comparison, Series, Witness, default_tip, series, touches
+from ..compare import (
+    Agreement,
+    Comparison,
+    Series,
+    SidesRun,
+    Witness,
+    default_tip,
+    series,
+    touches,
+)
 from ..compare.why import Attribution
 from ..comparison import QUANTITIES
 from ..comparison.text import NONE, milliseconds, quantity, sentence
@@ -27,6 +36,7 @@ from .finding import (
     subject,
     window,
 )
+from .loops import also_open, loops, told, unmatched
 from .over_time import BothRuns, QuantityChart, chart_of, foot_of
 from .provenance import emulated, provenance
 
@@ -46,6 +56,8 @@ def page(
     why_not: str = "",
     models: Page | None = None,
     command: str = "",
+    run: SidesRun | None = None,
+    played: Comparison | None = None,
 ) -> Page:
     """What was found in comparing two runs.
 
@@ -60,6 +72,8 @@ def page(
         why_not: Why there is none, as a sentence.
         models: The differences between what the engines make of the model, if asked.
         command: What makes the page again.
+        run: How two sides were run, if sides were given.
+        played: The comparison of their open loop, where it is not that of the closed one.
     """
     labels = long_labels(comparison)
     curves = series(one, two, tip)
@@ -67,7 +81,9 @@ def page(
     events = events_of(comparison, touching)
     notes = [sentence(line) for line in (*said, *comparison.notes)]
     blocks: list[Block] = [
+        *unmatched(run),
         *([Text(one.header.says)] if one.header.says else []),
+        *told(run),
         *commanded(one, two, labels),
         *in_words(comparison, events, attribution),
         *contact_words(comparison, touching),
@@ -75,6 +91,7 @@ def page(
     ]
     both = _over_time(comparison, one, two, curves, events, attribution, tip)
     blocks.append(both)
+    blocks += loops(comparison, played)
     if attribution is not None:
         blocks.append(
             Section("why", "What causes it", [*_rerun(attribution), *why.causes(attribution)])
@@ -100,7 +117,7 @@ def page(
         f"{one.header.experiment}: {comparison.one.label} and {comparison.two.label}",
         _origin(comparison),
         blocks,
-        headline(comparison, events, attribution, curves),
+        also_open(headline(comparison, events, attribution, curves), played),
     )
 
 
@@ -271,11 +288,14 @@ def _models(models: Page, has_emulated: bool) -> Section:
 
 
 def _origin(comparison: Comparison) -> str:
+    one, two = comparison.one, comparison.two
     words = []
-    for side in (comparison.one, comparison.two):
+    for side in (one, two):
         seed = side.provenance.seed
         text = f"{side.label}, {milliseconds(side.timestep)}"
         words.append(text + (f", seed {seed}" if seed is not None else ""))
-    file = comparison.one.provenance.model_file
-    digest = comparison.one.provenance.model_sha256[:8]
-    return f"{file} ({digest}); {'; '.join(words)}"
+    files = dict.fromkeys(
+        f"{side.provenance.model_file} ({side.provenance.model_sha256[:8]})" for side in (one, two)
+    )
+    engine = [] if one.engine in one.label else [f"both on {one.engine}"]
+    return "; ".join([*files, *engine, *words])
