@@ -83,7 +83,7 @@ class DrivenWorld(HiddenWorld):
 
     def diverging(self) -> bool:
         """Looks at the arms only: to read free bodies takes longer."""
-        return not all(bounded(arm.angles, arm.speed) for arm in self._arms)
+        return not all(bounded(arm.angles, arm.speed, self.fastest) for arm in self._arms)
 
     def read(self) -> tuple[Array, Array]:
         """As the base says."""

@@ -36,6 +36,7 @@ from ._bullet_world import Tree
 
 _OFF = mujoco.mjtDisableBit
 _PIVOTS, _SWEEPS, _SETTLED = 30, 500, 1e-9
+_TINY = 1e-300  # for a power that is too small for a float
 _STEADY = 1e-5  # of the largest friction: a change of it that is worth the whole solution
 _EXPLICIT = (int(mujoco.mjtIntegrator.mjINT_EULER), int(mujoco.mjtIntegrator.mjINT_RK4))
 
@@ -81,7 +82,7 @@ class Law:
 
         rub = not (off["friction"] or off["constraint"])
         self._frictionloss = raw.dof_frictionloss[dofs] * rub
-        self._least_rub, self._rubs = -self._frictionloss, self._frictionloss.any()
+        self._least_rub = -self._frictionloss
         self._steady = _STEADY**2 * dense.dot(self._frictionloss, self._frictionloss)
         weight = raw.dof_invweight0[dofs]
         floor = 0.0 if off["refsafe"] else 2 * h
@@ -90,19 +91,25 @@ class Law:
         damped = np.zeros(passive.shape)
         damped[:, len(dofs) : -1] = np.diag(self._rub_b)
         self._linear = np.vstack([passive, damped, feedback])
-        self._rub_r = _softness(_impedance(_clipped(solimp), np.zeros(len(dofs))), weight)
-
+        still = [_impedance(curve, 0.0) for curve in _curves(solimp)]
+        self._rub_r = np.array([_softness(*each) for each in zip(still, weight, strict=True)])
         self._rub_weight = weight + self._rub_r
+        # Rows of joints with friction: sign, softness, -b, least and most.
+        self._rubs = rubs = np.flatnonzero(self._frictionloss)
+        columns = [self._rub_r, -self._rub_b, self._least_rub, self._frictionloss]
+        self._rub_rows = np.array([np.ones(len(rubs)), *(each[rubs] for each in columns)])
 
         limited = raw.jnt_limited[joints].astype(bool) & (not (off["limit"] or off["constraint"]))
         # A limit acts from its margin on, and as if it were there.
         margin = raw.jnt_margin[joints][:, None] * [1.0, -1.0]
-        self._low, self._high = _range(raw.jnt_range[joints] + margin, limited)
-        self._ranges = list(zip(self._low.tolist(), self._high.tolist(), strict=True))
+        low, high = _range(raw.jnt_range[joints] + margin, limited)
+        self._ranges: list[tuple[float, float]]
+        self._ranges = list(zip(low.tolist(), high.tolist(), strict=True))
         solref, solimp = raw.jnt_solref[joints], raw.jnt_solimp[joints]
-        self._solimp, self._weight = _clipped(solimp), weight
-        self._stop_b, self._stop_k = _spring(solref, solimp, floor)
-        self._every, self._ones = np.arange(len(dofs)), np.ones(len(dofs))
+        damping, stiffness = _spring(solref, solimp, floor)
+        # Of each joint: the curve of its impedance, and b, k and the weight of its limit.
+        constants = np.column_stack([damping, stiffness, weight]).tolist()
+        self._stops = list(zip(_curves(solimp), constants, strict=True))
 
     def _take_actuators(self, raw: mujoco.MjModel, joints: Any, off: Mapping[str, bool]) -> Array:
         """Force = clip(gain·clip(ctrl) + b₀ + b₁·length + b₂·speed); length = gear·q."""
@@ -192,11 +199,10 @@ class Law:
         dense.factored(implicit)
         others = actuator + passive - bias + contact
         limit = self._nothing
-        solve = afresh
-        for place, (low, high) in zip(q, self._ranges, strict=True):
-            if not low <= place <= high:
-                solve = True
-        if not solve and self._rubs:
+        places = enumerate(zip(q, self._ranges, strict=True))
+        hit = [i for i, (place, (low, high)) in places if not low <= place <= high]
+        solve = afresh or bool(hit)
+        if not solve and len(self._rubs):
             # One sweep from the last step's friction, of all joints at once: enough where
             # it hardly changes, as in a joint that rests or slides.
             rest = dense.solved(explicit, others + friction) + damped + self._rub_r * friction
@@ -207,42 +213,46 @@ class Law:
             friction = moved
             solve = dense.dot(change, change) > self._steady
         if solve:
-            friction, limit = self._constrained(explicit, others, x, friction)
+            friction, limit = self._constrained(explicit, others, x, friction, hit)
             others = others + limit
         acceleration = dense.solved(implicit, others + friction)
         return Solution(q, v, speed, bias, mass, actuator, passive, friction, limit, acceleration)
 
     def _constrained(
-        self, factor: Array, others: Array, x: Array, friction: Array
+        self, factor: Array, others: Array, x: Array, friction: Array, hit: list[int]
     ) -> tuple[Array, Array]:
         """Friction and limit force, by pivoting between free and bounded rows.
 
         Each row of sign s at joint i has a force F between two bounds, and wants
         s·a_i + R·F = its reference; a row at a bound may miss it to one side.
         """
-        n = len(friction)
-        place, speed = x[:n], x[n:-1]
-        above, below = place - self._low, self._high - place
-        gap = np.minimum(above, below)
-        hit = (gap < 0).nonzero()[0]
-        side = np.where(above[hit] < below[hit], 1.0, -1.0)
-        strength = _impedance(self._solimp[hit], gap[hit])
-        stop = -self._stop_b[hit] * side * speed[hit] - self._stop_k[hit] * strength * gap[hit]
-        at = np.concatenate([self._every, hit])
-        sign = np.concatenate([self._ones, side])
-        soft = np.concatenate([self._rub_r, _softness(strength, self._weight[hit])])
-        goal = np.concatenate([-self._rub_b * speed, stop])
-        nothing = np.zeros(len(hit))
-        least = np.concatenate([self._least_rub, nothing])
-        most = np.concatenate([self._frictionloss, nothing + np.inf])
-        matrix = sign[:, None] * dense.inverse(factor)[at[:, None], at] * sign
+        n, rubs, rubbing = len(friction), self._rubs, len(self._rubs)
+        at, rows = rubs, np.empty((5, rubbing + len(hit)))
+        rows[:, :rubbing] = self._rub_rows
+        rows[2, :rubbing] *= x[n:-1][rubs]
+        if hit:
+            at = np.array([*rubs, *hit])
+            rows[:, rubbing:] = np.array([self._stop(i, *x[[i, n + i]].tolist()) for i in hit]).T
+        sign, soft, goal, least, most = rows
+        matrix = dense.inverse_rows(factor, at)[:, at] * sign[:, None] * sign
         matrix.flat[:: len(at) + 1] += soft
         right = goal - sign * dense.solved(factor, others)[at]
-        force = np.concatenate([friction, nothing])
+        force = np.zeros(len(at))
+        force[:rubbing] = friction[rubs]
         force = _pivoted(matrix, right, least, most, force)
-        limit = np.zeros(n)
-        limit[hit] = side * force[n:]
-        return force[:n], limit
+        friction, limit = np.zeros(n), np.zeros(n)
+        friction[rubs], limit[hit] = force[:rubbing], (sign * force)[rubbing:]
+        return friction, limit
+
+    def _stop(self, joint: int, place: float, speed: float) -> tuple[float, ...]:
+        """The row of the limit that a joint is beyond: sign, softness, reference, bounds."""
+        low, high = self._ranges[joint]
+        above, below = place - low, high - place
+        side, gap = (1.0, above) if above < below else (-1.0, below)
+        curve, (damping, stiffness, weight) = self._stops[joint]
+        impedance = _impedance(curve, gap)
+        goal = -damping * side * speed - stiffness * impedance * gap
+        return side, _softness(impedance, weight), goal, 0.0, math.inf
 
 
 def _pivoted(matrix: Array, right: Array, least: Array, most: Array, start: Array) -> Array:
@@ -255,11 +265,14 @@ def _pivoted(matrix: Array, right: Array, least: Array, most: Array, start: Arra
     force = np.minimum(np.maximum(start, least), most)
     free = (force > least) & (force < most) | (least == 0) & (most > 0)
     for _ in range(_PIVOTS):
-        inside, held = free.nonzero()[0], (~free).nonzero()[0]
-        rows = inside[:, None]
-        bound = dense.times(matrix[rows, held], force[held])
-        factor = dense.factored(matrix[rows, inside])
-        force[inside] = dense.solved(factor, right[inside] - bound)
+        if free.all():
+            force = dense.solved(dense.factored(matrix.copy()), right)
+        else:
+            inside, held = free.nonzero()[0], (~free).nonzero()[0]
+            rows = inside[:, None]
+            bound = dense.times(matrix[rows, held], force[held])
+            factor = dense.factored(matrix[rows, inside])
+            force[inside] = dense.solved(factor, right[inside] - bound)
         outside = free & ((force < least) | (force > most))
         force = np.minimum(np.maximum(force, least), most)
         miss = dense.times(matrix, force) - right
@@ -295,30 +308,32 @@ def _range(ranges: Array, limited: Any) -> tuple[Array, Array]:
     return low, high
 
 
-def _clipped(solimp: Array) -> Array:
-    """Rows of solimp (n, 5), each number within what MuJoCo takes."""
+def _curves(solimp: Array) -> list[list[float]]:
+    """Rows of solimp, each number within what MuJoCo takes; then the scales of both halves.
+
+    Their powers are Python's: the last bits of NumPy's are those of the processor.
+    """
     least, most = [1e-4, 1e-4, 1e-15, 1e-4, 1.0], [0.9999, 0.9999, 9e9, 0.9999, 9e9]
-    return np.clip(solimp, least, most)
+    curves = []
+    for low, high, width, middle, power in np.clip(solimp, least, most).tolist():
+        scales = [math.pow(part, power - 1) or _TINY for part in (middle, 1 - middle)]
+        curves.append([low, high, width, middle, power, *scales])
+    return curves
 
 
-def _impedance(solimp: Array, distance: Array) -> Array:
-    """d(r) of clipped rows (n, 5) [MuJoCo's manual, chapter Modeling, Solver parameters]."""
-    low, high, width, middle, power = solimp.T
-    x = np.minimum(np.abs(distance) / width, 1.0)
-    rising = _powers(x, power) / _powers(middle, power - 1)
-    falling = 1 - _powers(1 - x, power) / _powers(1 - middle, power - 1)
-    found = low + np.where(x <= middle, rising, falling) * (high - low)
-    return np.where(width <= 1e-15, (low + high) / 2, found)
+def _impedance(curve: Sequence[float], distance: float) -> float:
+    """d(r) of a curve [MuJoCo's manual, chapter Modeling, Solver parameters]."""
+    low, high, width, middle, power, rising, falling = curve
+    if width <= 1e-15:
+        return (low + high) / 2
+    x = min(abs(distance) / width, 1.0)
+    part = math.pow(x, power) / rising if x <= middle else 1 - math.pow(1 - x, power) / falling
+    return low + part * (high - low)
 
 
-def _powers(base: Array, exponent: Array) -> Array:
-    """Powers one by one: the last bits of NumPy's are those of the processor."""
-    return np.array([math.pow(*pair) for pair in zip(base, exponent, strict=True)])
-
-
-def _softness(impedance: Array, inverse_weight: Array) -> Array:
+def _softness(impedance: float, inverse_weight: float) -> float:
     """R, by which a constraint yields to its own force."""
-    return np.maximum((1 - impedance) / impedance * inverse_weight, 1e-15)
+    return max((1 - impedance) / impedance * inverse_weight, 1e-15)
 
 
 def _spring(solref: Array, solimp: Array, shortest: float) -> tuple[Array, Array]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from ..interface import Array
 
@@ -47,9 +48,10 @@ def solved(factor: Array, right: Array) -> Array:
     return found
 
 
-def inverse(factor: Array) -> Array:
-    """The inverse (n, n) of the matrix that was factored."""
-    found = np.eye(len(factor))
-    for column in found:  # its own right-hand side
-        mujoco.mju_cholSolve(column, factor, column)
+def inverse_rows(factor: Array, rows: NDArray[np.intp]) -> Array:
+    """Rows (k,) of the inverse, (k, n), of the matrix that was factored."""
+    found = np.zeros((len(rows), len(factor)))
+    found[np.arange(len(rows)), rows] = 1.0
+    for row in found:  # its own right-hand side
+        mujoco.mju_cholSolve(row, factor, row)
     return found

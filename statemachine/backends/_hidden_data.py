@@ -20,8 +20,14 @@ from ._hidden_world import HiddenWorld, LookAhead, Moment, bounded
 
 
 class HiddenModel(Model):
-    """A Model whose every Data has a world of its own."""
+    """A Model whose every Data has a world of its own.
 
+    Attributes:
+        max_qvel: (nv,) [rad/s or m/s]; a step after which a velocity is beyond it raises
+            DivergedError.
+    """
+
+    max_qvel: Array
     _open_world: Callable[[], HiddenWorld]
     _look_ahead: LookAhead
 
@@ -30,8 +36,10 @@ class HiddenModel(Model):
 
         Args:
             open_world: Opens a world; to be pickled with the Model.
-            **facts: What `Model.__init__` wants.
+            **facts: What `Model.__init__` wants, and max_qvel, which is `HUGE` by default; see
+                `compiled.fastest`.
         """
+        facts.setdefault("max_qvel", np.full(facts["nv"], HUGE))
         super().__init__(_open_world=open_world, _look_ahead=LookAhead(open_world), **facts)
 
     def _make_data(self) -> HiddenData:
@@ -53,11 +61,18 @@ class Machine:
 
     def __init__(self, model: HiddenModel) -> None:
         self._model, self._substeps = model, model.substeps
-        self.world = model._open_world()
+        self._bounds = np.full(model.nq, HUGE), np.minimum(model.max_qvel, HUGE)
+        self._fastest = float(self._bounds[1].min(initial=HUGE))
+        self.world = self._told(model._open_world())
         self.qpos, self.qvel = np.zeros(model.nq), np.zeros(model.nv)
         self.ctrl = np.zeros(model.nu)
         self._used = False
         self.reset(None)
+
+    def _told(self, world: HiddenWorld) -> HiddenWorld:
+        """A world that knows the smallest bound of a velocity."""
+        world.fastest = self._fastest
+        return world
 
     def reset(self, key: int | None) -> None:
         """Be in the default state, or in a keyframe's."""
@@ -72,7 +87,7 @@ class Machine:
     def restart(self, time: float, start: Moment) -> None:
         """Take a state whole; nothing of before has any part in what follows."""
         if self._used:
-            self.world = self.world.renewed()
+            self.world = self._told(self.world.renewed())
             self._used = False
         self.time = time
         self.qpos[:], self.qvel[:], self.ctrl[:] = start.qpos, start.qvel, start.ctrl
@@ -127,7 +142,7 @@ class Machine:
             moment = Moment(*before, self._ctrl, memory)
             time = self._several(1, time)
             qpos, qvel = world.read()
-            if not world.looks_at_all and not bounded(qpos, qvel):
+            if not world.looks_at_all and not bounded(qpos, qvel, self._fastest):
                 self._diverge(time)
             left = qpos, qvel, qpos.tobytes(), qvel.tobytes()
             self.moment, self._lives, self.derived = moment, True, {}
@@ -150,15 +165,18 @@ class Machine:
         return time
 
     def _diverge(self, time: float) -> None:
-        """Raise DivergedError for the first coordinate that is not finite, or is huge."""
-        for name, array in zip(INPUTS, self.world.read(), strict=False):
-            bad = np.flatnonzero(~(np.abs(array) <= HUGE))
+        """Raise DivergedError for the first coordinate that is not finite, or beyond its bound."""
+        for name, array, most in zip(INPUTS, self.world.read(), self._bounds, strict=False):
+            bad = np.flatnonzero(~(np.abs(array) <= most))
             if len(bad):
                 index = int(bad[0])
-                label = self._model._coordinate_name(name, index)
+                entry = f"{name}[{index}]{self._model._coordinate_name(name, index)}"
+                what = "became NaN, infinite or huge"
+                if abs(array[index]) < HUGE:
+                    what = f"= {array[index]:.3g} went beyond max_qvel, {most[index]:.3g},"
                 raise DivergedError(
-                    f"{name}[{index}]{label} became NaN, infinite or huge at "
-                    f"time {time:g} s. This Data now takes only reset and set_state",
+                    f"{entry} {what} at time {time:g} s. "
+                    "This Data now takes only reset and set_state",
                     quantity=name,
                     index=index,
                     time=time,
@@ -279,7 +297,7 @@ class HiddenData(Data):
     def _failed(self, error: Exception) -> None:
         world = self._machine.world
         if isinstance(error, DivergedError):
-            self._give_up(f"{error.quantity}[{error.index}] was not finite at {error.time:g} s")
+            self._give_up(f"{error.quantity}[{error.index}] diverged at {error.time:g} s")
         elif isinstance(error, world.errors):
             self._give_up(f"{world.engine} gave up: {error}")
             raise EngineError(f"{world.engine} gave up: {error}") from error

@@ -49,6 +49,7 @@ class HiddenWorld(ABC):
         timestep: Simulated time of one engine step [s].
         qpos0: (nq,) positions of the default state.
         raw: The engine's own object, which `Data.raw` gives.
+        fastest: The smallest `max_qvel` of the Model [rad/s or m/s]; the Data sets it.
         looks_at_all: Whether `diverging` looks at every coordinate; else all are looked at
             at the end of a call.
     """
@@ -60,6 +61,7 @@ class HiddenWorld(ABC):
     timestep: float
     qpos0: Array
     raw: Any
+    fastest: float = HUGE
     looks_at_all: bool = True
     # Held while a world that several Data share is used. One for all Models.
     lock = threading.RLock()
@@ -123,11 +125,11 @@ class HiddenWorld(ABC):
         return {}
 
     def diverging(self) -> bool:
-        """A quick look after each engine step: may a coordinate be NaN or beyond `HUGE`?
+        """A quick look after each engine step: may a coordinate be NaN or beyond its bound?
 
         If so, all are read, and the first that is raises DivergedError.
         """
-        return not bounded(*self.read())
+        return not bounded(*self.read(), self.fastest)
 
     def clamp(self, ctrl: Array) -> None:  # noqa: B027  (optional hook)
         """Bring a command (nu,) within its ranges, in place.
@@ -209,6 +211,9 @@ def values_of(world: HiddenWorld, moment: Moment) -> dict[str, Any]:
     return values
 
 
-def bounded(qpos: Array, qvel: Array) -> bool:
-    """Whether no coordinate is NaN or beyond `HUGE`, by a cheap sufficient condition."""
-    return bool(qpos.dot(qpos) + qvel.dot(qvel) < _MANY)
+def bounded(qpos: Array, qvel: Array, fastest: float) -> bool:
+    """Whether no position is beyond `HUGE`, no velocity beyond `fastest`, and none is NaN.
+
+    By a cheap sufficient condition.
+    """
+    return bool(qpos.dot(qpos) < _MANY and qvel.dot(qvel) < fastest * fastest)

@@ -25,7 +25,8 @@ import mujoco
 import numpy as np
 
 from ..errors import BadInputError, ModelError
-from ..interface import Array, Keyframe
+from ..interface import Array, JointType, Keyframe
+from ..interface.checks import HUGE, TINY
 from ..models import mesh_file
 from ._mjb import check_binary
 
@@ -42,6 +43,10 @@ _HINDRANCES = {  # option -> flags of a file that would leave it without effect
     "contacts": (_DISABLE.mjDSBL_CONSTRAINT,),
     "limits": (_DISABLE.mjDSBL_CONSTRAINT,),
 }
+
+# For `fastest`: in a step [rad, or the model's extent]; at least [rad/s or m/s]; about a day [s].
+_FAR, _FAST, _DAY = 1000.0, 1e5, 1e5
+_FREE, _SLIDE = int(JointType.FREE), int(JointType.SLIDE)
 
 # What nothing is computed from, but a user's own code: and what only muscles are, which is
 # infinite for a motor with a huge gear.
@@ -90,9 +95,19 @@ def compile_file(path: str | os.PathLike[str]) -> mujoco.MjModel:
     except (ValueError, MemoryError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split()) or "out of memory"
         raise ModelError(f"MuJoCo cannot read {text}: {reason}") from error
-    for problem in _problems(raw):
-        raise ModelError(f"{text} has a number that nothing can be computed with: {problem}")
+    check_numbers(raw, text)
     return raw
+
+
+def check_numbers(raw: mujoco.MjModel, name: str) -> None:
+    """Raise ModelError if a number of a compiled model is none, or has an impossible sign.
+
+    Args:
+        raw: The compiled model.
+        name: What the message calls it.
+    """
+    for problem in _problems(raw):
+        raise ModelError(f"{name} has a number that nothing can be computed with: {problem}")
 
 
 _PACKAGE = re.compile(r"(?<=[\"'])package://[^\"']*")
@@ -195,6 +210,43 @@ def step_length(timestep: float, substeps: int, options: dict[str, Any]) -> floa
     if whole / substeps <= 0:
         raise BadInputError(f"a timestep of {whole} s cannot have {substeps} substeps")
     return whole / substeps
+
+
+def fastest(m: mujoco.MjModel) -> Array:
+    """Velocities (nv,) [rad/s or m/s] beyond which a degree of freedom has diverged.
+
+    Of each the largest of three:
+
+    - 1000 rad in a timestep, or 1000 times the model's extent: no engine can follow that;
+    - 1e5;
+    - what gravity and its own actuators reach against damping in 1e5 s. That is `HUGE` where
+      an actuator has no limit. A position servo is left out: it pulls back.
+    """
+    straight = np.zeros(m.nv, dtype=bool)  # slides, and where free bodies are
+    for kind, start in zip(m.jnt_type, m.jnt_dofadr, strict=True):
+        straight[start : start + 3 * (kind == _FREE) + (kind == _SLIDE)] = True
+    in_a_step = _FAR * np.where(straight, m.stat.extent, 1.0) / m.opt.timestep
+
+    known, owner = facts(m), np.repeat(np.arange(m.nactuator), m.actuator_ctrlnum)
+    gain, bias = m.actuator_gainprm[owner, 0], m.actuator_biasprm[owner]
+    gear, joints = np.abs(known["actuator_gear"]), known["actuator_jntid"]
+    command = np.abs(known["actuator_ctrlrange"]).max(axis=1)
+    wanted = np.multiply(np.abs(gain), command, out=np.zeros(m.nu), where=gain != 0)
+    wanted += np.abs(bias[:, 0])
+    limit = np.abs(known["actuator_forcerange"]).max(axis=1)
+    pulls = (joints >= 0) & (bias[:, 1] >= 0) & (gear > 0)
+    dofs = m.jnt_dofadr[joints[pulls]]
+
+    def reached(force: Array, slope: Array) -> Array:
+        total = np.where(straight, m.dof_M0 * np.linalg.norm(gravity(m)), 0.0)
+        damping = m.dof_damping + m.dof_M0 / _DAY
+        np.add.at(total, dofs, (gear * force)[pulls])
+        np.add.at(damping, dofs, (gear**2 * slope)[pulls])
+        return total / np.maximum(damping, TINY)
+
+    slope = np.maximum(-bias[:, 2], 0.0)
+    within = np.minimum(reached(wanted, slope), reached(np.minimum(wanted, limit), 0 * slope))
+    return np.minimum(np.maximum(np.maximum(in_a_step, _FAST), within), HUGE)
 
 
 def gravity(m: mujoco.MjModel) -> Array:

@@ -30,9 +30,9 @@ from ..interface import (
     Model,
     State,
 )
-from ..interface.checks import TINY, check_finite
+from ..interface.checks import HUGE, TINY, check_finite
 from ._mujoco_alarms import AlarmError, Alarms, pass_on
-from .compiled import compile_file, compiler_warnings, edited, facts, step_length
+from .compiled import check_numbers, compile_file, compiler_warnings, edited, facts, step_length
 
 _DISABLE = mujoco.mjtDisableBit
 # Not RK4: after its step the derived values are neither of the state before nor after.
@@ -67,7 +67,11 @@ _NOTES = {
     ),
     "forces by part": Behaviour("native", "rows of the constraint solver, by their type"),
     "exact restore": Behaviour("native", "mjSTATE_INTEGRATION, warm start included"),
-    "no automatic reset": Behaviour("native", "the engine's flag mjDSBL_AUTORESET"),
+    "no automatic reset": Behaviour(
+        "native",
+        "the engine's flag mjDSBL_AUTORESET; DivergedError where qpos, qvel or qacc is beyond "
+        f"{HUGE:g}, the engine's own bound",
+    ),
 }
 _WITH_RK4 = Behaviour("unsupported", "with RK4 derived values are those of its fourth stage")
 _WITH_SLEEP = Behaviour("unsupported", "the counters of sleeping bodies are in no State")
@@ -87,7 +91,7 @@ def _capabilities(raw: mujoco.MjModel) -> Capabilities:
     if asleep:
         behaviours["exact restore"] = _WITH_SLEEP
     return Capabilities(
-        options=OPTIONS,
+        options=tuple(name for name in OPTIONS if name != "max_qvel"),
         integrators=tuple(_INTEGRATORS),
         behaviours=behaviours,
         shared_model=True,
@@ -137,6 +141,10 @@ class MujocoModel(Model):
     @property
     def compiled(self) -> mujoco.MjModel:
         return self.raw
+
+    def with_compiled(self, compiled: mujoco.MjModel) -> MujocoModel:
+        check_numbers(compiled, str(self.path))
+        return MujocoModel(compiled, self.path, self.substeps)
 
     def _make_data(self) -> MujocoData:
         try:

@@ -22,9 +22,11 @@ from ..installed import engine_version
 from ..interface import (
     BEHAVIOURS,
     OPTIONS,
+    Array,
     Behaviour,
     Capabilities,
 )
+from ..interface.checks import HUGE
 from ..interface.options import checked_options
 from . import _bullet_urdf as urdf
 from ._bullet_driven import DrivenWorld
@@ -33,7 +35,15 @@ from ._bullet_scope import check, ignored
 from ._bullet_shared import Shared
 from ._bullet_world import ENGINE_TIMESTEP, World
 from ._hidden_data import HiddenData, HiddenModel
-from .compiled import compile_file, compiler_warnings, edited, facts, step_length
+from .compiled import (
+    check_numbers,
+    compile_file,
+    compiler_warnings,
+    edited,
+    facts,
+    fastest,
+    step_length,
+)
 
 _EMULATED = {
     "stale after a write": "by copies of the adapter; the engine's own values follow a write",
@@ -50,7 +60,6 @@ _EMULATED = {
     "free joint conventions": "converted: the engine speaks of the centre of mass, and x y z w; "
     "it turns a body wrongly beyond 45° a step",
     "forces by part": "contact: what a step did beyond all other forces; those as solved",
-    "no automatic reset": "the adapter looks at every step; the engine goes on with NaN in silence",
 }
 _NATIVE = {
     "contacts": "the engine's own, which are hard: solref, solimp and the friction cone have no "
@@ -76,14 +85,20 @@ _AS_IT_COMES = {
 }
 
 
-def _capabilities(as_it_comes: bool) -> Capabilities:
+def _capabilities(as_it_comes: bool, max_qvel: Array | None = None) -> Capabilities:
+    """The record of a Model; before there is one, without its bound."""
     behaviours = {name: Behaviour("emulated", note) for name, note in _EMULATED.items()}
     behaviours |= {name: Behaviour("native", note) for name, note in _NATIVE.items()}
     behaviours["exact restore"] = Behaviour("unsupported", _RESTORE)
     options = tuple(name for name in OPTIONS if name != "integrator")
     if as_it_comes:
         behaviours |= _AS_IT_COMES
-        options = ("actuation", "gravity", "timestep", "substeps", "contacts")
+        options = ("actuation", "gravity", "timestep", "substeps", "contacts", "max_qvel")
+    behaviours["no automatic reset"] = Behaviour(
+        "emulated",
+        "the adapter looks at every step, and raises DivergedError where qvel is beyond "
+        f"{_bound(max_qvel)} (max_qvel) or qpos beyond {HUGE:g}; the engine goes on in silence",
+    )
     return Capabilities(
         options=options,
         integrators=(),
@@ -91,6 +106,14 @@ def _capabilities(as_it_comes: bool) -> Capabilities:
         shared_model=False,
         exact_restore=False,
     )
+
+
+def _bound(max_qvel: Array | None) -> str:
+    """The bound of a Model in words, as "2e+05" or "2e+05 to 1e+10"."""
+    if max_qvel is None or not len(max_qvel):
+        return "its bound"
+    low, high = max_qvel.min(), max_qvel.max()
+    return f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"
 
 
 def load(
@@ -130,7 +153,7 @@ def load(
         raw.opt.timestep = step_length(float(raw.opt.timestep), substeps, checked)
     plan = Plan(raw)
     check(plan, "pybullet")
-    model = PybulletModel(plan, Path(path), substeps, defaults)
+    model = PybulletModel(plan, Path(path), substeps, defaults, checked.get("max_qvel"))
     World(plan, model._shared.kind).close()  # what PyBullet cannot read shows now
     differences = [*ignored(plan), *plan.surfaces.differences]
     if differences and defaults == "model":
@@ -151,6 +174,7 @@ class PybulletModel(HiddenModel):
     plan: Plan
     defaults: Literal["model", "engine"]
     _shared: Shared
+    _asked: Array | None  # max_qvel, where it was set
 
     def __init__(
         self,
@@ -158,8 +182,10 @@ class PybulletModel(HiddenModel):
         path: Path,
         substeps: int,
         defaults: Literal["model", "engine"],
+        max_qvel: Array | None = None,
     ) -> None:
         as_it_comes, raw = defaults == "engine", plan.raw
+        bound = fastest(raw) if max_qvel is None else max_qvel
         shared = Shared(plan, "engine" if as_it_comes else "stepped")
         super().__init__(
             partial(DrivenWorld, shared),
@@ -170,18 +196,24 @@ class PybulletModel(HiddenModel):
                 raw.body(b).name or f"body {b}": plan.described(b, shared.kind)
                 for b in (0, *urdf.roots(raw))
             },
-            capabilities=_capabilities(as_it_comes),
+            capabilities=_capabilities(as_it_comes, bound),
+            max_qvel=bound,
             timestep=float(raw.opt.timestep) * substeps,
             substeps=substeps,
             **facts(raw),
             plan=plan,
             defaults=defaults,
             _shared=shared,
+            _asked=max_qvel,
         )
 
     @property
     def compiled(self) -> mujoco.MjModel:
         return self.plan.raw
+
+    def with_compiled(self, compiled: mujoco.MjModel) -> PybulletModel:
+        check_numbers(compiled, str(self.path))
+        return self._of(compiled, self.substeps, self._asked)
 
     @property
     def shared_worlds(self) -> dict[str, World]:
@@ -197,9 +229,12 @@ class PybulletModel(HiddenModel):
         raw = edited(self.plan.raw, options)
         substeps = options.get("substeps", self.substeps)
         raw.opt.timestep = step_length(self.timestep, substeps, options)
+        return self._of(raw, substeps, options.get("max_qvel", self._asked))
+
+    def _of(self, raw: mujoco.MjModel, substeps: int, asked: float | None) -> PybulletModel:
         plan = Plan(raw)
         check(plan, "pybullet")
-        return PybulletModel(plan, self.path, substeps, self.defaults)
+        return PybulletModel(plan, self.path, substeps, self.defaults, asked)
 
 
 class PybulletData(HiddenData):

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..description.records import Placement, Robot
+from ..description.records import Robot
 from ..engines import needed_part
-from ..engines.parts import CompilerPart
+from ..engines.parts import BodyPair, CompilerPart
 from ..errors import BadInputError, unknown_name
 from ..installed import DEFAULT
 from ..interface import Array, Model
@@ -23,22 +23,6 @@ from .models.tree import GroupTree
 
 Pairs = tuple[tuple[int, int], ...]
 Only = Mapping[str, tuple[str, ...]]
-
-
-@dataclass(frozen=True, eq=False)
-class BodyPair:
-    """A moving body of one Model, or the world, and its counterpart.
-
-    Attributes:
-        one, two: Ids of the bodies.
-        align: The frame of `one` in that of `two`, as the same solid.
-        moved: Whether it hangs on another part in the other Model.
-    """
-
-    one: int
-    two: int
-    align: Placement
-    moved: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +102,9 @@ def match_models(one: Model, two: Model, names: Mapping[str, str] | None = None)
     )
     found = match(trees[0], trees[1])
     joints = _joints(found, trees)
-    solids = tuple(_solid(pair, trees, one, two) for pair in found.pairs)
+    # A body with several joints is several parts of a description, of which the last has its mass.
+    by_body = {solid.one: solid for solid in (_solid(p, trees, one, two) for p in found.pairs)}
+    solids = tuple(by_body.values())
     sites = _by_name(one.site_names, two.site_names, given)
     actuators = _actuators(one, two, joints, given)
     only = tuple(
@@ -262,4 +248,4 @@ def _span(model: Model, joint: int, start: str, end: str) -> NDArray[Any]:
     return np.arange(starts[joint], starts[joint + 1])
 
 
-__all__ = ["BodyPair", "Matched", "match_models"]
+__all__ = ["Matched", "match_models"]

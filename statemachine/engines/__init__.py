@@ -31,6 +31,7 @@ PARTS: dict[str, str] = {
     "dials": "Models between the engine as it comes and the contract",
     "audit": "the engine by its own functions, to find out what its state is",
     "reading": "what the engine makes of a file, as a description",
+    "differences": "all that two compiled models differ in, and what brings one to the other",
     "energy": "the energies of states, by which all engines are measured",
     "mutants": "where a seeded fault is put into its backend",
     "plain": "a file as its own users run it, to compare bits with",

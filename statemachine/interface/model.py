@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import BadInputError, ReadOnlyError, unknown_name
+from ..errors import BadInputError, ReadOnlyError, UnsupportedError, unknown_name
 from .checks import TINY, index_of, whole_number
 from .options import checked_options
 from .records import Array, Capabilities, Ints, JointType, Keyframe, read_only
@@ -173,13 +173,32 @@ class Model(ABC):
                 timestep: > 0 [s]; substeps: engine steps within it, at least 1;
                 armature, damping, frictionloss: ≥ 0, (nv,) or one number for every
                 hinge and slide joint;
-                integrator: a name of `capabilities.integrators`.
+                integrator: a name of `capabilities.integrators`;
+                max_qvel: > 0 [rad/s or m/s], (nv,) or one number: beyond it a step raises
+                DivergedError. By default it is computed for each Model.
 
         Raises:
             UnsupportedError: This backend has no such option.
             BadInputError: The value has the wrong shape, kind or size.
         """
         return self._replace(checked_options(self, options))
+
+    def with_compiled(self, compiled: Any) -> Model:
+        """Another Model of the same engine and file, from another compiled model.
+
+        Args:
+            compiled: An edited copy of `compiled`; its timestep is that of an engine step.
+
+        Raises:
+            UnsupportedError: The backend starts from no compiled model, or cannot run this one.
+            ModelError: It has a number that nothing can be computed with.
+        """
+        raise UnsupportedError(
+            f"{self.backend} makes no Model from a compiled one",
+            backend=self.backend,
+            feature="compiled",
+            reason="it does not start from one",
+        )
 
     def _check_quaternions(self, qpos: Array) -> None:
         """Raise BadInputError for a quaternion of `qpos` (nq,) that is zero."""

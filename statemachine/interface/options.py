@@ -11,7 +11,8 @@ from ..errors import BadInputError, UnsupportedError, shown, unknown_name
 from .checks import as_count, as_numbers, as_scalar, as_switch, as_vector
 from .records import Array, Capabilities, Ints, JointType
 
-PER_DOF = ("armature", "damping", "frictionloss")  # one number for each degree of freedom
+# One number for each degree of freedom.
+PER_DOF = ("armature", "damping", "frictionloss")
 _SWITCHES = ("actuation", "contacts", "limits")
 OPTIONS = (
     "actuation",
@@ -22,6 +23,7 @@ OPTIONS = (
     *PER_DOF,
     "limits",
     "integrator",
+    "max_qvel",
 )
 
 
@@ -56,6 +58,8 @@ def checked_options(of: Optioned, options: Mapping[str, Any]) -> dict[str, Any]:
             raise unsupported(of, name)
         if name in PER_DOF:
             checked[name] = _per_dof(of, name, value)
+        elif name == "max_qvel":
+            checked[name] = _fastest(of, value)
         else:
             checked[name] = as_option(name, value, of.capabilities.integrators)
     return checked
@@ -75,8 +79,7 @@ def unsupported(of: Optioned, feature: str) -> UnsupportedError:
 
 def _per_dof(of: Optioned, name: str, value: Any) -> Array:
     """The value of an option of `PER_DOF`, one number or (nv,), as a new array (nv,)."""
-    numbers = as_numbers(value, name)
-    given = as_vector(numbers, (of.nv,) if numbers.ndim else (), name)
+    given = _numbers(of, name, value)
     if (given < 0).any():
         raise BadInputError(f"{name} must not be negative; got {shown(value)}")
     if given.ndim:
@@ -88,11 +91,25 @@ def _per_dof(of: Optioned, name: str, value: Any) -> Array:
     return values
 
 
+def _fastest(of: Optioned, value: Any) -> Array:
+    """The value of max_qvel, one number or (nv,), as a new array (nv,)."""
+    given = _numbers(of, "max_qvel", value)
+    if (given <= 0).any():
+        raise BadInputError(f"max_qvel must be above 0; got {shown(value)}")
+    return np.array(np.broadcast_to(given, (of.nv,)))
+
+
+def _numbers(of: Optioned, name: str, value: Any) -> Array:
+    """One number, or one for each degree of freedom (nv,)."""
+    numbers = as_numbers(value, name)
+    return as_vector(numbers, (of.nv,) if numbers.ndim else (), name)
+
+
 def as_option(name: str, value: Any, integrators: Sequence[str]) -> Any:
-    """The value of an option that is none of `PER_DOF`, as a backend takes it.
+    """The value of an option that does not depend on the model, as a backend takes it.
 
     Args:
-        name: Of `OPTIONS`.
+        name: Of `OPTIONS`, but for `PER_DOF` and max_qvel.
         value: Whatever the caller gave.
         integrators: Those that the backend knows.
 

@@ -1,0 +1,106 @@
+"""Rigid parts of a compiled model: what moves as one, and what it weighs, in one frame."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...description.records import HERE, Inertial, Placement
+from ...interface import Array
+from ...rotations import matrix_from_quat
+
+SLIDE, HINGE = 2, 3  # mjtJoint
+
+
+class Solids:
+    """The rigid parts of a compiled model, each by the body that is its head."""
+
+    def __init__(self, raw: Any) -> None:
+        self.raw = raw
+        self._places: dict[int, Placement] = {}
+
+    def head(self, body: int) -> int:
+        """The first body of the rigid part that a body is in."""
+        return int(self.raw.body_weldid[body])
+
+    def members(self, head: int) -> list[int]:
+        """All bodies of a rigid part."""
+        return np.flatnonzero(self.raw.body_weldid == head).tolist()
+
+    def place(self, body: int) -> Placement:
+        """The frame of a body in that of its rigid part."""
+        if body == self.head(body):
+            return HERE
+        if body not in self._places:
+            above = self.place(int(self.raw.body_parentid[body]))
+            self._places[body] = above @ placed(self.raw.body_pos[body], self.raw.body_quat[body])
+        return self._places[body]
+
+    def hangs(self, head: int) -> Placement:
+        """The frame of a rigid part in that of the part that carries it, joints at qpos0."""
+        own = placed(self.raw.body_pos[head], self.raw.body_quat[head])
+        return self.place(int(self.raw.body_parentid[head])) @ own
+
+    def massive(self, head: int) -> list[int]:
+        """The bodies of a rigid part that have a mass or an inertia."""
+        raw = self.raw
+        return [
+            body
+            for body in self.members(head)
+            if raw.body_mass[body] or raw.body_inertia[body].any()
+        ]
+
+    def inertial(self, head: int) -> Inertial:
+        """All bodies of a rigid part together, in its frame."""
+        parts = [self.inertial_of(body) for body in self.massive(head)]
+        if len(parts) == 1:
+            return parts[0]
+        mass = sum(part.mass for part in parts)
+        if not mass:
+            return Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
+        com = sum((part.mass * part.com for part in parts), np.zeros(3)) / mass
+        tensor = np.zeros((3, 3))
+        for part in parts:
+            away = part.com - com
+            tensor += part.tensor + part.mass * (away @ away * np.eye(3) - np.outer(away, away))
+        return Inertial(mass, com, tensor)
+
+    def inertial_of(self, body: int) -> Inertial:
+        """One body, in the frame of its rigid part."""
+        raw, place = self.raw, self.place(body)
+        axes = place.mat @ matrix_from_quat(raw.body_iquat[body])
+        tensor = axes @ np.diag(raw.body_inertia[body]) @ axes.T
+        return Inertial(float(raw.body_mass[body]), place.of(raw.body_ipos[body]), tensor)
+
+    def geom(self, geom: int) -> Placement:
+        """The frame of a geom in that of its rigid part."""
+        raw = self.raw
+        return self.place(int(raw.geom_bodyid[geom])) @ placed(
+            raw.geom_pos[geom], raw.geom_quat[geom]
+        )
+
+    def site(self, site: int) -> Placement:
+        """The frame of a site in that of its rigid part."""
+        raw = self.raw
+        return self.place(int(raw.site_bodyid[site])) @ placed(
+            raw.site_pos[site], raw.site_quat[site]
+        )
+
+    def vertices(self, geom: int) -> Array:
+        """Those (n, 3) of a mesh geom [m], in the frame of its rigid part."""
+        raw, place = self.raw, self.geom(geom)
+        mesh = int(raw.geom_dataid[geom])
+        start = int(raw.mesh_vertadr[mesh])
+        points = raw.mesh_vert[start : start + int(raw.mesh_vertnum[mesh])]
+        return place.pos + np.asarray(points, dtype=np.float64) @ place.mat.T
+
+
+def placed(pos: Array, quat: Array) -> Placement:
+    """A pose of the compiled model as a Placement."""
+    return Placement(np.array(pos), matrix_from_quat(np.asarray(quat)))
+
+
+def apart(one: Placement, two: Placement) -> tuple[float, float]:
+    """How far two poses are from each other: [m], and the largest entry of the matrices."""
+    return one.distance(two), float(np.abs(one.mat - two.mat).max())

@@ -1,0 +1,165 @@
+"""When an engine with a world of its own has diverged: a bound of each Model, which can be set."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.errors import BadInputError, DivergedError, UnsupportedError
+from statemachine.interface.checks import HUGE
+
+from .conftest import need_engine
+
+ROTOR = """<mujoco><option timestep="{timestep}" integrator="implicitfast"/><worldbody>
+  <body><joint name="rotor" axis="0 0 1"/><geom type="cylinder" size=".1 .01"/></body>
+  <body pos="1 0 0"><joint name="rail" type="slide" axis="0 0 1"/><geom size=".1"/></body>
+  <body name="ball" pos="2 0 0"><freejoint/><geom size=".1"/></body></worldbody>
+  <actuator>{actuator}</actuator></mujoco>"""
+# A post that stands deep in the floor, and turns about nearly the vertical: nothing can lift it.
+STUCK = """<mujoco><option integrator="implicitfast"/><worldbody>
+  <geom type="plane" size="1 1 .1"/><body pos="0 0 .095"><joint axis="0 1e-3 1" damping=".1"/>
+  <geom type="box" size=".1 .1 .1"/><body name="arm" pos="0 0 .3"><joint axis="0 1 0"/>
+  <geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/></body></body></worldbody></mujoco>"""
+
+
+def loaded(folder: Path, text: str, **options: Any) -> sm.Model:
+    need_engine("pybullet")
+    path = folder / "model.xml"
+    path.write_text(text)
+    return sm.load(path, backend="pybullet", **options)
+
+
+def bound(model: sm.Model) -> np.ndarray:
+    return vars(model)["max_qvel"]
+
+
+@pytest.mark.parametrize("timestep", [0.001, 0.005, 0.01])
+def test_what_is_fast_is_no_divergence(tmp_path: Path, timestep: float) -> None:
+    """A rotor at 2000 rad/s, every coordinate but a free body's turning at 1e4, a long fall."""
+    model = loaded(tmp_path, ROTOR.format(timestep=timestep, actuator=""))
+    for speed in (2000.0, 1e4):
+        with sm.make_data(model) as data:
+            data.qvel[:5] = speed
+            sm.step(model, data, 200)
+            assert data.qvel[0] == pytest.approx(speed, rel=1e-6)
+            assert np.abs(data.qvel[1:5]).max() == pytest.approx(speed, rel=0.02)
+    fall = np.sqrt(2 * 9.81 * HUGE)  # where it leaves the positions that engines can compute with
+    assert bound(model)[[1, 2, 3, 4]].min() > fall
+
+
+@pytest.mark.parametrize(
+    ("actuator", "fastest"),
+    [
+        ("", 1e5),
+        ('<position joint="rotor" kp="1"/>', 1e5),
+        # 1 N m against an inertia of 1/2·m·r² = 1.57e-3 kg m², for 1e5 s; twice by its gear.
+        ('<motor joint="rotor" ctrlrange="-1 1" gear="2"/>', 2e5 / 1.5708e-3),
+        ('<motor joint="rotor" forcerange="-1 .5"/>', 1e5 / 1.5708e-3),
+        ('<velocity joint="rotor" kv="1" ctrlrange="-2e6 2e6"/>', 2e6),
+        ('<motor joint="rotor"/>', HUGE),
+    ],
+)
+def test_no_motor_drives_a_joint_beyond_the_bound(
+    tmp_path: Path, actuator: str, fastest: float
+) -> None:
+    text = ROTOR.format(timestep=0.01, actuator=actuator).replace(
+        '<geom type="cylinder"', '<geom type="cylinder" mass=".31416"'
+    )
+    model = loaded(tmp_path, text)
+    assert bound(model)[0] == pytest.approx(fastest, rel=1e-3)
+    with sm.make_data(model) as data:
+        data.ctrl[:] = 1
+        sm.step(model, data, 100)
+
+
+def test_the_bound_follows_the_timestep_and_the_size(tmp_path: Path) -> None:
+    """1000 rad, or 1000 times the extent, in a timestep."""
+    model = loaded(tmp_path, ROTOR.format(timestep=1e-4, actuator=""), gravity=[0, 0, 0])
+    assert model.compiled is not None
+    extent = float(model.compiled.stat.extent)
+    assert bound(model) == pytest.approx([1e7] + [1e7 * extent] * 4 + [1e7] * 3)
+    assert bound(model.replace(timestep=2e-4))[0] == pytest.approx(5e6)
+    assert bound(model.replace(substeps=2))[0] == pytest.approx(2e7)
+
+
+def explode(model: sm.Model) -> DivergedError:
+    """A step with contacts as hard as the engine makes them, until it raises."""
+    import pybullet as pb
+
+    with sm.make_data(model) as data:
+        pb.setPhysicsEngineParameter(globalCFM=0, physicsClientId=data.raw.client)
+        data.qpos[1] = -1
+        with pytest.raises(DivergedError) as caught:
+            sm.step(model, data, 500)
+        with pytest.raises(DivergedError, match=r"qvel\[\d\] diverged at"):
+            sm.step(model, data)
+        sm.reset(model, data)
+        assert data.time == 0
+    return caught.value
+
+
+def test_an_explosion_is_raised_early(tmp_path: Path) -> None:
+    model = loaded(tmp_path, STUCK)
+    error = explode(model)
+    assert "went beyond max_qvel, 5e+05, at time" in str(error)
+    assert error.quantity == "qvel"
+    # Set lower it raises before; set as high as positions may be, later.
+    lower, higher = explode(model.replace(max_qvel=10)), explode(model.replace(max_qvel=HUGE))
+    assert lower.time < error.time < higher.time < 0.1
+
+
+def test_the_bound_can_be_set(tmp_path: Path) -> None:
+    """At load and by replace, one number or one of each; a variant keeps what was set."""
+    text = ROTOR.format(timestep=0.002, actuator="")
+    model = loaded(tmp_path, text, max_qvel=500)
+    assert np.array_equal(bound(model), np.full(8, 500.0))
+    assert np.array_equal(bound(model.replace(timestep=0.001)), bound(model))
+    each = model.replace(max_qvel=[1000, *[1e5] * 7])
+    for variant, top in ((model, 499), (each, 999)):
+        with sm.make_data(variant) as data:
+            data.qvel[0] = top
+            sm.step(variant, data, 3)
+            data.qvel[0] = top + 2
+            with pytest.raises(DivergedError, match=r"qvel\[0\] \(rotor\) = .* went beyond max_"):
+                sm.step(variant, data)
+    with sm.make_data(each) as data:  # another joint may be faster
+        data.qvel[1] = 5000
+        sm.step(each, data, 3)
+
+
+@pytest.mark.parametrize(
+    ("value", "says"),
+    [
+        (0, "above 0"),
+        (-1, "above 0"),
+        ([1, 2], "max_qvel wants 8 numbers"),
+        (np.nan, "not a finite number"),
+        (np.inf, "not a finite number"),
+        (1e11, "is beyond 1e\\+10"),
+        ("fast", "real numbers"),
+        (True, "real numbers"),
+    ],
+)
+def test_a_bad_bound_is_refused_in_a_line(tmp_path: Path, value: object, says: str) -> None:
+    text = ROTOR.format(timestep=0.002, actuator="")
+    with pytest.raises(BadInputError, match=says) as caught:
+        loaded(tmp_path, text, max_qvel=value)
+    assert "\n" not in str(caught.value)
+    with pytest.raises(BadInputError, match=says):
+        loaded(tmp_path, text).replace(max_qvel=value)
+
+
+def test_the_record_shows_the_bound(tmp_path: Path) -> None:
+    text = ROTOR.format(timestep=0.002, actuator="")
+    record = str(loaded(tmp_path, text).capabilities)
+    assert "where qvel is beyond 5e+05 to 1.1e+06 (max_qvel)" in record
+    record = str(loaded(tmp_path, text, max_qvel=700).capabilities)
+    assert "where qvel is beyond 700 (max_qvel)" in record
+    model = sm.load("so101")
+    assert "beyond 1e+10, the engine's own bound" in str(model.capabilities)
+    with pytest.raises(UnsupportedError, match="max_qvel"):
+        model.replace(max_qvel=1e5)
