@@ -231,7 +231,7 @@ class PybulletModel(HiddenModel):
         raw.opt.timestep = step_length(self.timestep, substeps, options)
         return self._of(raw, substeps, options.get("max_qvel", self._asked))
 
-    def _of(self, raw: mujoco.MjModel, substeps: int, asked: float | None) -> PybulletModel:
+    def _of(self, raw: mujoco.MjModel, substeps: int, asked: Array | None) -> PybulletModel:
         plan = Plan(raw)
         check(plan, "pybullet")
         return PybulletModel(plan, self.path, substeps, self.defaults, asked)

@@ -1,8 +1,9 @@
-"""Why two simulations differ: see `attribute`."""
+"""Why two simulations differ: of two files `explain`, of two engines `attribute`."""
 
 from __future__ import annotations
 
 from .attribute import attribute
+from .explain import CauseShare, Explanation, explain
 from .factors import FACTORS, Factor
 from .gap import Deviation
 from .results import Attribution, FactorTrial, FirstTouch
@@ -10,9 +11,12 @@ from .results import Attribution, FactorTrial, FirstTouch
 __all__ = [
     "FACTORS",
     "Attribution",
+    "CauseShare",
     "Deviation",
+    "Explanation",
     "Factor",
     "FactorTrial",
     "FirstTouch",
     "attribute",
+    "explain",
 ]

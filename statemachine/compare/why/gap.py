@@ -8,8 +8,9 @@ import numpy as np
 
 from ...comparison import SAME, common_moments, largest, nearest
 from ...errors import BadInputError, DivergedError, TraceError
-from ...interface import Array, JointType, Model, forward, make_data, usual_site
+from ...interface import Array, Ints, JointType, Model, forward, make_data, usual_site
 from ...traces import Trace
+from ..matching import Matched
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,50 @@ class Curves:
     of: dict[str, Array]
 
 
+@dataclass(frozen=True, eq=False)
+class _Measured:
+    """Where on one side is what both are measured by.
+
+    Attributes:
+        hinges, slides: Addresses in qpos.
+        free: Bodies that float.
+        tip: The site that is measured; None without one.
+    """
+
+    hinges: Ints
+    slides: Ints
+    free: Ints
+    tip: int | None
+
+    @classmethod
+    def of(cls, model: Model) -> _Measured:
+        """All of a Model."""
+        joints = np.arange(model.njnt)
+        return cls._at(model, joints, usual_site(model.site_names))
+
+    @classmethod
+    def pair(cls, matched: Matched) -> tuple[_Measured, _Measured]:
+        """What two Models have in common."""
+        joints = np.array(matched.joints, dtype=np.int64).reshape(-1, 2).T
+        names = [matched.one.site_names[a] for a, _ in matched.sites]
+        tip = usual_site(names)
+        sites = (None, None) if tip is None else matched.sites[tip]
+        models = matched.one, matched.two
+        one, two = (cls._at(m, j, s) for m, j, s in zip(models, joints, sites, strict=True))
+        return one, two
+
+    @classmethod
+    def _at(cls, model: Model, joints: Ints, tip: int | None) -> _Measured:
+        kinds = model.jnt_type[joints]
+        places = model.jnt_qposadr[joints]
+        return cls(
+            hinges=places[kinds == int(JointType.HINGE)],
+            slides=places[kinds == int(JointType.SLIDE)],
+            free=model.jnt_bodyid[joints[kinds == int(JointType.FREE)]],
+            tip=tip,
+        )
+
+
 class Ruler:
     """What all runs of one attribution are measured by: the same moments and quantities.
 
@@ -50,9 +95,18 @@ class Ruler:
         units: Unit of each quantity.
     """
 
-    def __init__(self, model: Model, one: Trace, two: Trace) -> None:
-        """Of two runs as they come; `model` is what poses are computed with."""
-        if (model.nq, model.joint_names) != (two.header.nq, two.header.joints):
+    def __init__(
+        self, model: Model, one: Trace, two: Trace, matched: Matched | None = None
+    ) -> None:
+        """Of two runs as they come.
+
+        Args:
+            model: That of `one`; poses are computed with it, unless `curves` is given another.
+            one: A run.
+            two: The other.
+            matched: What of `model` is what of the other's Model; None if they are built alike.
+        """
+        if matched is None and (model.nq, model.joint_names) != (two.header.nq, two.header.joints):
             raise BadInputError("the two models have other joints: there is nothing to attribute")
         try:
             self.between, self.time = False, common_moments(one, two).time
@@ -61,60 +115,70 @@ class Ruler:
             slack = SAME * one.header.timestep
             self.between, self.time = True, time[time <= end + slack]
         self._model = model
-        kinds, places = model.jnt_type, model.jnt_qposadr
-        self._hinges = places[kinds == int(JointType.HINGE)]
-        self._slides = places[kinds == int(JointType.SLIDE)]
-        self._free = model.jnt_bodyid[kinds == int(JointType.FREE)]
-        self._tip = usual_site(model.site_names)
+        if matched is None:
+            self._sides = (_Measured.of(model),) * 2
+        else:
+            self._sides = _Measured.pair(matched)
+        measured = self._sides[0]
         self.units = {}
-        if len(self._hinges):
+        if len(measured.hinges):
             self.units["joints"] = "rad"
-        if len(self._slides):
+        if len(measured.slides):
             self.units["slides"] = "m"
-        if self._tip is not None:
+        if measured.tip is not None:
             self.units[self._tip_name] = "m"
-        for body in self._free:
+        for body in measured.free:
             self.units[model.body_names[body]] = "m"
-            if self._tip is not None:
+            if measured.tip is not None:
                 self.units[self._in_hand(body)] = "m"
         if not self.units:
-            raise BadInputError(f"nothing can be measured in {model.path.name}: it has no joint")
+            raise BadInputError(
+                f"nothing can be measured in {model.path.name}: it has no joint"
+                + ("" if matched is None else " that the other has, too")
+            )
 
     @property
     def _tip_name(self) -> str:
-        assert self._tip is not None
-        return self._model.site_names[self._tip] or f"site {self._tip}"
+        tip = self._sides[0].tip
+        assert tip is not None
+        return self._model.site_names[tip] or f"site {tip}"
 
     def _in_hand(self, body: int) -> str:
         return f"{self._model.body_names[body]} in the hand"
 
-    def curves(self, trace: Trace) -> Curves | None:
-        """A run at the moments of the ruler; None if it ended before the last of them."""
+    def curves(self, trace: Trace, model: Model | None = None, side: int = 0) -> Curves | None:
+        """A run at the moments of the ruler; None if it ended before the last of them.
+
+        Args:
+            trace: The run.
+            model: What its poses are computed with; None for the ruler's own Model.
+            side: 0 for a run of the first Model, 1 for one of the second.
+        """
         time = trace.time - trace.time[0]
         if trace.header.ended or time[-1] < self.time[-1] - SAME * trace.header.timestep - 1e-9:
             return None
         qpos = _rows(time, trace.qpos, self.time, trace.header.timestep)
-        found: dict[str, Array] = {}
-        if len(self._hinges):
-            found["joints"] = qpos[:, self._hinges]
-        if len(self._slides):
-            found["slides"] = qpos[:, self._slides]
-        if self._tip is None and not len(self._free):
+        measured, found = self._sides[side], dict[str, Array]()
+        if len(measured.hinges):
+            found["joints"] = qpos[:, measured.hinges]
+        if len(measured.slides):
+            found["slides"] = qpos[:, measured.slides]
+        if measured.tip is None and not len(measured.free):
             return Curves(found)
         try:
-            found |= self._poses(qpos)
+            found |= self._poses(qpos, model or self._model, measured)
         except DivergedError:
             return None
         return Curves(found)
 
-    def _poses(self, qpos: Array) -> dict[str, Array]:
-        model, tip = self._model, self._tip
+    def _poses(self, qpos: Array, model: Model, measured: _Measured) -> dict[str, Array]:
+        tip = measured.tip
         sites, turns, bodies = [], [], []
         with make_data(model) as data:
             for row in qpos:
                 data.qpos = row
                 forward(model, data)
-                bodies.append(data.xpos[self._free].copy())
+                bodies.append(data.xpos[measured.free].copy())
                 if tip is not None:
                     sites.append(data.site_xpos[tip].copy())
                     turns.append(data.site_xmat[tip].reshape(3, 3).copy())
@@ -122,8 +186,8 @@ class Ruler:
         found = {}
         if tip is not None:
             found[self._tip_name] = np.array(sites)
-        for k, body in enumerate(self._free):
-            found[model.body_names[body]] = where[:, k]
+        for k, body in enumerate(self._sides[0].free):
+            found[self._model.body_names[body]] = where[:, k]
             if tip is not None:  # along the axes of the hand
                 apart = where[:, k] - np.array(sites)
                 found[self._in_hand(body)] = np.einsum("nij,ni->nj", np.array(turns), apart)
@@ -131,7 +195,7 @@ class Ruler:
 
     def held(self, trace: Trace, touching: frozenset[str]) -> str:
         """The quantity that an experiment is about: what is in the hand, else the joints."""
-        for body in self._free:
+        for body in self._sides[0].free:
             name = self._in_hand(body)
             if self._model.body_names[body] in touching and name in self.units:
                 return name

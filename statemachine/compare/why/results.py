@@ -125,6 +125,16 @@ class Attribution:
         return (trial.put_back - self.settings_same) / self.gap
 
     @property
+    def explained(self) -> float:
+        """The part of it that goes where settings are brought to the same."""
+        return (self.gap - self.settings_same) / self.gap if self.gap else 0.0
+
+    @property
+    def located(self) -> float:
+        """The part that goes only where something is left out on both sides."""
+        return (self.settings_same - self.left) / self.gap if self.gap else 0.0
+
+    @property
     def unexplained(self) -> float:
         """The part of it that nothing took away."""
         return self.left / self.gap if self.gap else 0.0

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+_TOGETHER = 3  # entries: a longer array is told by those that differ
 _ROUNDING = 1e-9  # relative: as a file with ten digits, or other units, leaves it
 
 
@@ -31,9 +32,15 @@ def plain(value: Any) -> Any:
 def differing(
     names: Sequence[str], one: Sequence[Any], two: Sequence[Any]
 ) -> tuple[tuple[str, Any, Any], ...]:
-    """The figures of these that differ, by name."""
-    return tuple(
-        (name.partition("_")[2] or name, plain(a), plain(b))
-        for name, a, b in zip(names, one, two, strict=True)
-        if not same(a, b)
-    )
+    """The figures of these that differ, by name; of a long array each entry that does."""
+    found: list[tuple[str, Any, Any]] = []
+    for name, a, b in zip(names, one, two, strict=True):
+        if same(a, b):
+            continue
+        word, size = name.partition("_")[2] or name, np.size(a)
+        if size <= _TOGETHER or np.shape(a) != np.shape(b):
+            found.append((word, plain(a), plain(b)))
+            continue
+        places = [k for k in range(size) if not same(a[k], b[k])]
+        found += [(f"{word}[{k}]", plain(a[k]), plain(b[k])) for k in places]
+    return tuple(found)

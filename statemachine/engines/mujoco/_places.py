@@ -212,14 +212,14 @@ class Places:
             if align is HERE:
                 axis, anchor = one.jnt_axis[a].copy(), one.jnt_pos[a].copy()
             if kind in (SLIDE, HINGE) and np.abs(axis - two.jnt_axis[b]).max() > _NEAR:
-                values = (("axis", tuple(axis), tuple(two.jnt_axis[b])),)
+                values = (("axis", plain(axis), plain(two.jnt_axis[b])),)
                 edits: tuple[Edit, ...] = (("jnt_axis", (b,), axis),)
                 yield ModelDifference("axis", "joint", name, values, "", edits)
             off = anchor - two.jnt_pos[b]
             if kind == HINGE:  # a point along the axis is as good
                 off = off - axis * (off @ axis)
             if kind in (HINGE, _BALL) and np.linalg.norm(off) > _NEAR:
-                values = (("anchor", tuple(anchor), tuple(two.jnt_pos[b])),)
+                values = (("anchor", plain(anchor), plain(two.jnt_pos[b])),)
                 edits = (("jnt_pos", (b,), anchor),)
                 yield ModelDifference("anchor", "joint", name, values, "m", edits)
 
@@ -259,7 +259,7 @@ class Places:
             pos, quat = inner.pos, _quat(inner.mat)
         values = []
         if far > _NEAR:
-            values.append(("place", tuple(wanted.pos), tuple(theirs.pos)))
+            values.append(("place", plain(wanted.pos), plain(theirs.pos)))
         if turn > _NEAR:
             values.append(("turned by [rad]", 0.0, wanted.angle(theirs)))
         edits: tuple[Edit, ...] = (
@@ -320,7 +320,7 @@ class Places:
         if kinds[0] != kinds[1]:
             values.append(("type", _kind(kinds[0]), _kind(kinds[1])))
         if kinds[0] in _SIZES and not same(_size(one, a), _size(two, b)):
-            values.append(("size", tuple(_size(one, a)), tuple(_size(two, b))))
+            values.append(("size", plain(_size(one, a)), plain(_size(two, b))))
         if not same(one.geom_fluid[a], two.geom_fluid[b]):
             values.append(("fluid", "as given", "as given"))
         if values:
@@ -340,7 +340,7 @@ class Places:
         else:
             inner = self._solids[1].place(bodies[1]).inverse @ wanted
             pos, quat = inner.pos, _quat(inner.mat)
-        values = [("place", tuple(wanted.pos), tuple(theirs.pos))]
+        values = [("place", plain(wanted.pos), plain(theirs.pos))]
         if wanted.distance(theirs) <= _NEAR:
             values = [("turned by [rad]", 0.0, wanted.angle(theirs))]
         edits: tuple[Edit, ...] = (("geom_pos", (b,), pos), ("geom_quat", (b,), quat))
@@ -398,7 +398,7 @@ class Places:
         if far <= _NEAR and turn <= _NEAR:
             return
         inner = self._solids[1].place(int(two.site_bodyid[b])).inverse @ wanted
-        values = [("place", tuple(wanted.pos), tuple(theirs.pos))]
+        values = [("place", plain(wanted.pos), plain(theirs.pos))]
         if far <= _NEAR:
             values = [("turned by [rad]", 0.0, wanted.angle(theirs))]
         edits: tuple[Edit, ...] = (

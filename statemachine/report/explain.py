@@ -1,0 +1,209 @@
+"""What an explanation says: what differs between two sides, and what each of it explains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..compare.why import CauseShare, Explanation
+from ..comparison.text import NONE, capital, percent, quantity, short_time, significant
+from ..page import Block, Items, Page, Section, Table, TableCell, Text, Verdict
+from . import why
+
+_SHOWN = 12  # rows; the rest is folded away
+_WIDE = 15  # characters of a value
+_MEASURES = {"worst": "at its largest", "end": "in the end", "rms": "as a root mean square"}
+_OFF = ("place", "anchor", "com", "axis")
+_METHODS = {
+    "nothing": "",
+    "one at a time": "They add up: what each takes away alone it also takes away after all others.",
+    "all sets": "They interact. Each share is the mean of what a cause takes away over all orders "
+    "in which the causes can be brought to the same (Shapley value), over all sets of them.",
+    "drawn orders": "They interact. Each share is the mean of what a cause takes away over {} "
+    "drawn orders in which the causes are brought to the same (Shapley value), with its standard "
+    "error.",
+}
+THREE = (
+    "Explained: it goes where settings are brought to the same. Located: it goes only where "
+    "something is left out on both sides, which says where it comes from, and not why. "
+    "Unexplained: it stays."
+)
+
+
+def page(result: Explanation, said: Sequence[str] = ()) -> Page:
+    """What the gap is, what differs, what each difference explains, and what stays.
+
+    Args:
+        result: The explanation.
+        said: Lines to say before anything else.
+    """
+    origin = (
+        f"left: {result.one}; right: {result.two}; {result.seconds:g} s, {result.runs} runs "
+        f"compared at {result.moments} moments"
+    )
+    blocks: list[Block] = [Text(line) for line in (*said, *_unmatched(result), result.says) if line]
+    blocks.append(Text(_gap_sentence(result)))
+    if result.is_rounding:
+        negligible = quantity(result.negligible, result.unit)
+        blocks.append(Text(f"What is below {negligible} is taken for rounding."))
+    blocks += _table(result)
+    if result.engines is not None:
+        left = quantity(result.engines.gap, result.unit)
+        text = f"The left file on both engines: {left} is between the engines themselves"
+        blocks.append(Section("engines", text, why.causes(result.engines), detail=True))
+    blocks += _verdict(result)
+    return Page(f"{result.experiment}: why the right is not the left", origin, blocks)
+
+
+def three(explained: float, located: float, unexplained: float) -> str:
+    """The three parts of a gap, in a sentence."""
+    return (
+        f"{percent(explained)} of the gap is explained, {percent(located)} is located, "
+        f"{percent(unexplained)} is unexplained"
+    )
+
+
+def _unmatched(result: Explanation) -> list[str]:
+    """What has no counterpart; it comes first."""
+    lines = []
+    for side, only in zip(("left", "right"), result.unmatched, strict=True):
+        for kind in ("joint", "actuator"):
+            names = only.get(kind, ())
+            if names:
+                few = ", ".join(names[:6]) + (f" and {len(names) - 6} more" if names[6:] else "")
+                plural = "s" if len(names) > 1 else ""
+                lines.append(f"Only the {side} has the {kind}{plural} {few} (--map LEFT=RIGHT).")
+    return lines + [f"{capital(note)}." for note in result.notes]
+
+
+def _gap_sentence(result: Explanation) -> str:
+    gap = result.first[result.quantity]
+    what = f"the {result.quantity}"
+    if result.quantity in ("joints", "slides"):
+        what = f"the worst {result.quantity.removesuffix('s')}"
+    text = (
+        f"As they come, {what} is up to {quantity(gap.worst, gap.unit)} apart, at "
+        f"{short_time(gap.at)} (root mean square {quantity(gap.rms, gap.unit)}, in the end "
+        f"{quantity(gap.end, gap.unit)})."
+    )
+    others = [
+        f"{name} {quantity(other.worst, other.unit)}"
+        for name, other in result.first.items()
+        if name != result.quantity
+    ]
+    return text + (f" Elsewhere: {', '.join(others)}." if others else "")
+
+
+def _table(result: Explanation) -> list[Block]:
+    """The differences, the largest share first; those without an effect folded away."""
+    able = [each for each in result.shares if each.share is not None]
+    refused = [each for each in result.shares if each.share is None]
+    blocks: list[Block] = []
+    if not result.shares:
+        return [Text("The two sides have the same settings in everything that is compared.")]
+    rows = [_row(result, each) for each in able]
+    if rows:
+        gap = quantity(result.gap, result.unit)
+        title = f"What differs, and its part of the {gap} ({_MEASURES[result.measure]})"
+        heads = ("what", "left", "right", "explains", "alone", "last")
+        words = frozenset({0, 1, 2})
+        blocks.append(Table(heads, rows[:_SHOWN], title, words=words))
+        if rows[_SHOWN:]:
+            more = Table(heads, rows[_SHOWN:], words=words)
+            heading = f"{len(rows) - _SHOWN} more differences, with smaller parts"
+            blocks.append(Section("", heading, [more], folded=True))
+    if method := _METHODS[result.method].format(result.orders):
+        blocks.append(
+            Text(f"{method} Alone, last: brought to the same first, or after all others.")
+        )
+    if refused:
+        lines = [f"{capital(each.name)}: {each.note}." for each in refused]
+        blocks += [Text("These differ, too, and cannot be brought to the same:"), Items(lines)]
+    if result.impossible:
+        number = len(result.impossible)
+        first = ", ".join(result.impossible[0])
+        sets = "set" if number == 1 else "sets"
+        blocks.append(Text(f"{number} {sets} of causes could not be run, such as: {first}."))
+    return blocks
+
+
+def _row(result: Explanation, each: CauseShare) -> tuple[str | TableCell, ...]:
+    values = each.values
+    left, right = _sides(values[0], each.unit) if values else (NONE, NONE)
+    what = capital(each.name)
+    if len(values) == 1 and not each.name.startswith(values[0][0]):
+        what += f" ({values[0][0]})" if "[" in values[0][0] else ""
+    elif len(values) > 1:
+        what += f" ({len(values)} figures)"
+    explains = percent(each.share)
+    if each.error:
+        explains += f" ± {percent(each.error)}"
+    if result.is_rounding:
+        return what, left, right, NONE, NONE, NONE
+    return (
+        what,
+        left,
+        right,
+        TableCell(explains, share=each.share),
+        percent(each.alone) if each.alone is not None else NONE,
+        percent(each.last) if each.last is not None else NONE,
+    )
+
+
+def _sides(figure: tuple[str, object, object], unit: str) -> tuple[str, str]:
+    """Both values; of a place, or a direction, how far the right one is off."""
+    name, one, two = figure
+    if name in _OFF and isinstance(one, tuple) and isinstance(two, tuple):
+        a, b = np.array(one, dtype=float), np.array(two, dtype=float)
+        if unit:
+            return "here", f"{quantity(float(np.linalg.norm(a - b)), unit)} off"
+        angle = float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+        return "this way", f"{quantity(angle, 'rad')} off"
+    return _value(one, unit), _value(two, unit)
+
+
+def _value(value: object, unit: str) -> str:
+    if value is None:
+        return NONE
+    if isinstance(value, tuple):
+        text = " ".join(_number(each, "") for each in value)
+        return text if len(text) <= _WIDE else f"{text[: _WIDE - 1].rstrip()}…"
+    return _number(value, unit)
+
+
+def _number(value: object, unit: str) -> str:
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    if isinstance(value, int | float):
+        return quantity(float(value), unit) if unit else significant(float(value))
+    text = str(value)
+    return text if len(text) <= _WIDE else f"{text[: _WIDE - 1]}…"
+
+
+def _verdict(result: Explanation) -> list[Block]:
+    if result.is_rounding:
+        refused = any(each.share is None for each in result.shares)
+        text = "the two sides move alike" + (", though they differ" if result.shares else "")
+        return [Verdict(text, not refused)]
+    blocks: list[Block] = []
+    if not result.is_explained:
+        blocks.append(Text(_next(result)))
+    text = three(result.explained, result.located, result.unexplained)
+    return [*blocks, Text(THREE, small=True), Verdict(text, result.is_explained)]
+
+
+def _next(result: Explanation) -> str:
+    """What to look at where something stays."""
+    refused = [each.name for each in result.shares if each.share is None]
+    if refused:
+        return (
+            f"What stays may come from what cannot be brought to the same: {', '.join(refused[:4])}"
+            ". Give both sides the same there, and compare again."
+        )
+    if result.engines is not None:
+        return (
+            "What stays is between the engines. Look at one step at a time (--one-step), which "
+            "names the stage, and at the timestep (--converge)."
+        )
+    return "What stays is in nothing that is compared. Look at one step at a time (--one-step)."
