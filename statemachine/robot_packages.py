@@ -43,8 +43,11 @@ def file_of(text: str) -> Path:
     Raises:
         MissingEngineError: The package is not installed.
         UnknownNameError: It has no such robot.
-        ModelFileError: The robot is not on this machine and cannot be had, or has no MJCF or URDF.
+        ModelFileError: No robot is named, or it is not on this machine and cannot be had, or it
+            has no MJCF or URDF.
     """
+    if text in (_MENAGERIE, _DESCRIPTIONS):
+        raise ModelFileError(f"{text!r} names no robot: type {text}NAME")
     if text.startswith(_MENAGERIE):
         return _of_menagerie(text.removeprefix(_MENAGERIE))
     return _of_descriptions(text.removeprefix(_DESCRIPTIONS))

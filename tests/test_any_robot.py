@@ -386,6 +386,43 @@ def test_a_robot_by_name_without_a_network(
 
 
 @pytest.mark.parametrize(
+    ("name", "code", "said"),
+    [
+        (
+            "menagerie:unitree_g1",
+            2,
+            "unitree_g1 is not on this machine and could not be downloaded",
+        ),
+        ("menagerie:", 2, "'menagerie:' names no robot: type menagerie:NAME"),
+        ("menagerie:unitre_g1", 2, "Did you mean 'unitree_g1'?"),
+        ("robot_descriptions:panda_mj_description", 3, "pip install 'statemachine-sim[robots]'"),
+    ],
+)
+@pytest.mark.parametrize("command", ["lesson gravity", "compare hold", "trace record hold"])
+def test_a_robot_that_cannot_be_had_is_one_line(
+    menagerie_package: _Registry,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    command: str,
+    name: str,
+    code: int,
+    said: str,
+) -> None:
+    def urlopen(_request: Any, timeout: float) -> Any:
+        raise urllib.error.URLError("Name or service not known")
+
+    menagerie_package.here = False
+    monkeypatch.setattr(robot_packages.urllib.request, "urlopen", urlopen)
+    monkeypatch.setitem(sys.modules, "robot_descriptions", None)
+    assert main([*command.split(), "--model", name]) == code
+    out, line = capsys.readouterr()
+    assert not out
+    assert line.startswith("statemachine: ")
+    assert said in line
+    assert line.count("\n") == 1
+
+
+@pytest.mark.parametrize(
     ("name", "extra"),
     [("menagerie:unitree_g1", "menagerie"), ("robot_descriptions:panda_description", "robots"),
      ("panda_mj_description", "robots")],

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 import statemachine
 from statemachine import conformance
 from statemachine.errors import UnknownNameError, UnsupportedError
+from statemachine.interface import Behaviour
 
 from .conftest import need_engine, registered
+from .hidden_world import ExampleModel
+from .hidden_world import load as load_hidden
 
 
 @pytest.fixture
@@ -63,6 +68,48 @@ def test_a_backend_that_refuses_everything_does_not_pass(monkeypatch: pytest.Mon
         results = [outcome.result for outcome in conformance.run(name)]
     assert results.count("failed") > 40
     assert "skipped" not in results
+
+
+def load_weightless(path: Path, defaults: str = "model") -> ExampleModel:
+    """An engine without gravity, whose record says so."""
+    return _without(load_hidden(path, defaults)._replace({"gravity": np.zeros(3)}), "gravity")
+
+
+def load_limp(path: Path, defaults: str = "model") -> ExampleModel:
+    """An engine without servos, whose record says so."""
+    model = load_hidden(path, defaults)._replace({"actuation": False})
+    return _without(model, "actuation", "position servo")
+
+
+def _without(model: ExampleModel, option: str, *behaviours: str) -> ExampleModel:
+    record = model.capabilities
+    lacking = dict.fromkeys(behaviours, Behaviour("unsupported", "it has none"))
+    record = dataclasses.replace(
+        record,
+        options=tuple(name for name in record.options if name != option),
+        behaviours={**record.behaviours, **lacking},
+    )
+    object.__setattr__(model, "capabilities", record)
+    return model
+
+
+@pytest.mark.parametrize(
+    ("engine", "feature", "skipped"),
+    [
+        ("weightless", "gravity", {"free_fall", "contact_carries_the_weight"}),
+        ("limp", "position servo", {"untouched_ctrl_is_a_command", "the_servo_law"}),
+    ],
+)
+def test_what_rests_on_what_an_engine_lacks_is_skipped(
+    engine: str, feature: str, skipped: set[str]
+) -> None:
+    with registered(engine, f"{__name__}:load_{engine}") as name:
+        outcomes = {outcome.check: outcome for outcome in conformance.run(name)}
+    assert not [outcome for outcome in outcomes.values() if outcome.result == "failed"]
+    for check in skipped:
+        assert outcomes[check].result == "skipped"
+        assert repr(feature) in outcomes[check].detail
+    assert sum(outcome.result == "passed" for outcome in outcomes.values()) > 25
 
 
 def test_an_option_that_a_record_lacks_is_refused() -> None:

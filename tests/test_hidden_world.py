@@ -129,6 +129,18 @@ def test_what_an_engine_does_not_tell_is_refused(
             assert data.qfrc_bias.any()
 
 
+def test_contacts_that_an_engine_does_not_tell_are_refused(
+    model: sm.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ExampleWorld, "untold", frozenset({"contacts"}))
+    with held(model) as data:
+        for verb in (sm.step, sm.forward):
+            verb(model, data)
+            with pytest.raises(UnsupportedError, match="contacts"):
+                _ = data.contacts
+            assert data.qfrc_bias.any()
+
+
 def test_a_world_that_keeps_traces_is_another_after_a_reset(
     model: sm.Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:

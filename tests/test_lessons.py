@@ -400,6 +400,17 @@ def test_a_slide_is_printed_in_millimetres_and_a_reset_tells_its_own_time(tmp_pa
     assert not any(isinstance(b, Table) and not b.rows for b in both.blocks)
 
 
+def test_the_second_engine_is_named_after_what_follows_the_load() -> None:
+    taken = take(LESSONS["reset"], sm.load("so101"), "mujoco")
+    line = load_line("so101", "mujoco", "robots")
+    code = f"import statemachine as sm\n\nmodel = {line}.replace(timestep=0.01)\n"
+    taken = dataclasses.replace(taken, code=code)
+    both: dict[str, Taken] = {"mujoco": taken, "other": taken}
+    page = page_of_lesson(LESSONS["reset"], both)
+    (shown,) = (block for block in page.blocks if isinstance(block, Code))
+    assert list(shown.lines)[2:] == [f'model = {line}.replace(timestep=0.01)  # then "other"']
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "body",

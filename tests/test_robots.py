@@ -12,6 +12,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from statemachine.backends import load
@@ -26,10 +27,13 @@ from statemachine.robots import (
     WitnessRow,
     examine_all,
     find,
+    gaps,
     many,
 )
 from statemachine.robots import table as tables
+from statemachine.scenarios import scenario
 from statemachine.scenarios.provenance import model_files
+from statemachine.traces import record_scenario
 
 from .conftest import ROOT, Cli, need_engine
 
@@ -133,6 +137,18 @@ def test_an_include_is_looked_for_beside_the_main_file_then_beside_its_includer(
     put("finger.xml", "<worldbody><body name='beside main'/></worldbody>")
     assert files() == ["main.xml", "parts/hand.xml", "finger.xml"]
     assert "beside main" in load(tmp_path / "main.xml").body_names
+
+
+def test_a_run_starts_where_the_experiments_start(tmp_path: Path) -> None:
+    need_engine("mujoco")
+    for names, start in ((("up", "home"), 1), (("up",), None)):
+        keys = "".join(f"<key name='{name}' qpos='0.1 0.2'/>" for name in names)
+        file = tmp_path / "robot.xml"
+        file.write_text(GOOD.replace("</mujoco>", f"<keyframe>{keys}</keyframe></mujoco>"))
+        model = load(file)
+        assert gaps.keyframe_of(model) == start
+        trace = record_scenario(scenario("hold"), model, seconds=0.02)
+        assert gaps.run(model, np.zeros((0, 1))).qpos[0].tolist() == trace["qpos"][0].tolist()
 
 
 def test_files_are_named_too(folder: Path) -> None:

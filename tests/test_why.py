@@ -738,7 +738,7 @@ def test_the_command_says_no_where_the_cause_is_not_found(
     models = [arm, edited(arm, body_mass=1.3 * arm.raw.body_mass)]
     monkeypatch.setattr(backends, "load", lambda *_a, **_k: models.pop(0))
     assert cli.main(["compare", "hold", "--why", "--seconds", "0.5"]) == 1
-    assert "100.0 % is not" in capsys.readouterr().out
+    assert "100.0 % is unexplained" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -32,14 +32,17 @@ def contacts(
             they were turned, wxyz; asked for only where a link has several geoms.
     """
     geoms = world.geoms_of_links
+    turns: dict[int, Array] = {}  # by body, into its own axes
 
     def geom_at(body: int, link: int, point: Array) -> int:
         b, candidates = geoms[body, link]
         if len(candidates) == 1:
             return candidates[0]
         xpos, xquat = poses()
-        local = dense.times(matrix_from_quat(xquat[b]).T, point - xpos[b])
-        return min(candidates, key=lambda g: abs(_distance(raw, g, local)))
+        if b not in turns:
+            turns[b] = matrix_from_quat(xquat[b]).T.copy()
+        local = dense.times(turns[b], point - xpos[b])
+        return min(candidates, key=lambda g: abs(_distance(raw, g, world.geom_turns[g], local)))
 
     found: list[tuple[Any, ...]] = []
     for point in world.contact_points():
@@ -76,10 +79,16 @@ def _axes(normal: Array) -> Array:
     return np.array([normal, first, np.cross(normal, first)])
 
 
-def _distance(raw: mujoco.MjModel, geom: int, point: Array) -> float:
-    """Signed distance of a point, in the body's frame, from the surface of its geom [m]."""
-    turn = matrix_from_quat(raw.geom_quat[geom])
-    local = dense.times(turn.T, point - raw.geom_pos[geom])
+def _distance(raw: mujoco.MjModel, geom: int, turn: Array, point: Array) -> float:
+    """Signed distance of a point, in the body's frame, from the surface of its geom [m].
+
+    Args:
+        raw: The compiled model.
+        geom: Of the body.
+        turn: (3, 3) from the body's axes into the geom's.
+        point: (3,) [m].
+    """
+    local = dense.times(turn, point - raw.geom_pos[geom])
     size, kind = raw.geom_size[geom], int(raw.geom_type[geom])
     if kind == int(_GEOM.mjGEOM_SPHERE):
         return float(math.hypot(*local) - size[0])

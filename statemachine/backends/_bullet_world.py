@@ -80,6 +80,7 @@ class World:
         client: What PyBullet's functions want as `physicsClientId`.
         trees: The trees of the model, the world's own geoms first.
         geoms_of_links: By PyBullet's body and link, MuJoCo's body and its geoms that touch.
+        geom_turns: By geom that touches, the matrix (3, 3) from its body's axes into its own.
     """
 
     def __init__(self, plan: Plan, kind: Literal["stepped", "ghost", "engine"]) -> None:
@@ -123,6 +124,11 @@ class World:
             self._take_surfaces()
         self.geoms_of_links = {
             (body, link): (solid.body, solid.geoms) for body, link, solid in self.solids()
+        }
+        self.geom_turns = {
+            g: matrix_from_quat(raw.geom_quat[g]).T.copy()
+            for _, geoms in self.geoms_of_links.values()
+            for g in geoms
         }
         self._solid_links = list(self.geoms_of_links)
         self._homes = [

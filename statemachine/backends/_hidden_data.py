@@ -261,6 +261,8 @@ class HiddenData(Data):
         return self._machine.derive(name)
 
     def _find_contacts(self) -> Contacts:
+        if "contacts" in self._machine.world.untold:
+            raise unsupported(self._home, "contacts")
         return self._machine.derive("contacts")
 
     def _recompute(self) -> None:

@@ -44,7 +44,7 @@ class HiddenWorld(ABC):
     Attributes:
         engine: Name of the engine, for messages.
         errors: What the engine raises when it gives up.
-        untold: Names of `records.DERIVED` that this engine does not tell.
+        untold: Names of `records.DERIVED`, and "contacts", that this engine does not tell.
         memory_layout: Name and length of each array of `packed`, which a State then has.
         timestep: Simulated time of one engine step [s].
         qpos0: (nq,) positions of the default state.

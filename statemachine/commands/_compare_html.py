@@ -51,6 +51,7 @@ def write(
     witness: Any = None,
     run: Any = None,
     played: Any = None,
+    floor: Any = None,
 ) -> None:
     """Look for causes and shapes, and write the page.
 
@@ -63,6 +64,7 @@ def write(
         witness: The third party's figures, or None.
         run: The `compare.SidesRun`, if sides were given.
         played: The figures of its open loop, if that is another run.
+        floor: The chaos floor, or None.
     """
     from ..report import compare as pages
     from ..report.html import report, write_report
@@ -79,6 +81,7 @@ def write(
         command=_typed(options, request),
         run=run,
         played=played,
+        floor=floor,
     )
     text = report(page, _looks(request, traces))
     target = write_report(options.html, text)
@@ -175,6 +178,8 @@ def _typed(options: argparse.Namespace, request: Any) -> str:
         ("--keyframe", request.keyframe, None),
         *(("--map", f"{a}={b}", None) for a, b in request.names.items()),
         *(("--tolerance", text, None) for text in options.tolerance),
+        *(("--floor", text, None) for text in options.floor),
+        ("--no-floor", options.no_floor, False),
         ("--quantity", options.quantity or None, None),
         ("--no-why", options.no_why, False),
         ("--html", Path(options.html).name, None),

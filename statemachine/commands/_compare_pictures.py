@@ -109,6 +109,7 @@ def write(
     two: Any = None,
     comparison: Any = None,
     request: Any = None,
+    floor: Any = None,
 ) -> None:
     """Write what was asked for; a line for each file on standard error.
 
@@ -119,6 +120,7 @@ def write(
         two: The other one; None for pictures of one trace.
         comparison: Of the two.
         request: The `compare.Request`; its sides say what a film of theirs shows.
+        floor: The chaos floor of the comparison, or None.
     """
     from ..report.progress import progress
 
@@ -126,7 +128,11 @@ def write(
         from ..report import plot as plots
 
         with progress("figure"):
-            figure = plots.plot_trace(one) if two is None else plots.plot(one, two, comparison)
+            figure = (
+                plots.plot_trace(one)
+                if two is None
+                else plots.plot(one, two, comparison, floor=floor)
+            )
             size = plots.write_plot(figure, pictures.plot)
         complain(f"{pictures.plot}: a figure, {_bytes(size)}", 0)
     if pictures.film is not None:

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..errors import BadInputError
 from ..installed import PAIR
-from . import _compare_html, _compare_models
+from . import _compare_floor, _compare_html, _compare_models
 from . import _compare_pictures as pictures
 from ._common import PROGRAM, add_json, add_menagerie, complain, pairs_of, show
 
@@ -77,6 +77,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--keyframe", default=None, metavar="NAME", help="where a FUNCTION starts, on both sides"
     )
+    _compare_floor.add_options(parser)
     _compare_html.add_options(parser)
     pictures.add(parser)
     _compare_models.add_options(parser)
@@ -192,6 +193,7 @@ def _check_sides(options: argparse.Namespace, what: tuple[str, ...], sides: Any)
 def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
     _compare_html.check(options)
+    _compare_floor.check(options)
     pictures.complete(options)
     if options.models:
         if options.why or options.quantity:
@@ -246,10 +248,19 @@ def _run_compare(options: argparse.Namespace) -> int:
         for line in (*(run.unmatched if run else ()), *said):
             complain(line, 0)
     asked = witness(one, two, run.file if run else None)
+    rerun = run.reruns[0] if run and run.reruns else None
+    floor = _compare_floor.floor_of(options, request, found, (one, two), rerun)
     if options.html:
-        _compare_html.write(options, request, found, (one, two), said, asked, run, played)
-    page = report.page(found, one, two, said=said, witness=asked, run=run, played=played)
-    result = {"comparison": found, "witness": asked, "touches": touches(one, two)}
+        _compare_html.write(options, request, found, (one, two), said, asked, run, played, floor)
+    page = report.page(
+        found, one, two, said=said, witness=asked, run=run, played=played, floor=floor
+    )
+    result = {
+        "comparison": found,
+        "witness": asked,
+        "touches": touches(one, two),
+        "floor": floor,
+    }
     if run:
         result |= {
             "sides": request.sides,
@@ -259,5 +270,5 @@ def _run_compare(options: argparse.Namespace) -> int:
             "only": run.matched.only if run.matched else ({}, {}),
         }
     code = show(page, result, options.json)
-    pictures.write(wanted, options, one, two, found, request)
+    pictures.write(wanted, options, one, two, found, request, floor)
     return code

@@ -15,7 +15,9 @@ Two engines that agree prove nothing; neither side is the truth.
 from __future__ import annotations
 
 from .agreement import Agreement, Comparison, SideRun, compare
+from .floor import ChaosFloor, FloorBand, chaos_floor
 from .labels import Labels, labels_of
+from .perturbed import Rerun, Uncertainty, perturbed_runs, rerun_of
 from .request import Request, split_words
 from .series import Series, default_tip, series
 from .side import Side, parse_sides
@@ -26,20 +28,27 @@ from .witness import Witness, witness
 
 __all__ = [
     "Agreement",
+    "ChaosFloor",
     "Comparison",
     "Contact",
+    "FloorBand",
     "Labels",
     "Request",
+    "Rerun",
     "Series",
     "Side",
     "SideRun",
     "SidesRun",
     "Touch",
+    "Uncertainty",
     "Witness",
+    "chaos_floor",
     "compare",
     "default_tip",
     "labels_of",
     "parse_sides",
+    "perturbed_runs",
+    "rerun_of",
     "run_sides",
     "series",
     "sides_of",

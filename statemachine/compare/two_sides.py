@@ -14,11 +14,12 @@ from ..errors import BadInputError, StateMachineError, TraceError
 from ..interface import Array, Data, Model, make_data, reset
 from ..scenarios import Controller, Scenario
 from ..scenarios.runs import Progress, check_length, part_of, silent
-from ..traces import Trace, model_file, play, read, record
+from ..traces import Trace, model_file, play, read
 from ..traces.recorder import layout_of
 from .alike import replace_layout, told_alike, translated
 from .labels import files_apart, labels_of
 from .matching import Matched, match_models
+from .perturbed import Rerun
 from .request import Request
 from .side import Side
 
@@ -38,6 +39,7 @@ class SidesRun:
         commands: "its own" if the two sides were told different things; "the same" if what
             each was told did not depend on the side; "recorded" if a trace was played on both.
         matched: What of the left is what of the right; None if both are of one file.
+        reruns: How the left and the right were run; None where a trace was played.
         file: The file of both sides; None if they have two.
         said: What a reader should know of how it was run.
     """
@@ -47,6 +49,7 @@ class SidesRun:
     played: Trace
     commands: Loop
     matched: Matched | None
+    reruns: tuple[Rerun, Rerun] | None
     file: Path | None
     said: tuple[str, ...]
 
@@ -82,6 +85,7 @@ def run_sides(request: Request, progress: Progress = silent) -> SidesRun:
     given |= request.options
     options = [{**given, **side.options} for side in request.sides]
     models = [side.load(**given) for side in request.sides]
+    reruns: tuple[Rerun, Rerun] | None = None
     matched = _matched(models[0], models[1], left, right, request)
     if trace is not None:
         pair, said = _of_trace(trace, models, options, matched, request, progress)
@@ -89,7 +93,9 @@ def run_sides(request: Request, progress: Progress = silent) -> SidesRun:
         played = pair[1]
     else:
         assert scenario is not None
-        pair, said = _of_scenario(scenario, models, options, matched, request, progress)
+        scenario = scenario.on(models[0])
+        reruns, said = _reruns(scenario, models, options, matched, request)
+        pair = _of_scenario(scenario, reruns, request, progress)
         theirs = _in_terms_of_right(pair[0], pair[1], matched)
         if _same_commands(theirs, pair[1]):
             commands, played = "the same", pair[1]
@@ -102,7 +108,7 @@ def run_sides(request: Request, progress: Progress = silent) -> SidesRun:
         third = two if third is second else told_alike(first, third, matched)[1]
         first, second = one, two
     file = left.path if left.path == right.path else None
-    return SidesRun(first, second, third, commands, matched, file, said)
+    return SidesRun(first, second, third, commands, matched, reruns, file, said)
 
 
 def _matched(one: Model, two: Model, left: Side, right: Side, request: Request) -> Matched | None:
@@ -119,16 +125,30 @@ def _matched(one: Model, two: Model, left: Side, right: Side, request: Request) 
 
 
 def _of_scenario(
+    scenario: Scenario, reruns: tuple[Rerun, Rerun], request: Request, progress: Progress
+) -> tuple[Trace, Trace]:
+    """A run on each side."""
+    traces = [
+        rerun.record(
+            experiment=scenario.name,
+            says=scenario.says,
+            seed=request.seed if scenario.seeded else None,
+            progress=part_of(progress, 0.35 * place, 0.35),
+        )
+        for place, rerun in enumerate(reruns)
+    ]
+    return traces[0], traces[1]
+
+
+def _reruns(
     scenario: Scenario,
     models: list[Model],
     options: list[dict[str, Any]],
     matched: Matched | None,
     request: Request,
-    progress: Progress,
-) -> tuple[tuple[Trace, Trace], tuple[str, ...]]:
-    """A run on each side; what an experiment tells the left, the right is told too."""
+) -> tuple[tuple[Rerun, Rerun], tuple[str, ...]]:
+    """How each side is run; what an experiment tells the left, the right is told too."""
     left, right = models
-    scenario = scenario.on(left)
     seconds = scenario.seconds if request.seconds is None else request.seconds
     for model in models:
         check_length(model, seconds)
@@ -138,42 +158,27 @@ def _of_scenario(
         begin = _in_right(matched, _start(left, key), _start(right, None))
         said.append(f"{right.path.name} has no keyframe {key!r}: it starts in the left's")
         key = None
-    if scenario.own:
-        theirs = scenario.controller(right, request.seed)
-    else:
-        theirs = scenario.controller(left, request.seed)
-        theirs = _retold(theirs, matched, _start(right, key)[2]) if matched else theirs
-    if begin is not None:
-        theirs = _after(begin[2], theirs)
-
-    def run(
-        place: int, controller: Controller, keyframe: str | None, start: _Start | None
-    ) -> Trace:
-        return record(
-            models[place],
-            controller,
-            seconds,
-            keyframe=keyframe,
-            qpos=None if start is None else start[0],
-            qvel=None if start is None else start[1],
-            experiment=scenario.name,
-            says=scenario.says,
-            defaults=request.sides[place].defaults,
-            options=options[place],
-            seed=request.seed if scenario.seeded else None,
-            progress=part_of(progress, 0.35 * place, 0.35),
-        )
-
-    traces = (
-        run(0, scenario.controller(left, request.seed), scenario.keyframe, None),
-        run(1, theirs, key, begin),
-    )
     if request.every > 1 and left.timestep != right.timestep:
         said.append(
             f"{request.every} steps are {milliseconds(request.every * left.timestep)} on the left "
             f"and {milliseconds(request.every * right.timestep)} on the right"
         )
-    return traces, tuple(said)
+    ctrl = _start(right, key)[2]
+
+    def own(model: Model) -> Controller:
+        return scenario.controller(model, request.seed)
+
+    def theirs(model: Model) -> Controller:
+        told = own(model if scenario.own else left)
+        if matched and not scenario.own:
+            told = _retold(told, matched, ctrl)
+        return told if begin is None else _after(begin[2], told)
+
+    one, two = request.sides
+    return (
+        Rerun(left, own, seconds, scenario.keyframe, None, None, one.defaults, options[0]),
+        Rerun(right, theirs, seconds, key, *(begin or (None, None))[:2], two.defaults, options[1]),
+    ), tuple(said)
 
 
 def _of_trace(

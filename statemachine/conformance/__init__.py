@@ -19,7 +19,6 @@ from typing import Literal
 
 from ..backends import backend_engine
 from ..errors import MissingEngineError, UnsupportedError
-from ..interface import OPTIONS
 from . import derived, inputs, physics, states
 from ._lab import Lab
 
@@ -69,13 +68,9 @@ def run(backend: str) -> list[Outcome]:
 def _declared(lab: Lab, error: UnsupportedError) -> bool:
     """Whether the capability record says that this cannot be done."""
     try:
-        record = lab.arm.capabilities
+        return lab.lacks(error.feature)
     except Exception:  # no Model, no record
         return False
-    behaviour = record.behaviours.get(error.feature)
-    if behaviour is not None:
-        return behaviour.support == "unsupported"
-    return error.feature in OPTIONS and error.feature not in record.options
 
 
 __all__ = ["CHECKS", "Lab", "Outcome", "run"]

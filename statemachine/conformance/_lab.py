@@ -11,7 +11,19 @@ import numpy as np
 
 from ..backends import load
 from ..comparison.readings import readings
-from ..interface import Array, Contacts, Data, Model, forward, get_state, make_data, reset, step
+from ..interface import (
+    OPTIONS,
+    Array,
+    Contacts,
+    Data,
+    Model,
+    forward,
+    get_state,
+    make_data,
+    reset,
+    step,
+)
+from ..interface.options import unsupported
 
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
 
@@ -51,8 +63,30 @@ class Lab:
             reset(model, data, keyframe=keyframe)
         return data
 
+    def rests_on(self, *features: str) -> None:
+        """Say what a check rests on: it skips where the record declares one unsupported.
+
+        Args:
+            features: Names of `BEHAVIOURS` or `OPTIONS`.
+
+        Raises:
+            UnsupportedError: One of them is.
+        """
+        for feature in features:
+            if self.lacks(feature):
+                raise unsupported(self.arm, feature)
+
+    def lacks(self, feature: str) -> bool:
+        """Whether the capability record says that a behaviour or option is not supported."""
+        record = self.arm.capabilities
+        behaviour = record.behaviours.get(feature)
+        if behaviour is not None:
+            return behaviour.support == "unsupported"
+        return feature in OPTIONS and feature not in record.options
+
     def held(self) -> Data:
         """A Data in which the jaws hold the box and squeeze it: mid-contact."""
+        self.rests_on("position servo")
         data = self.data(self.box, keyframe=0)
         data.ctrl[0] += 0.2
         step(self.box, data, 25)

@@ -17,6 +17,7 @@ _G = 9.81
 
 def check_untouched_ctrl_is_a_command(lab: Lab) -> None:
     """The servos hold the zero pose from the first step on, with a small droop."""
+    lab.rests_on("position servo", "gravity")
     model, data = lab.scene, lab.data(lab.scene)
     step(model, data, 200)
     droop = np.degrees(data.qpos[model.jnt_qposadr[model.joint_id("shoulder_lift")]])
@@ -27,6 +28,7 @@ def check_untouched_ctrl_is_a_command(lab: Lab) -> None:
 
 def check_the_servo_law(lab: Lab) -> None:
     """qfrc_actuator is clip(kp·(clip(ctrl) - q) - kv·q̇, forcerange), after forward."""
+    lab.rests_on("position servo")
     model, data = lab.arm, lab.data(lab.arm)
     random = np.random.default_rng(13)
     for scale in (1e-3, 1e-2, 1.0, 5.0):
@@ -63,6 +65,7 @@ def check_ctrl_is_clamped_inside(lab: Lab) -> None:
 
 def check_forces_balance_at_rest(lab: Lab) -> None:
     """Held by its servos, the arm's forces sum to zero; parts add up to the constraint."""
+    lab.rests_on("position servo", "gravity")
     model, data = lab.scene, lab.data(lab.scene)
     step(model, data, 400)
     forward(model, data)
@@ -95,6 +98,7 @@ def check_dry_friction_saturates(lab: Lab) -> None:
 
 def check_limits_stop_a_joint(lab: Lab) -> None:
     """Pushed by gravity, a joint stops at its limit; with limits off it goes on."""
+    lab.rests_on("gravity")
     limp = lab.arm.replace(actuation=False)
     free = limp.replace(limits=False)
     joint = limp.joint_id("shoulder_lift")
@@ -111,6 +115,7 @@ def check_limits_stop_a_joint(lab: Lab) -> None:
 
 def check_free_fall(lab: Lab) -> None:
     """A free body falls g·t²/2, within the g·t·h of one timestep; sideways not at all."""
+    lab.rests_on("gravity")
     model, data = lab.box, lab.data(lab.box)
     start = int(model.jnt_qposadr[model.joint_id("box")])
     dof = int(model.jnt_dofadr[model.joint_id("box")])
@@ -146,6 +151,7 @@ def check_free_body_velocity_conventions(lab: Lab) -> None:
 
 def check_contact_carries_the_weight(lab: Lab) -> None:
     """Under a resting box: four or more contacts, normals up, forces that sum to m·g."""
+    lab.rests_on("gravity")
     model, data = lab.box, lab.data(lab.box)
     step(model, data, 300)
     forward(model, data)
@@ -217,6 +223,7 @@ def check_acceleration_is_the_rate_of_velocity(lab: Lab) -> None:
 
 def check_a_force_accelerates_by_the_armature(lab: Lab) -> None:
     """With an armature far beyond the links' inertia, qacc is force over armature."""
+    lab.rests_on("position servo")
     heavy = 1e4
     model = lab.arm.replace(armature=heavy, gravity=[0, 0, 0], frictionloss=0.0)
     with make_data(model) as data:
@@ -253,6 +260,7 @@ def check_facts_are_the_files(lab: Lab) -> None:
 
 def check_the_box_is_held(lab: Lab) -> None:
     """From keyframe 0, under a command that moves the arm, both jaws keep the box."""
+    lab.rests_on("position servo")
     model, data = lab.box, lab.data(lab.box, keyframe=0)
     box, jaws = model.body_id("box"), {model.body_id(n) for n in ("gripper", "moving_jaw_so101_v1")}
     data.ctrl[:2] += (0.4, -0.2)
@@ -268,6 +276,7 @@ def check_the_box_is_held(lab: Lab) -> None:
 
 def check_options_do_what_they_say(lab: Lab) -> None:
     """Each option that the capability record lists has its effect, and no other Model's."""
+    lab.rests_on("gravity")
     base, options = lab.scene, lab.scene.capabilities.options
     limp = base.replace(actuation=False)
 

@@ -64,6 +64,7 @@ def check_replay_is_bit_identical(lab: Lab) -> None:
 
 def check_a_different_command_is_noticed(lab: Lab) -> None:
     """The replay check is not blind: one late command gives other bits."""
+    lab.rests_on("position servo")
     model = lab.box
     ends = []
     for late in (False, True):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import io
+import re
 from collections.abc import Callable, Mapping
 from contextlib import redirect_stdout
 from dataclasses import dataclass
@@ -181,7 +182,8 @@ def page_of_lesson(lesson: Lesson, taken: Mapping[str, Taken]) -> Page:
     code = taken[first].code
     if others:  # each ran with its own name there
         both = ", then ".join(f'"{name}"' for name in others)
-        code = code.replace(f'backend="{first}")', f'backend="{first}")  # then {both}')
+        loads = re.compile(f'^.*backend="{re.escape(first)}".*$', re.MULTILINE)
+        code = loads.sub(lambda line: f"{line[0]}  # then {both}", code)
     session = Session(code, {name: each.printed for name, each in taken.items()})
     return module(lesson.name).page({name: t.result for name, t in taken.items()}, session)
 

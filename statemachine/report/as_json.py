@@ -20,7 +20,8 @@ def dumps(value: Any) -> str:
 def plain(value: Any) -> Any:
     """A result as dicts, lists, strings and numbers."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        names = [field.name for field in dataclasses.fields(value)]
+        fields = dataclasses.fields(value)
+        names = [field.name for field in fields if field.metadata.get("json", True)]
         names += [name for name, kind in vars(type(value)).items() if isinstance(kind, property)]
         return {name: plain(getattr(value, name)) for name in names}
     if isinstance(value, dict):

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..compare import (
     Agreement,
+    ChaosFloor,
     Comparison,
     Series,
     SidesRun,
@@ -36,11 +37,13 @@ from .finding import (
     subject,
     window,
 )
+from .floor import floor_words
 from .loops import also_open, loops, told, unmatched
 from .over_time import BothRuns, QuantityChart, chart_of, foot_of
 from .provenance import emulated, provenance
 
 _ROUNDING = 1e-6  # of a tolerance: what is less is shown as nothing
+_HEADERS = ("quantity", "verdict", "largest", "at, s", "RMS", "settled", "from, s", "tolerance")
 _EMULATED = ("emulated", "What is emulated")
 
 
@@ -58,6 +61,7 @@ def page(
     command: str = "",
     run: SidesRun | None = None,
     played: Comparison | None = None,
+    floor: ChaosFloor | None = None,
 ) -> Page:
     """What was found in comparing two runs.
 
@@ -74,6 +78,7 @@ def page(
         command: What makes the page again.
         run: How two sides were run, if sides were given.
         played: The comparison of their open loop, where it is not that of the closed one.
+        floor: The chaos floor, if it was looked for.
     """
     labels = long_labels(comparison)
     curves = series(one, two, tip)
@@ -89,7 +94,7 @@ def page(
         *contact_words(comparison, touching),
         *([Items(notes)] if notes else []),
     ]
-    both = _over_time(comparison, one, two, curves, events, attribution, tip)
+    both = _over_time(comparison, one, two, curves, events, attribution, tip, floor)
     blocks.append(both)
     blocks += loops(comparison, played)
     if attribution is not None:
@@ -99,7 +104,7 @@ def page(
     elif why_not:
         blocks.append(Section("why", "What causes it", [Text(why_not)]))
     blocks.append(Section("curves", "How far apart, over time", _sorted(both.charts), detail=True))
-    blocks.append(Section("figures", "The figures", _figures(comparison, witness)))
+    blocks.append(Section("figures", "The figures", _figures(comparison, witness, floor)))
     table = events_table(events, (comparison.one.label, comparison.two.label))
     blocks.append(Section("events", "What happens when", [table], detail=True))
     kept = emulated(comparison)
@@ -129,12 +134,20 @@ def _over_time(
     events: Sequence[Event],
     attribution: Attribution | None,
     tip: str | None,
+    floor: ChaosFloor | None,
 ) -> BothRuns:
     """The scene and a chart for each quantity that is a number throughout."""
     labels = long_labels(comparison)
     found = {each.name: each for each in comparison.agreements}
+    bands = {} if floor is None else {band.name: band.width for band in floor.bands}
     charts = tuple(
-        chart_of(curve, found[curve.name], labels, foot_of(curve, one, two, labels))
+        chart_of(
+            curve,
+            found[curve.name],
+            labels,
+            foot_of(curve, one, two, labels),
+            bands.get(curve.name),
+        )
         for curve in curves
         if np.isfinite(curve.difference).all()
     )
@@ -183,8 +196,10 @@ def _sorted(charts: Sequence[QuantityChart]) -> list[Block]:
     return [*beyond, Section("", told, within, folded=True)]
 
 
-def _figures(comparison: Comparison, witness: Witness | None) -> list[Block]:
-    """Figures and verdicts, the reasons of the tolerances, and what a third party says."""
+def _figures(
+    comparison: Comparison, witness: Witness | None, floor: ChaosFloor | None
+) -> list[Block]:
+    """Figures and verdicts, the floor, the reasons of tolerances, what a third party says."""
     one, two = short_labels(comparison)
     agreements = comparison.agreements
     more: list[Block] = []
@@ -204,14 +219,14 @@ def _figures(comparison: Comparison, witness: Witness | None) -> list[Block]:
         more.append(Section("", "", [Text(checked)], detail=True))
     return [
         Table(
-            ("quantity", "verdict", "largest", "at, s", "RMS", "settled", "from, s", "tolerance"),
-            [_row(found) for found in agreements],
+            _HEADERS if floor is None else (*_HEADERS, "floor", "inside from, s"),
+            [(*_row(found), *_floor_cells(found, floor)) for found in agreements],
             f"{one} against {two}: how far apart",
             words=frozenset({0, 1}),
             emphasis=frozenset(
                 k for k, found in enumerate(agreements) if found.verdict == "differs"
             ),
-            wide=frozenset({7}),
+            wide=frozenset({7, 8, 9}) if floor else frozenset({7}),
         ),
         Text(
             f"Compared at {comparison.moments} moments over {comparison.until:g} s. Settled: the "
@@ -219,6 +234,7 @@ def _figures(comparison: Comparison, witness: Witness | None) -> list[Block]:
             "first beyond tolerance. A quantity agrees if it never is; it settles if it is within "
             "its tolerance at the end, and DIFFERS otherwise."
         ),
+        *(floor_words(comparison, floor) if floor else []),
         Table(
             ("quantities", "tolerance", "because"),
             _reasons(comparison),
@@ -247,6 +263,17 @@ def _row(found: Agreement) -> tuple[str, ...]:
         "never" if found.since is None else _moment(found.since),
         tolerance,
     )
+
+
+def _floor_cells(found: Agreement, floor: ChaosFloor | None) -> tuple[str, ...]:
+    """How high the chaos floor is, and from when on the gap is inside."""
+    if floor is None:
+        return ()
+    band = floor.of(found.name)
+    if band is None:
+        return NONE, NONE
+    inside = "never" if band.inside_from is None else _moment(band.inside_from)
+    return quantity(band.most, found.unit), inside
 
 
 def _moment(time: float) -> TableCell:

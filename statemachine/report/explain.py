@@ -10,6 +10,7 @@ from ..compare.why import CauseShare, Explanation
 from ..comparison.text import NONE, capital, percent, quantity, short_time, significant
 from ..page import Block, Items, Page, Section, Table, TableCell, Text, Verdict
 from . import why
+from .why_words import THREE, three
 
 _SHOWN = 12  # rows; the rest is folded away
 _WIDE = 15  # characters of a value
@@ -24,11 +25,6 @@ _METHODS = {
     "drawn orders in which the causes are brought to the same (Shapley value), with its standard "
     "error.",
 }
-THREE = (
-    "Explained: it goes where settings are brought to the same. Located: it goes only where "
-    "something is left out on both sides, which says where it comes from, and not why. "
-    "Unexplained: it stays."
-)
 
 
 def page(result: Explanation, said: Sequence[str] = ()) -> Page:
@@ -54,14 +50,6 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
         blocks.append(Section("engines", text, why.causes(result.engines), detail=True))
     blocks += _verdict(result)
     return Page(f"{result.experiment}: why the right is not the left", origin, blocks)
-
-
-def three(explained: float, located: float, unexplained: float) -> str:
-    """The three parts of a gap, in a sentence."""
-    return (
-        f"{percent(explained)} of the gap is explained, {percent(located)} is located, "
-        f"{percent(unexplained)} is unexplained"
-    )
 
 
 def _unmatched(result: Explanation) -> list[str]:

@@ -68,6 +68,11 @@ class LogAxis:
             found = np.clip(np.log10(values), self.low, self.high)
         return found if self.zero is None else np.where(values == 0, self.zero, found)
 
+    def area(self, values: Array) -> Array:
+        """The upper edge of an area over the axis (n,): what is too small to be on it has none."""
+        places = self.places(values)
+        return np.where(places > self.low, places, self.bottom)
+
     def line(self, across: Array, values: Array) -> tuple[Array, Array]:
         """Points of a line through values (n,); no number where it would join zero to another.
 

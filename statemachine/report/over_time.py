@@ -26,6 +26,7 @@ class QuantityChart(Interactive):
         labels: What the sides are called.
         said: What it shows, for those who do not see it.
         foot: A note under it; "" for none.
+        floor: (n,) the width of its chaos floor at the moments of the curve, if that is known.
     """
 
     curve: Series
@@ -33,6 +34,7 @@ class QuantityChart(Interactive):
     labels: tuple[str, str]
     said: str
     foot: str = ""
+    floor: Array | None = None
 
     @property
     def unit(self) -> str:
@@ -71,7 +73,11 @@ class BothRuns(Interactive):
 
 
 def chart_of(
-    curve: Series, found: Agreement, labels: tuple[str, str], foot: str = ""
+    curve: Series,
+    found: Agreement,
+    labels: tuple[str, str],
+    foot: str = "",
+    floor: Array | None = None,
 ) -> QuantityChart:
     """The chart of a quantity."""
     name = name_of(curve.name)
@@ -81,7 +87,7 @@ def chart_of(
         f"{short_time(found.at)}, settled at {quantity(found.settled, curve.unit)}; tolerance "
         f"{quantity(found.tolerance, curve.unit)}, {since}."
     )
-    return QuantityChart(name, curve, found, labels, said, foot)
+    return QuantityChart(name, curve, found, labels, said, foot, floor)
 
 
 def foot_of(curve: Series, one: Trace, two: Trace, labels: tuple[str, str]) -> str:

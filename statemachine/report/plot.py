@@ -6,7 +6,7 @@ import io
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from ..compare import Comparison
+from ..compare import ChaosFloor, Comparison
 from ..errors import BadInputError, MissingEngineError
 from ..traces import Trace
 from ..traces.whole import replace_file
@@ -42,7 +42,13 @@ def check_suffix(path: Path) -> None:
     _matplotlib()
 
 
-def plot(one: Trace, two: Trace, comparison: Comparison, tip: str | None = None) -> Plot:
+def plot(
+    one: Trace,
+    two: Trace,
+    comparison: Comparison,
+    tip: str | None = None,
+    floor: ChaosFloor | None = None,
+) -> Plot:
     """The figure of two traces and their comparison.
 
     Args:
@@ -50,8 +56,9 @@ def plot(one: Trace, two: Trace, comparison: Comparison, tip: str | None = None)
         two: Drawn dashed and dark over it.
         comparison: Of the two.
         tip: The site whose way is shown; by default gripperframe, else the last one.
+        floor: The chaos floor of the comparison, if that is known.
     """
-    return plot_panels.of_comparison(one, two, comparison, tip)
+    return plot_panels.of_comparison(one, two, comparison, tip, floor)
 
 
 def plot_trace(trace: Trace) -> Plot:

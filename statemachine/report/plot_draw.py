@@ -26,6 +26,7 @@ _SMALL, _TINY = 5.6, 5.2
 _SAMPLE, _LETTER = 9.5, 1.25  # of a label: the line before it, and one letter
 _DECADES = 6  # at most, of a difference
 _POWERS = 2  # that its axis names, at most
+_FLOOR = "#bdbdbd"
 _BELOW = "#ececec"  # behind the level of zero
 
 
@@ -188,6 +189,11 @@ def _apart(axes: Any, panel: Panel) -> None:
     log = LogAxis.around(values, [panel.tolerance] if panel.tolerance else [], _DECADES)
     axes.set_ylim(log.bottom, log.high)
     places = log.places(values)
+    if panel.floor is not None:
+        width = np.minimum(panel.floor[1], 10.0**log.high)
+        axes.fill_between(
+            panel.floor[0], log.bottom, log.area(width), color=_FLOOR, linewidth=0, zorder=0.5,
+        )  # fmt: skip
     axes.plot(time, places, color=_APART, linewidth=0.7)
     if log.edge is not None:
         axes.axhspan(log.bottom, log.edge, color=_BELOW, linewidth=0, zorder=0)

@@ -8,12 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compare import Agreement, Comparison, Series, default_tip, labels_of, series
+from ..compare import (
+    Agreement,
+    ChaosFloor,
+    Comparison,
+    Series,
+    default_tip,
+    labels_of,
+    series,
+)
 from ..compare.tolerances import COUNT
 from ..comparison import QUANTITIES
 from ..comparison.text import few, milliseconds, quantity, reading, short_time
 from ..interface import Array, JointType
 from ..traces import Header, Trace
+from .floor import changed_by
 
 MOST = 16  # panels of joints and bodies
 _MOST_PAIRS = 8
@@ -33,6 +42,7 @@ class Panel:
         tolerance: Of them; the values' axis spans some of it at least.
         verdict: In a word, or "".
         wide: Whether it has a row of its own.
+        floor: The chaos floor of the differences, or None.
     """
 
     title: str
@@ -42,6 +52,7 @@ class Panel:
     tolerance: float | None = None
     verdict: str = ""
     wide: bool = False
+    floor: Curve | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,16 +88,25 @@ class Plot:
     notes: Sequence[str]
 
 
-def of_comparison(one: Trace, two: Trace, comparison: Comparison, tip: str | None = None) -> Plot:
+def of_comparison(
+    one: Trace,
+    two: Trace,
+    comparison: Comparison,
+    tip: str | None = None,
+    floor: ChaosFloor | None = None,
+) -> Plot:
     """The figure of two traces: fingertip first, then joints, bodies, energy, touches."""
+    bands = {} if floor is None else {band.name: band.width for band in floor.bands}
     found = {agreement.name: agreement for agreement in comparison.agreements}
     curves = series(one, two, tip)
     shown = [curve for curve in curves if QUANTITIES[curve.kind].own]
     kept = _worst_of(shown, found)
     tips = [curve for curve in curves if curve.kind == "tip"]
     energy = [curve for curve in curves if curve.kind == "energy"]
-    panels = [_panel(curve, found.get(curve.name), wide=True) for curve in tips]
-    panels += [_panel(curve, found.get(curve.name)) for curve in (*kept, *energy)]
+    panels = [
+        _panel(curve, found.get(curve.name), curve.kind == "tip", bands.get(curve.name))
+        for curve in (*tips, *kept, *energy)
+    ]
     parted = [agreement for agreement in comparison.agreements if agreement.since is not None]
     first = min((agreement.since or 0.0 for agreement in parted), default=None)
     notes = [
@@ -94,6 +114,11 @@ def of_comparison(one: Trace, two: Trace, comparison: Comparison, tip: str | Non
         "exactly 0; the dotted line is the tolerance, and what is beyond it is filled. Beside "
         "the verdict: the largest difference."
     ]
+    if floor is not None:
+        notes.append(
+            "Grey band: the chaos floor, how far the first side gets from itself with "
+            f"{changed_by(floor)}."
+        )
     if first is not None:
         names = [agreement.name for agreement in parted if agreement.since == first]
         notes.append(f"Grey line: they part at {short_time(first)}, first {few(names, 1)}.")
@@ -153,7 +178,9 @@ def of_trace(trace: Trace) -> Plot:
     )
 
 
-def _panel(curve: Series, found: Agreement | None, wide: bool = False) -> Panel:
+def _panel(
+    curve: Series, found: Agreement | None, wide: bool = False, floor: Array | None = None
+) -> Panel:
     scale, unit = reading(curve.unit)
     values = [(k, (curve.time, scale * side)) for k, side in enumerate(_values(curve))]
     title = curve.name.removesuffix(", position").removeprefix(", ")  # a joint without a name
@@ -171,6 +198,7 @@ def _panel(curve: Series, found: Agreement | None, wide: bool = False) -> Panel:
         tolerance=None if found is None else scale * found.tolerance,
         verdict=verdict,
         wide=wide,
+        floor=None if floor is None else (curve.time, scale * floor),
     )
 
 

@@ -4,10 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..compare.why import Attribution, FactorTrial
+from ..compare.why import UNEXPLAINED, Attribution, FactorTrial
 from ..comparison.text import NONE, capital, listed, percent, quantity, short_time
 from ..page import Block, Items, Page, Section, Table, TableCell, Text, Verdict
-from .why_words import ENOUGH, amount, astray, conclusion, moves, shown, title, titles
+from .why_words import (
+    THREE,
+    amount,
+    astray,
+    conclusion,
+    moves,
+    shown,
+    three,
+    title,
+    titles,
+)
 
 
 def page(result: Attribution, said: Sequence[str] = ()) -> Page:
@@ -27,11 +37,11 @@ def page(result: Attribution, said: Sequence[str] = ()) -> Page:
     blocks += causes(result)
     if result.alone:
         blocks.append(Section("agree", "To make them agree", steps(result), detail=True))
+        blocks.append(Text(THREE, small=True))
         blocks.append(
             Verdict(
-                f"{percent(1 - result.unexplained)} of the gap is explained, "
-                f"{percent(result.unexplained)} is not",
-                abs(result.unexplained) <= ENOUGH,
+                three(result.explained, result.located, result.unexplained),
+                abs(result.unexplained) <= UNEXPLAINED,
             )
         )
     return Page(name, origin, blocks)

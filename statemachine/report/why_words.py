@@ -4,16 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..compare.why import FACTORS, Attribution, FactorTrial
+from ..compare.why import FACTORS, UNEXPLAINED, Attribution, FactorTrial
 from ..comparison.text import listed, percent, quantity, short_time
 
 _WORTH = 0.005  # the least part of the gap that is spoken of
 _SOME = 0.1  # part of the gap from which on a factor is a cause
 _PROOF = 1e-3  # of the gap: nearer than this until the first touch, the touch parts them
-ENOUGH = 0.1  # what may stay unexplained without the answer being no
 _OPENS = 1.5  # times the gap of equal settings: a setting put back that opens more is named
 _OTHERWISE = 0.05  # of the gap: a part that changes by more with the order is given both ways
 _AT_TOUCH = ("contact", "limits", "surfaces")  # what does nothing before something is met
+
+
+THREE = (
+    "Explained: it goes where settings are brought to the same. Located: it goes only where "
+    "something is left out on both sides, which says where it comes from, and not why. "
+    "Unexplained: it stays."
+)
+
+
+def three(explained: float, located: float, unexplained: float) -> str:
+    """The three parts of a gap, in a sentence."""
+    return (
+        f"{percent(explained)} of the gap is explained, {percent(located)} is located, "
+        f"{percent(unexplained)} is unexplained"
+    )
 
 
 def amount(result: Attribution, value: float | None) -> str:
@@ -133,7 +147,7 @@ def conclusion(result: Attribution) -> list[str]:
             )
         elif touch is None and not settings:
             found.append("Something touches from the start, so no moment shows the rest alone.")
-    if abs(result.unexplained) > ENOUGH:
+    if abs(result.unexplained) > UNEXPLAINED:
         found.append(
             f"{percent(result.unexplained)} of the gap is none of these: look at what is not in "
             "the table, masses and shapes first."

@@ -10,6 +10,7 @@ import numpy as np
 from ..engines.futures import Coordinates, gap
 from ..errors import StateMachineError
 from ..interface import Array, JointType, Model, make_data, reset, step
+from ..scenarios.commands import start_keyframe
 from .records import TOLERANCE, RunGap
 
 STEPS = 400
@@ -46,8 +47,9 @@ def commands(model: Model, steps: int, seed: int) -> Array:
 
 
 def keyframe_of(model: Model) -> int | None:
-    """Where a run of a model starts: its first keyframe, or None for the default state."""
-    return 0 if model.keyframes else None
+    """Where a run of a model starts, as in the experiments; None for the default state."""
+    name = start_keyframe(model)
+    return None if name is None else model.key_id(name)
 
 
 def run(model: Model, orders: Array) -> Run:

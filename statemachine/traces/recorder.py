@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import BadInputError, DivergedError, EngineError, TraceError
 from ..interface import Array, Data, Model, State, make_data, reset, set_state, step
+from ..interface.checks import HUGE
 from ..scenarios import Controller, Scenario
 from ..scenarios.provenance import provenance
 from ..scenarios.runs import Progress, check_length, part_of, silent, steps_in
@@ -288,6 +289,10 @@ def _run(
             break
         if k % 256 == 0:
             progress(k / total)
+    while len(times) > 1 and not all(_stands(rows[-1]) for rows in kept[:2]):
+        ended = ended or f"a coordinate left every bound at {times[-1]:g} s"
+        for rows in (times, *kept):  # numbers that no trace holds
+            rows.pop()
     found = {"time": np.array(times)}
     for name, rows, width in zip(
         ("qpos", "qvel", "ctrl"), kept, (model.nq, model.nv, model.nu), strict=True
@@ -299,6 +304,12 @@ def _run(
             raise BadInputError(f"the controller left {name} with an entry that is no number")
     progress(1.0)
     return found, ended
+
+
+def _stands(row: bytes) -> bool:
+    """Whether no finite number of a row is beyond what a trace holds."""
+    numbers = np.abs(np.frombuffer(row))
+    return not bool(((numbers > HUGE) & np.isfinite(numbers)).any())
 
 
 def _command(data: Data, wanted: Any, time: float) -> None:

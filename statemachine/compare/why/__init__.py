@@ -6,10 +6,11 @@ from .attribute import attribute
 from .explain import CauseShare, Explanation, explain
 from .factors import FACTORS, Factor
 from .gap import Deviation
-from .results import Attribution, FactorTrial, FirstTouch
+from .results import UNEXPLAINED, Attribution, FactorTrial, FirstTouch
 
 __all__ = [
     "FACTORS",
+    "UNEXPLAINED",
     "Attribution",
     "CauseShare",
     "Deviation",

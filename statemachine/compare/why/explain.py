@@ -16,7 +16,7 @@ from ..matching import match_models
 from .attribute import attribute
 from .causes import Cause, causes, differences_of
 from .gap import Deviation
-from .results import Attribution
+from .results import UNEXPLAINED, Attribution
 from .shapley import Method, Shares, shapley
 from .trials import Measure, Trials
 
@@ -24,7 +24,6 @@ __all__ = ["CauseShare", "Explanation", "explain"]
 
 # Rounding, after it has grown for some seconds: less than this is no gap to be explained.
 _ROUNDING = {"rad": 1e-8, "m": 1e-9}
-UNEXPLAINED = 0.05  # of the gap: more is not explained
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -223,6 +224,34 @@ class Ruler:
     def gaps(self, one: Curves, two: Curves) -> dict[str, Deviation]:
         """In every quantity."""
         return {name: self.gap(name, one, two) for name in self.units}
+
+    def floor(self, run: Curves, perturbed: Iterable[Trace]) -> dict[str, Deviation]:
+        """The chaos floor of every quantity: a gap that is no larger says nothing.
+
+        Args:
+            run: The side as it comes.
+            perturbed: The same side from `perturbed_runs`. One that ends early leaves no bound.
+
+        Returns:
+            Of each figure the largest that a perturbed run has to `run`.
+        """
+        found = {name: Deviation(unit, 0.0, 0.0, 0.0, 0.0) for name, unit in self.units.items()}
+        for trace in perturbed:
+            curves = self.curves(trace)
+            for name, most in found.items():
+                gap = (
+                    Deviation(most.unit, np.inf, 0.0, np.inf, np.inf)
+                    if curves is None
+                    else self.gap(name, run, curves)
+                )
+                found[name] = Deviation(
+                    unit=most.unit,
+                    worst=max(most.worst, gap.worst),
+                    at=gap.at if gap.worst > most.worst else most.at,
+                    rms=max(most.rms, gap.rms),
+                    end=max(most.end, gap.end),
+                )
+        return found
 
 
 def _rows(time: Array, values: Array, wanted: Array, timestep: float) -> Array:

@@ -8,6 +8,8 @@ from typing import Literal
 from ...scenarios.provenance import Provenance
 from .gap import Deviation
 
+UNEXPLAINED = 0.05  # of the gap: where more stays, the answer is no
+
 Way = Literal["parity", "off", "one side", "alike", "none"]
 
 
@@ -114,7 +116,7 @@ class Attribution:
     @property
     def settings_same(self) -> float:
         """The gap where all settings are the same and nothing is left out."""
-        rungs = [trial for trial in self.ladder if trial.way == "parity"]
+        rungs = [trial for trial in self.ladder if trial.way in ("parity", "one side")]
         known = [trial.worst for trial in rungs if trial.worst is not None]
         return known[-1] if known else self.gap
 

@@ -44,7 +44,7 @@ class Runs:
         watches = [_Watch(model) for model in models]
         traces = [self._record(*pair) for pair in zip(models, watches, strict=True)]
         self.provenance = provenance(models[0]), provenance(models[1])
-        self.ruler = Ruler(models[0], *traces)
+        self.ruler = Ruler(models[0], traces[0], traces[1])
         for place, trace in enumerate(traces):
             self._curves[place, ()] = self.ruler.curves(trace)
             self.ended = self.ended or trace.header.ended
@@ -67,7 +67,15 @@ class Runs:
 
     def curves(self, place: int, changes: Changes) -> Curves | None:
         """A run of one side, 0 or 1; None, with a reason in `ended`, if it did not end well."""
-        key = place, tuple(sorted((name, change.how) for name, change in changes.items()))
+        key = (
+            place,
+            tuple(
+                sorted(
+                    (name, change.how, str(change.values.get("integrator", "")))
+                    for name, change in changes.items()
+                )
+            ),
+        )
         if key not in self._curves:
             side = (self.one, self.two)[place]
             try:

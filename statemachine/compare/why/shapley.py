@@ -155,7 +155,7 @@ def _drawn(
     start, failed = game.evaluated, 0
     while failed < 10:
         order = [active[k] for k in random.permutation(len(active))]
-        both = [_along(game, way) for way in (order, order[::-1])]
+        both = [_along(game, way) for way in (order, list(reversed(order)))]
         if both[0] is None or both[1] is None:
             failed += 1
         else:

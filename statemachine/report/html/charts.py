@@ -49,6 +49,8 @@ def quantity_row(chart: QuantityChart, own: tuple[Series, Series] | None, points
     values = None if own is None else values_chart(*own, chart.labels, points)
     axis = "log axis; " if logarithmic(chart.found) else ""
     said = f"how far apart, {chart.unit}; {axis}shaded: within tolerance"
+    if _floor_shows(chart):
+        said += "; grey: the chaos floor"
     return tag(
         "section",
         tag("h3", tag("span", chart.title, class_="quantity"), badge(chart.found.verdict)),
@@ -72,13 +74,30 @@ def _sides(chart: QuantityChart) -> Html:
     return joined((f"both sides, {chart.unit}: ", *keys))
 
 
+def _top(chart: QuantityChart) -> float:
+    """The upper end of the axis of differences, in what is shown."""
+    most = max(float(chart.curve.difference.max()), chart.found.tolerance)
+    return 1.08 * most * reading(chart.curve.unit)[0]
+
+
+def _floor_shows(chart: QuantityChart) -> bool:
+    """Whether the chaos floor is high enough to be seen."""
+    if chart.floor is None:
+        return False
+    least = _DECADES * chart.found.tolerance if logarithmic(chart.found) else 0.01 * _top(chart)
+    return bool((chart.floor * reading(chart.curve.unit)[0] > least).any())
+
+
 def difference_chart(chart: QuantityChart, points: int = 600) -> Html:
-    """How far apart over time, with the tolerance as a band."""
+    """How far apart over time, with the tolerance and the chaos floor as bands."""
     curve, found, said = chart.curve, chart.found, chart.said
     scale = reading(curve.unit)[0]
-    top = 1.08 * max(float(curve.difference.max()), found.tolerance) * scale
+    top = _top(chart)
     band = found.tolerance * scale
     values = curve.difference * scale
+    floor = None
+    if chart.floor is not None and _floor_shows(chart):
+        floor = np.minimum(chart.floor * scale, top)
     if logarithmic(found):
         axis = LogAxis(
             math.log10(_DECADES * band), math.log10(top) + 0.1, bool((values == 0).any())
@@ -86,8 +105,12 @@ def difference_chart(chart: QuantityChart, points: int = 600) -> Html:
         return _plot(
             curve.time, [Curve(axis.places(values), "apart")], (axis.bottom, axis.high),
             said, band=math.log10(band), points=points, log=axis,
+            floor=None if floor is None else axis.area(floor),
         )  # fmt: skip
-    return _plot(curve.time, [Curve(values, "apart")], (0.0, top), said, band=band, points=points)
+    return _plot(
+        curve.time, [Curve(values, "apart")], (0.0, top), said, band=band, points=points,
+        floor=floor,
+    )  # fmt: skip
 
 
 def logarithmic(found: Agreement) -> bool:
@@ -177,6 +200,7 @@ def _plot(
     band: float | None = None,
     points: int = 600,
     log: LogAxis | None = None,
+    floor: Array | None = None,
 ) -> Html:
     """Curves in a box of 1000 × 100 that is stretched to its place; ticks are text beside it."""
     until = float(time[-1]) or 1.0
@@ -187,6 +211,9 @@ def _plot(
         marks.append(tag("rect", x=0, y=f"{y:.2f}", width=1000, height=f"{100 - y:.2f}",
                          class_="band"))  # fmt: skip
         marks.append(tag("line", x1=0, x2=1000, y1=f"{y:.2f}", y2=f"{y:.2f}", class_="edge"))
+    if floor is not None:
+        area = _path(time / until, floor, low, high, points)
+        marks.append(tag("path", d=f"{area}V100H0Z", class_="floor"))
     if log is None:
         levels = ticks_of(low, high)
         if len(levels) < 2:

@@ -1,0 +1,100 @@
+"""The chaos floor of `statemachine compare`: its options, and the runs that it is made of."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from ..errors import BadInputError
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Those of the chaos floor."""
+    parser.add_argument(
+        "--floor",
+        action="append",
+        default=[],
+        metavar="SIZE",
+        help="what your robot's start is uncertain by, such as 0.1mm or 0.1deg",
+    )
+    parser.add_argument(
+        "--no-floor", action="store_true", help="do not look for the chaos floor: faster"
+    )
+
+
+def check(options: argparse.Namespace) -> None:
+    """Whether what was asked for makes sense.
+
+    Raises:
+        BadInputError: It does not.
+    """
+    from ..compare.perturbed import parse_uncertainty
+
+    if options.floor and options.no_floor:
+        raise BadInputError("--floor and --no-floor exclude each other")
+    parse_uncertainty(options.floor)
+
+
+def floor_of(
+    options: argparse.Namespace,
+    request: Any,
+    comparison: Any,
+    traces: tuple[Any, Any],
+    rerun: Any = None,
+) -> Any:
+    """The chaos floor of an experiment; None where nothing can be run again.
+
+    Args:
+        options: `floor` and `no_floor` are read.
+        request: The `compare.Request`.
+        comparison: Of the traces.
+        traces: Both sides.
+        rerun: How the left was run, if sides were given.
+
+    Raises:
+        BadInputError: An uncertainty was given, and the left side was not run here.
+    """
+    one, two = traces
+    if options.no_floor:
+        return None
+    if request.is_traces or one.header.recorded:
+        if options.floor:
+            raise BadInputError("--floor runs the left side again, and it is a recorded run")
+        return None
+    from ..compare import chaos_floor
+    from ..compare.perturbed import parse_uncertainty
+    from ..report.progress import progress
+
+    rerun = rerun or _rerun(request)
+    with progress("chaos floor") as told:
+        return chaos_floor(
+            comparison,
+            one,
+            two,
+            rerun,
+            seed=request.seed,
+            uncertain=parse_uncertainty(options.floor),
+            progress=told,
+        )
+
+
+def _rerun(request: Any) -> Any:
+    """How the first of two engines runs an experiment."""
+    from ..backends import load
+    from ..compare import rerun_of
+
+    asked = request.scenario()
+    model = load(
+        request.model or asked.model,
+        backend=request.backends[0],
+        defaults=request.defaults,
+        menagerie=request.menagerie,
+    )
+    return rerun_of(
+        asked,
+        model,
+        seconds=request.seconds,
+        seed=request.seed,
+        defaults=request.defaults,
+        options=request.options,
+    )

@@ -1,0 +1,196 @@
+"""The chaos floor: the band of a gap in which nothing can be concluded.
+
+After a grazing contact two runs that differ by rounding part exponentially. So one side is run
+again with its start and commands perturbed, and what that makes of each quantity is its floor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..comparison import common_moments
+from ..errors import TraceError
+from ..interface import Array
+from ..scenarios.runs import Progress, silent
+from ..traces import Trace
+from .agreement import Agreement, Comparison, compare
+from .perturbed import EXACT, ROUNDING, RUNS, Rerun, Uncertainty, perturbed_runs
+from .series import default_tip, series
+
+_WINDOW = 0.025  # of the common time, to either side
+
+
+@dataclass(frozen=True, eq=False)
+class FloorBand:
+    """The chaos floor of one quantity.
+
+    Attributes:
+        name: As in the Agreement of the two sides; kind, unit: likewise.
+        most: The largest width of the band; end: the width at the last moment.
+        inside_from: The time from which on the gap between the two sides lies inside [s];
+            None if it does not at the end. Of a first touch 0 or None.
+        beyond: Whether the gap is, at any moment, larger than both the band and the tolerance:
+            only then it is more than chaos.
+        width: (n,) at each moment that the sides have in common; (1,) of a first touch.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    most: float
+    end: float
+    inside_from: float | None
+    beyond: bool
+    width: Array = field(repr=False, metadata={"json": False})
+
+
+@dataclass(frozen=True, eq=False)
+class ChaosFloor:
+    """The chaos floor of a comparison.
+
+    Attributes:
+        runs: How many perturbed runs of the left side it is made of; seed: of what was drawn.
+        rounding: What starts and commands were changed by, relative.
+        uncertain: What the start is uncertain by besides.
+        ended: How many of the runs ended early; from then on the band has no bound.
+        bands: One for each quantity that is compared.
+        time: (n,) the moments of the bands [s from the start].
+    """
+
+    runs: int
+    seed: int
+    rounding: float
+    uncertain: Uncertainty
+    ended: int
+    bands: tuple[FloorBand, ...]
+    time: Array = field(repr=False, metadata={"json": False})
+
+    def of(self, name: str) -> FloorBand | None:
+        """The band of a quantity; None if it has none."""
+        return next((band for band in self.bands if band.name == name), None)
+
+
+def chaos_floor(
+    comparison: Comparison,
+    one: Trace,
+    two: Trace,
+    rerun: Rerun,
+    *,
+    tip: str | None = None,
+    runs: int = RUNS,
+    seed: int = 0,
+    uncertain: Uncertainty = EXACT,
+    progress: Progress = silent,
+) -> ChaosFloor:
+    """The chaos floor of each quantity of a comparison.
+
+    The band at a moment is the largest distance of a perturbed run from `one`, within 2.5 % of
+    the common time before and after it. It is no running maximum: a robot whose servos pull it
+    back forgets where it started, and a gap that remains then is a difference although an impact
+    in between was chaotic. And it is not of the moment alone: all perturbed runs part along the
+    one direction that grows fastest, so that they cross `one` at the same time, and an impact
+    that comes a step later is a spike in each of two places.
+
+    Args:
+        comparison: Of the two traces.
+        one: The left side, as `rerun` runs it.
+        two: The right side.
+        rerun: How the left side is run.
+        tip: As given to `compare`.
+        runs: How many perturbed runs.
+        seed: Of what is drawn.
+        uncertain: What the start of a real robot is uncertain by.
+        progress: Told the fraction that is done.
+
+    Raises:
+        BadInputError: As `perturbed_runs`.
+    """
+    common = common_moments(one, two)
+    tip = default_tip(one.header, two.header) if tip is None else tip
+    gaps = {curve.name: curve.difference for curve in series(one, two, tip)}
+    widths = {name: np.zeros(len(common.time)) for name in gaps}
+    touches = {each.name: 0.0 for each in comparison.agreements if each.kind == "contact"}
+    ended = 0
+    for trace in perturbed_runs(
+        rerun, runs=runs, seed=seed, uncertain=uncertain, progress=progress
+    ):
+        ended += bool(trace.header.ended)
+        for name, far in _distances(one, trace, tip).items():
+            if name in widths:
+                widths[name] = np.maximum(widths[name], far[common.one])
+        for name, gap in _first_touches(one, trace, comparison.until).items():
+            if name in touches:
+                touches[name] = max(touches[name], gap)
+    reach = round(_WINDOW * (len(common.time) - 1))
+    bands = []
+    for found in comparison.agreements:
+        if found.kind == "contact":
+            bands.append(_of_touch(found, touches[found.name]))
+        else:
+            width = _widened(widths[found.name], reach)
+            bands.append(_band(found, gaps[found.name], width, common.time))
+    return ChaosFloor(runs, seed, ROUNDING, uncertain, ended, tuple(bands), common.time)
+
+
+def _distances(one: Trace, perturbed: Trace, tip: str) -> dict[str, Array]:
+    """How far a run is from `one` (n,), row by row; infinite where it has ended."""
+    found: dict[str, Array] = {}
+    try:
+        curves, rows = series(one, perturbed, tip), common_moments(one, perturbed).one
+    except TraceError:  # it ended at once
+        curves, rows = series(one, one, tip), np.empty(0, dtype=np.int64)
+    for curve in curves:
+        far = np.full(len(one), np.inf)
+        far[rows] = np.nan_to_num(curve.difference[: len(rows)], nan=np.inf)
+        found[curve.name] = far
+    return found
+
+
+def _first_touches(one: Trace, perturbed: Trace, until: float) -> dict[str, float]:
+    """How far apart each pair's first touches are [s]; a touch that does not come has no time."""
+    try:
+        compared = compare(one, perturbed)
+    except TraceError:
+        return {}
+    return {
+        each.name: each.max if not each.note else until
+        for each in compared.agreements
+        if each.kind == "contact"
+    }
+
+
+def _widened(width: Array, reach: int) -> Array:
+    """The largest (n,) within some rows to either side."""
+    padded = np.pad(width, reach, mode="edge")
+    return np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
+
+
+def _band(found: Agreement, gap: Array, width: Array, time: Array) -> FloorBand:
+    outside = np.flatnonzero(~(gap <= width))
+    last = int(outside[-1]) + 1 if len(outside) else 0
+    return FloorBand(
+        name=found.name,
+        kind=found.kind,
+        unit=found.unit,
+        most=float(width.max()),
+        end=float(width[-1]),
+        inside_from=float(time[last]) if last < len(time) else None,
+        beyond=bool((~(gap <= np.maximum(width, found.tolerance))).any()),
+        width=width,
+    )
+
+
+def _of_touch(found: Agreement, spread: float) -> FloorBand:
+    inside = found.max <= spread
+    return FloorBand(
+        name=found.name,
+        kind=found.kind,
+        unit=found.unit,
+        most=spread,
+        end=spread,
+        inside_from=0.0 if inside else None,
+        beyond=not found.max <= max(spread, found.tolerance),
+        width=np.array([spread]),
+    )

@@ -1,0 +1,235 @@
+"""The same side run again, its start and its commands changed by next to nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from ..errors import BadInputError
+from ..interface import Array, Data, JointType, Model, make_data, reset
+from ..rotations import times
+from ..scenarios import Controller, Scenario
+from ..scenarios.runs import Progress, part_of, silent
+from ..traces import Trace, record
+
+RUNS = 4
+ROUNDING = 1e-12  # of a value, or of 1 where it is less; some thousand times that of a float64
+_UNITS = {"mm": ("length", 1e-3), "cm": ("length", 1e-2), "m": ("length", 1.0)}
+_UNITS |= {"deg": ("angle", np.pi / 180), "rad": ("angle", 1.0)}
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """What is not known of the start of a real robot.
+
+    Attributes:
+        length: Of the position of a slide or a free body [m].
+        angle: Of a hinge, and of the rotation of a free body or a ball [rad].
+    """
+
+    length: float = 0.0
+    angle: float = 0.0
+
+
+EXACT = Uncertainty()
+
+
+def parse_uncertainty(words: Iterable[str]) -> Uncertainty:
+    """What words like "0.1mm" and "0.1deg" say.
+
+    Raises:
+        BadInputError: A word is none, or a length or an angle is given twice.
+    """
+    found: dict[str, float] = {}
+    for word in words:
+        # The longer suffix first: "1mm" ends with "m", too.
+        suffix = next((s for s in sorted(_UNITS, key=len)[::-1] if word.endswith(s)), "")
+        kind, scale = _UNITS.get(suffix, ("", 0.0))
+        try:
+            value = float(word.removesuffix(suffix)) * scale
+        except ValueError:
+            value = float("nan")
+        if not suffix or not 0 < value < np.inf:
+            raise BadInputError(
+                f"an uncertainty reads like 0.1mm or 0.1deg ({', '.join(_UNITS)}); got {word!r}"
+            )
+        if kind in found:
+            raise BadInputError(f"the {kind} that is uncertain is given twice: {word!r}")
+        found[kind] = value
+    return Uncertainty(**found)
+
+
+@dataclass(frozen=True, eq=False)
+class Rerun:
+    """How a side is run, so that it can be run again.
+
+    Attributes:
+        model: With all its options.
+        controller: Makes a fresh controller of a Model; it may give None for none.
+        seconds: Simulated time.
+        keyframe: Where it starts; qpos, qvel: written over that.
+        defaults, options: For the header of a trace; see `traces.record`.
+    """
+
+    model: Model
+    controller: Callable[[Model], Controller | None]
+    seconds: float
+    keyframe: int | str | None = None
+    qpos: Array | None = None
+    qvel: Array | None = None
+    defaults: Literal["model", "engine"] = "model"
+    options: dict[str, Any] = field(default_factory=dict)
+
+    def record(self, **arguments: Any) -> Trace:
+        """The run; `arguments` are further ones of `traces.record`, which win."""
+        given = {
+            "controller": self.controller(self.model),
+            "seconds": self.seconds,
+            "keyframe": self.keyframe,
+            "qpos": self.qpos,
+            "qvel": self.qvel,
+            "defaults": self.defaults,
+            "options": self.options,
+            **arguments,
+        }
+        return record(self.model, **given)
+
+    def start(self) -> tuple[Array, Array]:
+        """Positions (nq,) and velocities (nv,) that it starts with."""
+        with make_data(self.model) as data:
+            reset(self.model, data, self.keyframe)
+            qpos = data.qpos.copy() if self.qpos is None else np.array(self.qpos)
+            qvel = data.qvel.copy() if self.qvel is None else np.array(self.qvel)
+        return qpos, qvel
+
+
+def rerun_of(
+    scenario: Scenario,
+    model: Model,
+    *,
+    seconds: float | None = None,
+    seed: int = 0,
+    defaults: Literal["model", "engine"] = "model",
+    options: dict[str, Any] | None = None,
+) -> Rerun:
+    """How a scenario is run on a Model; arguments are those of `traces.record_scenario`."""
+    scenario = scenario.on(model)
+    chosen = {**scenario.options, **(options or {})}
+    return Rerun(
+        model.replace(**chosen) if chosen else model,
+        lambda replaced: scenario.controller(replaced, seed),
+        scenario.seconds if seconds is None else seconds,
+        keyframe=scenario.keyframe,
+        defaults=defaults,
+        options=chosen,
+    )
+
+
+def perturbed_runs(
+    rerun: Rerun,
+    *,
+    runs: int = RUNS,
+    seed: int = 0,
+    uncertain: Uncertainty = EXACT,
+    derive: bool = True,
+    progress: Progress = silent,
+) -> Iterator[Trace]:
+    """The same run, again and again, from starts and with commands that differ by rounding.
+
+    Positions, velocities and commands change by at most 1e-12 of themselves (of 1 where they
+    are less), drawn anew for each run and each command. A quaternion is turned by such an
+    angle, and stays one. Where the start is uncertain by more, each coordinate of it is
+    displaced by all of that, to a side that is drawn, and in the next run to the other side:
+    the corners of what is possible.
+
+    Args:
+        rerun: The run.
+        runs: How many, at least 1.
+        seed: Of what is drawn.
+        uncertain: What is not known of the start.
+        derive: Whether the traces tell what the engine derives, too.
+        progress: Told the fraction that is done.
+
+    Raises:
+        BadInputError: `runs` is less than 1, or the seed is negative.
+    """
+    if runs < 1:
+        raise BadInputError(f"the chaos floor wants at least one run; got {runs}")
+    if seed < 0:
+        raise BadInputError(f"seed must not be negative; got {seed}")
+    for k in range(runs):
+        draw = np.random.default_rng([seed, k])
+        qpos, qvel = rerun.start()
+        qpos = _displaced(rerun.model, qpos, uncertain, np.random.default_rng([seed, k // 2]), k)
+        yield rerun.record(
+            controller=_nudged_controller(rerun.controller(rerun.model), draw),
+            qpos=_nudged_pose(rerun.model, qpos, draw),
+            qvel=_nudged(qvel, draw),
+            derive=derive,
+            progress=part_of(progress, k / runs, 1 / runs),
+        )
+
+
+def _displaced(
+    model: Model, qpos: Array, size: Uncertainty, draw: np.random.Generator, run: int
+) -> Array:
+    """A start (nq,) at a corner of what is possible; of two runs one is opposite to the other."""
+    qpos, opposite = qpos.copy(), -1.0 if run % 2 else 1.0
+    for kind, place in zip(model.jnt_type.tolist(), model.jnt_qposadr.tolist(), strict=True):
+        if kind in (JointType.HINGE, JointType.SLIDE):
+            most = size.angle if kind == JointType.HINGE else size.length
+            qpos[place] += opposite * most * float(draw.choice((-1.0, 1.0)))
+            continue
+        if kind == JointType.FREE:
+            qpos[place : place + 3] += opposite * size.length * _direction(draw)
+        _turn(qpos[place + JointType(kind).nq - 4 :][:4], opposite * size.angle * _direction(draw))
+    return qpos
+
+
+def _nudged_pose(model: Model, qpos: Array, draw: np.random.Generator) -> Array:
+    """Positions (nq,) changed by rounding; a quaternion stays one."""
+    nudged = _nudged(qpos, draw)
+    for _, place in model._quaternions:
+        nudged[place : place + 4] = qpos[place : place + 4]
+        _turn(nudged[place : place + 4], ROUNDING * _direction(draw))
+    return nudged
+
+
+def _turn(quat: Array, turn: Array) -> None:
+    """Turn a quaternion (4,), in place, by a vector (3,) along the axis, as long as the angle."""
+    angle = float(np.linalg.norm(turn))
+    if angle:
+        half = np.array([np.cos(angle / 2), *(np.sin(angle / 2) * turn / angle)])
+        turned = times(half, quat)
+        quat[:] = turned / np.linalg.norm(turned)
+
+
+def _direction(draw: np.random.Generator) -> Array:
+    """A unit vector (3,), every direction as likely as any other."""
+    vector = draw.standard_normal(3)
+    return vector / np.linalg.norm(vector)
+
+
+def _nudged(values: Array, draw: np.random.Generator) -> Array:
+    """Values (n,) changed by rounding; what is not finite stays."""
+    finite = np.where(np.isfinite(values), values, 0.0)
+    return values + ROUNDING * np.maximum(1.0, np.abs(finite)) * draw.uniform(-1, 1, len(values))
+
+
+def _nudged_controller(controller: Controller | None, draw: np.random.Generator) -> Controller:
+    """A controller whose commands differ by rounding, and what is commanded without one."""
+    began = False
+
+    def nudging(time: float, data: Data) -> Any:
+        nonlocal began
+        wanted = None if controller is None else controller(time, data)
+        if wanted is not None:
+            return _nudged(np.asarray(wanted, dtype=np.float64), draw)
+        # Once: a ctrl that stays as it is must not wander.
+        first, began = not began, True
+        return _nudged(data.ctrl, draw) if first else None
+
+    return nudging

@@ -1,0 +1,238 @@
+"""Pairs of models with known causes, for the tests of `explain`; made by editing a model's text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import statemachine as sm
+from statemachine.compare.why import Explanation, explain
+from statemachine.scenarios import Scenario
+
+# Two links on servos above a floor, a ball on the floor, and a weight on a spring.
+ARM = """
+<mujoco model="arm">
+  <compiler angle="radian"/>
+  <option timestep="0.002" integrator="implicitfast"/>
+  <default><geom density="0"/></default>
+  <worldbody>
+    <geom name="floor" type="plane" size="2 2 0.1"/>
+    <body name="upper" pos="0 0 0.5">
+      <inertial mass="0.5" pos="0 0 -0.1" diaginertia="0.003 0.003 0.0004"/>
+      <joint name="shoulder" axis="0 1 0" damping="0.1" armature="0.01" range="-2 2"
+             limited="true" frictionloss="0.01"/>
+      <geom name="upper_shape" type="capsule" size="0.02" fromto="0 0 0 0 0 -0.2"/>
+      <body name="lower" pos="0 0 -0.2">
+        <inertial mass="0.3" pos="0 0 -0.08" diaginertia="0.001 0.001 0.0002"/>
+        <joint name="elbow" axis="0 1 0" damping="0.1" armature="0.01"/>
+        <geom name="lower_shape" type="capsule" size="0.02" fromto="0 0 0 0 0 -0.15"/>
+        <site name="tip" pos="0 0 -0.15"/>
+      </body>
+    </body>
+    <body name="ball" pos="0.6 0 0.2">
+      <freejoint name="ball"/>
+      <inertial mass="0.2" pos="0 0 0" diaginertia="0.0004 0.0004 0.0004"/>
+      <geom name="ball_shape" size="0.05" friction="0.8 0.005 0.0001"/>
+    </body>
+    <body name="weight" pos="-0.6 0 0.3">
+      <joint name="spring" type="slide" axis="0 0 1" stiffness="40" springref="0.05" damping="1"/>
+      <geom name="weight_shape" type="box" size="0.03 0.03 0.03" mass="0.5"/>
+    </body>
+  </worldbody>
+  <actuator>
+    <position name="shoulder" joint="shoulder" kp="20" kv="1"/>
+    <position name="elbow" joint="elbow" kp="20" kv="1"/>
+  </actuator>
+  <keyframe><key name="home" qpos="0 0  0.6 0 0.2 1 0 0 0  0" ctrl="0 0"/></keyframe>
+</mujoco>
+"""
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is changed in the text of the right side, and what it is to be called.
+
+    Attributes:
+        old, new: A piece of the text and what stands in its place.
+        cause: What the explanation calls it.
+        quantity: What shows it.
+    """
+
+    old: str
+    new: str
+    cause: str
+    quantity: str = "joints"
+
+
+def _swing(time: float) -> tuple[float, float]:
+    return (0.8, -0.5) if time < 0.5 else (-0.3, 0.6)
+
+
+def _controller(model: sm.Model, _seed: int) -> Callable[[float, sm.Data], list[float]]:
+    places = [model.actuator_names.index(name) for name in ("shoulder", "elbow")]
+
+    def controller(time: float, _data: sm.Data) -> list[float]:
+        ctrl = [0.0] * model.nu
+        for place, value in zip(places, _swing(time), strict=True):
+            ctrl[place] = value
+        return ctrl
+
+    return controller
+
+
+class Swing(Scenario):
+    """Two commands to the servos; it is what it is on every model."""
+
+    def on(self, model: sm.Model) -> Scenario:
+        return self
+
+
+SWING = Swing("swing", "The servos are told two poses.", "", 1.0, _controller, lambda _model: "")
+
+
+def write(folder: Path, name: str, text: str) -> Path:
+    """A file of a model."""
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def explained(
+    folder: Path, left: str, right: str, *, engines: tuple[str, str] = ("mujoco", "mujoco"), **more
+) -> Explanation:
+    """Why two texts of models differ."""
+    models = [
+        sm.load(write(folder, f"{side}.xml", text), backend=engine)
+        for side, text, engine in zip(("left", "right"), (left, right), engines, strict=True)
+    ]
+    return explain(models[0], models[1], more.pop("scenario", SWING), **more)
+
+
+def changed(text: str, *cases: Case) -> str:
+    """A text with the changes of cases."""
+    for case in cases:
+        assert text.count(case.old) == 1, case
+        text = text.replace(case.old, case.new)
+    return text
+
+
+_SHOULDER = '<position name="shoulder" joint="shoulder" kp="20" kv="1"'
+_OPTION = '<option timestep="0.002" integrator="implicitfast"'
+_JOINT = 'axis="0 1 0" damping="0.1" armature="0.01" range'
+_BALL = 'name="ball_shape"'
+_ELBOW = 'name="elbow" axis="0 1 0"'
+_LOWER = '<body name="lower" pos="0 0 -0.2"'
+
+
+def _more(old: str, more: str, cause: str, quantity: str = "joints") -> Case:
+    """Something added behind a piece of the text."""
+    return Case(old, f"{old} {more}", cause, quantity)
+
+
+def _before(old: str, more: str, cause: str, quantity: str = "joints") -> Case:
+    """Something added before a piece of the text."""
+    return Case(old, f"{more}{old}", cause, quantity)
+
+
+def _in(tag: str, inner: str, cause: str, quantity: str = "joints") -> Case:
+    """A section of its own, before that of the actuators."""
+    return _before("<actuator>", f"<{tag}>{inner}</{tag}>", cause, quantity)
+
+
+ALONE = {
+    "mass": Case('mass="0.3"', 'mass="0.36"', "mass of lower"),
+    "centre of mass": Case('pos="0 0 -0.08"', 'pos="0 0 -0.09"', "centre of mass of lower"),
+    "inertia": Case('"0.001 0.001 0.0002"', '"0.001 0.0011 0.0002"', "inertia of lower"),
+    "place": Case(_LOWER, _LOWER.replace("0 0", "0.01 0"), "place of lower"),
+    "tilted body": _more(_LOWER, 'euler="0 0.02 0"', "place of lower"),
+    "axis": Case(_ELBOW, _ELBOW.replace("0 1", "0.2 1"), "axis of elbow"),
+    "anchor": _more(_ELBOW, 'pos="0.005 0 0"', "anchor of elbow"),
+    "range": Case('range="-2 2"', 'range="-2 0.4"', "range of shoulder"),
+    "damping": Case(_JOINT, _JOINT.replace("0.1", "0.2"), "damping of shoulder"),
+    "armature": Case(_JOINT, _JOINT.replace("0.01", "0.03"), "armature of shoulder"),
+    "dry friction": Case('frictionloss="0.01"', 'frictionloss="0.1"', "dry friction of shoulder"),
+    "spring": Case('stiffness="40"', 'stiffness="50"', "spring of spring", "slides"),
+    "rest": Case('springref="0.05"', 'springref="0.06"', "rest of the spring of spring", "slides"),
+    "gains": Case(_SHOULDER, _SHOULDER.replace('"20"', '"24"'), "gains of shoulder"),
+    "gear": _more(_SHOULDER, 'gear="1.1"', "gear of shoulder"),
+    "force range": _more(_SHOULDER, 'forcerange="-2 2"', "force range of shoulder"),
+    "range of ctrl": _more(_SHOULDER, 'ctrlrange="-0.5 0.5"', "range of ctrl of shoulder"),
+    "force limit": _more('limited="true"', 'actuatorfrcrange="-2 2"', "force limit of shoulder"),
+    "delay": _more(_SHOULDER, 'delay="0.01" nsample="16"', "delay of shoulder"),
+    "gravity": _more(_OPTION, 'gravity="0 0 -9"', "gravity"),
+    "timestep": Case('timestep="0.002"', 'timestep="0.01"', "timestep"),
+    "integrator": Case('integrator="implicitfast"', 'integrator="RK4"', "integrator"),
+    "medium": _more(_OPTION, 'density="200" viscosity="0.5"', "medium"),
+    "damper": Case(f"{_OPTION}/>", f'{_OPTION}><flag damper="disable"/></option>', "damper"),
+    "no spring": Case(
+        f"{_OPTION}/>", f'{_OPTION}><flag spring="disable"/></option>', "spring", "slides"
+    ),
+    "weight": _more('<body name="upper"', 'gravcomp="1"', "weight taken off of upper"),
+    "geom moved": _more(_BALL, 'pos="0.003 0 0"', "place of ball_shape", "ball"),
+    "size": Case(f'{_BALL} size="0.05"', f'{_BALL} size="0.055"', "shape of ball_shape", "ball"),
+    "type": Case(
+        f'{_BALL} size="0.05"',
+        f'{_BALL} type="box" size="0.05 0.05 0.06"',
+        "shape of ball_shape",
+        "ball",
+    ),
+    "filter": _more(_BALL, 'contype="2" conaffinity="2"', "filter of ball_shape", "ball"),
+    "softness": _more(_BALL, 'solref="0.05 1"', "softness of ball_shape", "ball"),
+    "margin": _more(_BALL, 'margin="0.02"', "margin of ball_shape", "ball"),
+    "floor": _more('name="floor"', 'pos="0 0 0.02"', "place of floor", "ball"),
+    "extra shape": _before(
+        '<body name="ball"',
+        '<geom name="box" type="box" pos="0.6 0 0.02" size="0.1 0.1 0.02"/>',
+        "extra shape of box",
+        "ball",
+    ),
+    "exclude": _in(
+        "contact", '<exclude body1="world" body2="ball"/>', "extra exclude of exclude 0", "ball"
+    ),
+    "pair": _in(
+        "contact",
+        '<pair geom1="floor" geom2="ball_shape" solref="0.08 1"/>',
+        "extra pair of pair 0",
+        "ball",
+    ),
+    "equality": _in(
+        "equality",
+        '<joint name="tie" joint1="shoulder" joint2="elbow"/>',
+        "extra equality of tie",
+    ),
+    "tendon": _in(
+        "tendon",
+        '<fixed name="band" stiffness="5" springlength="0.1">'
+        '<joint joint="elbow" coef="1"/></fixed>',
+        "extra tendon of band",
+    ),
+    "actuator": _before(
+        '<position name="elbow"',
+        '<position name="wind" joint="shoulder" kp="1"/>',
+        "extra actuator of wind",
+    ),
+    "start": Case('qpos="0 0  0.6 0 0.2', 'qpos="0.1 0  0.6 0 0.2', "start"),
+}
+
+SERVO = """
+<mujoco model="servo">
+  <option timestep="0.005" integrator="implicitfast"/>
+  <worldbody>
+    <body name="slider">
+      <joint name="slider" type="slide" axis="0 0 1"/>
+      <inertial mass="{mass}" pos="0 0 0" diaginertia="0.01 0.01 0.01"/>
+      <body name="load" pos="0 0 0.1">
+        <joint name="bend" axis="0 1 0" stiffness="1e5" damping="50"/>
+        <inertial mass="{load}" pos="0 0 0" diaginertia="0.01 0.01 0.01"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator><position name="slider" joint="slider" kp="{kp}" kv="{kv}"/></actuator>
+</mujoco>
+"""
+
+
+def servo(mass: float = 1.0, load: float = 1.0, kp: float = 200.0) -> str:
+    """A slide that a servo holds against its weight: it sags by (mass + load) g / kp."""
+    return SERVO.format(mass=mass, load=load, kp=kp, kv=2 * (kp * (mass + load)) ** 0.5)

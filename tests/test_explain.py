@@ -1,0 +1,314 @@
+"""Why two sides differ: every known cause is found, weighed and brought to the same."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.compare.why import Explanation, explain
+from statemachine.compare.why.shapley import shapley
+from statemachine.scenarios import scenario
+
+from .conftest import ROOT, need_engine
+from .explained import ALONE, ARM, SWING, Case, changed, explained, servo
+
+HOME = replace(SWING, keyframe="home")
+STILL = replace(SWING, controller=lambda _model, _seed: lambda _time, _data: [0.0])
+
+
+def shares(found: Explanation) -> dict[str, float | None]:
+    return {each.name: each.share for each in found.shares}
+
+
+@pytest.mark.parametrize("name", ALONE)
+def test_one_cause_is_found_and_explains_all(name, tmp_path):
+    case = ALONE[name]
+    idle = Case(
+        'springref="0.05" damping="1"', 'springref="0.05" damping="1.5"', "damping of spring"
+    )
+    if case.quantity == "slides":
+        idle = Case('mass="0.3"', 'mass="0.31"', "mass of lower")
+    right = changed(ARM, case, idle)
+    found = explained(tmp_path, ARM, right, scenario=HOME, quantity=case.quantity)
+    told = shares(found)
+    assert found.gap > 100 * found.negligible
+    assert told[case.cause] >= 0.95, told
+    assert all(abs(share) <= 0.02 for cause, share in told.items() if cause != case.cause), told
+    assert set(told) <= {case.cause, idle.cause, "extra actuator of more"}
+    assert found.brought <= 1e-9 * found.gap + 1e-12
+    assert found.is_explained
+    assert found.located == 0
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_two_causes_at_70_to_30(seed, tmp_path):
+    """What a servo sags by is the sum of the weights that it carries."""
+    size = np.random.default_rng(seed).uniform(0.2, 0.6)
+    left, right = servo(), servo(1.0 + 0.7 * size, 1.0 + 0.3 * size)
+    right = right.replace(_kv(right), _kv(left))
+    found = explained(
+        tmp_path, left, right, scenario=STILL, seconds=3.0, measure="end", quantity="slides"
+    )
+    assert found.gap == pytest.approx(9.81 * size / 200, rel=1e-3)
+    told = shares(found)
+    assert told["mass of slider"] == pytest.approx(0.7, abs=0.05)
+    assert told["mass of load"] == pytest.approx(0.3, abs=0.05)
+    assert found.method == "one at a time"
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_causes_that_interact_get_their_shapley_value(seed, tmp_path):
+    """What a servo sags by is weight over gain: two causes, neither of which adds to the other."""
+    random = np.random.default_rng(seed)
+    mass, kp = random.uniform(2, 3), random.uniform(80, 140)
+    left, right = servo(), servo(mass, 1.0, kp)
+    right = right.replace(_kv(right), _kv(left))
+    found = explained(
+        tmp_path, left, right, scenario=STILL, seconds=6.0, measure="end", quantity="slides"
+    )
+
+    def gap(m: float, k: float) -> float:
+        return 9.81 * abs((m + 1) / k - 2 / 200)
+
+    whole = gap(mass, kp)
+    heavier = ((whole - gap(1, kp)) + gap(mass, 200)) / 2 / whole
+    told = shares(found)
+    assert found.method == "all sets"
+    assert told["mass of slider"] == pytest.approx(heavier, abs=0.01)
+    assert told["gains of slider"] == pytest.approx(1 - heavier, abs=0.01)
+
+
+def _kv(text: str) -> str:
+    start = text.index('kv="')
+    return text[start : text.index('"', start + 4) + 1]
+
+
+SAME = {
+    "fullinertia": [
+        (
+            'pos="0 0 -0.08" diaginertia="0.001 0.001 0.0002"',
+            'pos="0 0 -0.08" fullinertia="0.001 0.001 0.0002 0 0 0"',
+        )
+    ],
+    "turned inertia": [
+        (
+            'pos="0 0 -0.08" diaginertia="0.001 0.001 0.0002"',
+            'pos="0 0 -0.08" quat="0.5 0.5 0.5 0.5" diaginertia="0.001 0.0002 0.001"',
+        )
+    ],
+    "degrees": [
+        ('<compiler angle="radian"/>', '<compiler angle="degree"/>'),
+        ('range="-2 2"', f'range="{np.degrees(-2):.15g} {np.degrees(2):.15g}"'),
+    ],
+    "inlined defaults": [
+        ('<default><geom density="0"/></default>', ""),
+        ('name="upper_shape"', 'name="upper_shape" density="0"'),
+        ('name="lower_shape"', 'name="lower_shape" density="0"'),
+    ],
+    "fixed body": [
+        ('<geom name="lower_shape"', '<body name="shell"><geom name="lower_shape"'),
+        ('fromto="0 0 0 0 0 -0.15"/>', 'fromto="0 0 0 0 0 -0.15"/></body>'),
+    ],
+    "mass in a fixed body": [
+        (
+            '<inertial mass="0.3" pos="0 0 -0.08" diaginertia="0.001 0.001 0.0002"/>',
+            '<inertial mass="1e-9" pos="0 0 -0.08" diaginertia="1e-9 1e-9 1e-9"/><body '
+            'name="core" pos="0 0 -0.08"><inertial mass="0.299999999" pos="0 0 0" '
+            'diaginertia="0.000999999 0.000999999 0.000199999"/></body>',
+        )
+    ],
+    "what shows it": [
+        ('name="floor"', 'name="floor" rgba="1 0 0 1" group="3"'),
+        ("<worldbody>", '<worldbody><light pos="0 0 3"/><camera name="a" pos="0 0 3"/>'),
+    ],
+    "shape that touches nothing": [
+        (
+            '<site name="tip"',
+            '<geom name="look" size="0.1" contype="0" conaffinity="0"/><site name="tip"',
+        )
+    ],
+    "renamed": [('name="lower"', 'name="forearm"'), ('name="upper"', 'name="arm"')],
+    "permuted bodies": [],
+    "permuted actuators": [],
+}
+
+
+def _swapped(text: str) -> str:
+    """The two actuators in the other order."""
+    lines = [f'<position name="{n}" joint="{n}" kp="20" kv="1"/>' for n in ("shoulder", "elbow")]
+    return text.replace(lines[0], "@").replace(lines[1], lines[0]).replace("@", lines[1])
+
+
+@pytest.mark.parametrize("name", SAME)
+def test_another_way_of_saying_it_is_no_difference(name, tmp_path):
+    right = ARM
+    for old, new in SAME[name]:
+        assert right.count(old) == 1
+        right = right.replace(old, new)
+    scenario = HOME
+    if name == "permuted bodies":  # and with them the order of qpos
+        start, end = right.index('<body name="ball"'), right.index('<body name="weight"')
+        ball = right[start:end]
+        right = right.replace(ball, "").replace('<body name="upper"', f'{ball}<body name="upper"')
+        right = right.replace('qpos="0 0  0.6 0 0.2 1 0 0 0  0"', 'qpos="0.6 0 0.2 1 0 0 0 0 0 0"')
+    if name == "permuted actuators":
+        lines = [
+            f'<position name="{n}" joint="{n}" kp="20" kv="1"/>' for n in ("shoulder", "elbow")
+        ]
+        right = right.replace(lines[0], "@").replace(lines[1], lines[0]).replace("@", lines[1])
+    found = explained(tmp_path, ARM, right, scenario=scenario)
+    # The order of ctrl matters to who writes it by number.
+    assert [each.name for each in found.shares] == (
+        ["order of ctrl"] if name == "permuted actuators" else []
+    )
+    assert found.is_rounding
+    assert found.is_explained
+
+
+def test_a_function_that_writes_by_number_meets_other_actuators(tmp_path):
+    right = _swapped(ARM)
+    by_number = replace(HOME, controller=lambda _model, _seed: lambda _time, _data: [0.8, -0.5])
+    found = explained(tmp_path, ARM, right, scenario=by_number)
+    assert shares(found) == {"order of ctrl": pytest.approx(1.0)}
+
+
+def test_what_cannot_be_brought_over_stays_unexplained(tmp_path):
+    extra = (
+        '<site name="tip"',
+        '<body name="more"><joint name="more" axis="1 0 0" damping="0.01"/><inertial mass="0.2" '
+        'pos="0 0.05 0" diaginertia="0.001 0.001 0.001"/></body><site name="tip"',
+    )
+    found = explained(tmp_path, ARM, ARM.replace(*extra), scenario=SWING)
+    (alone,) = [each for each in found.shares if each.share is None]
+    assert alone.name == "extra joint of more"
+    assert found.unexplained > 0.9
+    assert not found.is_explained
+    assert found.unmatched[1]["joint"] == ("more",)
+
+
+@pytest.mark.parametrize("name", ["mass", "gains", "damping", "gear", "place", "armature"])
+def test_across_engines_the_file_is_told_from_the_engine(name, tmp_path):
+    need_engine("pybullet")
+    bare = ARM.replace('<geom name="floor" type="plane" size="2 2 0.1"/>', "")
+    case = ALONE[name]
+    found = explained(
+        tmp_path, bare, changed(bare, case), engines=("mujoco", "pybullet"), quantity="joints"
+    )
+    told = shares(found)
+    assert told[case.cause] >= 0.95, told
+    assert all(abs(share) <= 0.02 for cause, share in told.items() if cause != case.cause), told
+    assert found.is_explained
+
+
+def test_the_robot_of_a_urdf_is_that_of_the_mjcf():
+    left = sm.load("so101/so101", contacts=False)
+    right = sm.load(ROOT / "models/so101/so101.urdf", contacts=False)
+    found = explain(left, right, scenario("fall"))
+    # A URDF knows no integrator, armature or timestep; the links, as far as it has digits, are one.
+    kinds = {each.kind for each in found.shares if abs(each.share or 0.0) > 1e-3}
+    assert kinds <= {"option", "joint"}
+    assert found.unexplained == pytest.approx(0.0, abs=1e-6)
+
+
+def test_names_can_be_given(tmp_path):
+    right = ARM.replace('"elbow"', '"e"').replace('"shoulder"', '"s"').replace("_shape", "_s")
+
+    def fixed(_model: sm.Model, _seed: int):
+        return lambda _time, _data: [0.8, -0.5]
+
+    by_number = replace(HOME, controller=fixed)
+    found = explained(
+        tmp_path, ARM, right, scenario=by_number, names={"elbow": "e", "shoulder": "s"}
+    )
+    assert found.shares == ()
+    assert found.is_rounding
+
+
+def test_a_finer_list_has_every_difference(tmp_path):
+    right = ARM.replace('damping="0.1"', 'damping="0.11"').replace('kp="20"', 'kp="21"')
+    found = explained(tmp_path, ARM, right, scenario=HOME, finer=True)
+    assert {"damping of shoulder", "damping of elbow", "gains of shoulder"} <= set(shares(found))
+    assert sum(share or 0.0 for share in shares(found).values()) == pytest.approx(1.0, abs=0.02)
+
+
+def test_every_array_of_a_compiled_model_is_compared_or_has_no_effect():
+    """A later engine may have more of them: then this fails, and the tables are to grow."""
+    mujoco = pytest.importorskip("mujoco")
+    from statemachine.engines.mujoco import _fields as fields
+
+    raw = sm.load("so101/scene").compiled
+    names = [name for name in dir(raw) if not name.startswith("_")]
+    arrays = [name for name in names if isinstance(getattr(raw, name), np.ndarray)]
+    assert [name for name in arrays if not fields.known(name)] == []
+    known = {name for names in fields.OPTIONS.values() for name in names} | set(fields.FLAGS)
+    assert [n for n in dir(raw.opt) if not n.startswith("_") and n not in known] == []
+    flags = {*mujoco.mjtDisableBit.__members__, *mujoco.mjtEnableBit.__members__}
+    assert set(fields.IDLE_FLAGS) <= flags
+
+
+@pytest.mark.parametrize("model", ["so101/scene_box"])
+def test_each_figure_of_a_model_is_found_and_brought_over(model):
+    """One entry of each array is changed: the list has it, and the edits undo it."""
+    from statemachine.compare.matching import match_models
+    from statemachine.engines.mujoco import _fields as fields
+    from statemachine.engines.mujoco.differences import differences, edited
+
+    left, random = sm.load(model), np.random.default_rng(0)
+    raw, tried = left.compiled, 0
+    for row in fields.ROWS:
+        name = row.fields[0]
+        array = getattr(raw, name)
+        places = np.arange(len(array))
+        if name.startswith("geom"):
+            places = np.flatnonzero(raw.geom_contype | raw.geom_conaffinity)
+        if not len(places) or row.when or name == "body_gravcomp":
+            continue
+        place = int(random.choice(places))
+        old = np.array(array[place])
+        new = ~old if old.dtype.kind == "b" else old + 1 if old.dtype.kind == "i" else old + 0.01
+        right = left.with_compiled(edited(raw, [(name, (place,), new)]))
+        (found,) = differences(raw, right.compiled, match_models(left, right))
+        back = edited(right.compiled, found.edits)
+        assert np.array_equal(getattr(back, name), array), name
+        tried += 1
+    assert tried > 15
+
+
+def test_shapley_values_of_a_game_whose_values_are_known():
+    """Of v(S) = 1 - max over S each gets what it adds, as in the airport game."""
+    costs = {"a": 0.1, "b": 0.3, "c": 0.6, "d": 1.0}
+
+    def value(brought: frozenset[str]) -> float:
+        return 1.0 - max((costs[name] for name in brought), default=0.0)
+
+    found = shapley(list(costs), value, 1.0)
+    known = {"a": 0.025, "b": 0.025 + 0.2 / 3, "c": 0.025 + 0.2 / 3 + 0.15}
+    known["d"] = 1.0 - sum(known.values())
+    assert found.method == "all sets"
+    assert found.share == pytest.approx(known)
+
+
+def test_drawn_orders_come_with_their_error():
+    names = [f"cause {k}" for k in range(8)]
+
+    def value(brought: frozenset[str]) -> float:
+        return max(0.0, 1.0 - (len(brought) / 8) ** 2)
+
+    found = shapley(names, value, 1.0, budget=400, seed=3)
+    assert found.method == "drawn orders"
+    for name in names:
+        assert abs((found.share[name] or 0.0) - 1 / 8) <= 4 * found.error[name] + 1e-12
+    assert found == shapley(names, value, 1.0, budget=400, seed=3)
+
+
+def test_a_set_that_cannot_be_run_is_told():
+    def value(brought: frozenset[str]) -> float | None:
+        return None if brought == {"a"} else 1.0 - 0.5 * len(brought)
+
+    found = shapley(["a", "b"], value, 1.0)
+    assert found.impossible == (("a",),)
+    assert found.alone["a"] is None
+    assert found.share["a"] is None

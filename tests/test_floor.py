@@ -1,0 +1,199 @@
+"""The chaos floor: how far a side gets from itself, and what of a gap lies inside that."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.compare import ChaosFloor, Uncertainty, chaos_floor, compare, perturbed_runs
+from statemachine.compare.perturbed import ROUNDING, Rerun, parse_uncertainty
+from statemachine.compare.why.gap import Ruler
+from statemachine.errors import BadInputError
+from statemachine.page import Text
+from statemachine.report import compare as report
+
+from .conftest import Cli, need_engine
+
+PENDULUM = """<mujoco><option timestep="0.005"/><worldbody><body><joint name="swing" axis="0 1 0"
+  damping="0.05"/><geom type="capsule" size="0.02" fromto="0 0 0 0 0 -0.5" contype="0"/></body>
+</worldbody></mujoco>"""
+DOUBLE = """<mujoco><option timestep="0.005"/><worldbody><body><joint name="upper" axis="0 1 0"/>
+  <geom type="capsule" size="0.02" fromto="0 0 0 0 0 -0.5" contype="0" conaffinity="0"/>
+  <body pos="0 0 -0.5"><joint name="lower" axis="0 1 0"/>
+  <geom type="capsule" size="0.02" fromto="0 0 0 0 0 -0.5" contype="0" conaffinity="0"/></body>
+</body></worldbody></mujoco>"""
+BOX = """<mujoco><option timestep="0.002"/><worldbody><geom name="floor" type="plane" size="5 5 1"/>
+  <body name="box" pos="0 0 0.4"><freejoint name="box"/><geom type="box" size="0.1 0.06 0.03"/>
+</body></worldbody></mujoco>"""
+
+
+def model_of(tmp_path: Path, text: str, name: str = "model") -> sm.Model:
+    file = tmp_path / f"{name}.xml"
+    file.write_text(text)
+    return sm.load(file)
+
+
+def rerun(model: sm.Model, seconds: float, **start: Any) -> Rerun:
+    return Rerun(model, lambda _: None, seconds, **start)
+
+
+def floor_against_itself(run: Rerun, **how: Any) -> ChaosFloor:
+    trace = run.record()
+    return chaos_floor(compare(trace, trace), trace, trace, run, **how)
+
+
+def test_a_damped_pendulum_that_hangs_has_a_floor_at_rounding(tmp_path: Path) -> None:
+    run = rerun(model_of(tmp_path, PENDULUM), 5.0, qpos=np.array([0.3]))
+    band = floor_against_itself(run).of("swing")
+    assert band is not None
+    assert 0 < band.most < 5 * ROUNDING
+    assert band.end < band.most
+
+
+def test_the_floor_of_a_double_pendulum_grows(tmp_path: Path) -> None:
+    run = rerun(model_of(tmp_path, DOUBLE), 20.0, qpos=np.array([2.5, 1.0]))
+    band = floor_against_itself(run).of("lower")
+    assert band is not None
+    assert band.width[0] < 1e-9
+    assert band.end > 1e4 * band.width[0]
+
+
+def test_the_floor_of_a_box_that_lands_on_an_edge_grows_with_the_impact(tmp_path: Path) -> None:
+    tilt = np.array([0.0, 0.0, 0.4, np.cos(0.6), np.sin(0.6) * 0.8, np.sin(0.6) * 0.6, 0.0])
+    run = rerun(model_of(tmp_path, BOX), 1.0, qpos=tilt)
+    floor = floor_against_itself(run)
+    band = floor.of("box, rotation")
+    assert band is not None
+    before = band.width[floor.time < 0.15]
+    assert band.most > 20 * before.max()
+
+
+def test_identical_sides_are_inside_all_the_time(tmp_path: Path) -> None:
+    run = rerun(model_of(tmp_path, DOUBLE), 2.0, qpos=np.array([2.5, 1.0]))
+    trace = run.record()
+    comparison = compare(trace, trace)
+    floor = chaos_floor(comparison, trace, trace, run)
+    assert {band.inside_from for band in floor.bands} == {0.0}
+    assert not any(band.beyond for band in floor.bands)
+    texts = flat_texts(report.page(comparison, trace, trace, floor=floor))
+    assert any("Every gap lies inside it, all the time." in text for text in texts)
+
+
+def flat_texts(page: Any) -> list[str]:
+    found, waiting = [], list(page.blocks)
+    while waiting:
+        block = waiting.pop()
+        if isinstance(block, Text):
+            found.append(block.text)
+        waiting += list(getattr(block, "blocks", []))
+    return found
+
+
+def test_a_gap_of_chaos_alone_is_told_from_one_that_was_made(tmp_path: Path) -> None:
+    run = rerun(model_of(tmp_path, DOUBLE), 20.0, qpos=np.array([2.5, 1.0]))
+    one = run.record()
+    # Two that differ by rounding end up apart; one that is heavier is apart before.
+    chance = rerun(run.model, 20.0, qpos=np.array([2.5 + 1e-13, 1.0])).record()
+    heavier = model_of(tmp_path, DOUBLE.replace('size="0.02"', 'size="0.025"', 1), "heavier")
+    made = rerun(heavier, 20.0, qpos=np.array([2.5, 1.0])).record()
+    bands = []
+    for two in (chance, made):
+        comparison = compare(one, two)
+        bands.append(chaos_floor(comparison, one, two, run).of("lower"))
+    assert bands[0] is not None
+    assert bands[0].inside_from is not None
+    assert not bands[0].beyond
+    assert bands[1] is not None
+    assert bands[1].beyond
+
+
+def test_the_band_is_wide_about_a_moment_and_forgets_it_later(tmp_path: Path) -> None:
+    """A running maximum would not fall, and one moment alone would dip at each crossing."""
+    run = rerun(model_of(tmp_path, PENDULUM), 5.0, qpos=np.array([1.0]))
+    trace = run.record()
+    floor = chaos_floor(compare(trace, trace), trace, trace, run, uncertain=Uncertainty(0.0, 0.01))
+    band = floor.of("swing")
+    assert band is not None
+    assert band.width.min() > 0
+    assert band.end < 0.2 * band.most
+    # The difference oscillates: at a moment alone it is next to zero again and again.
+    assert band.width[floor.time < 1].min() > 0.2 * band.most
+
+
+def test_quaternions_of_perturbed_starts_stay_unit(tmp_path: Path) -> None:
+    run = rerun(model_of(tmp_path, BOX), 0.01)
+    size = Uncertainty(1e-4, 0.01)
+    for trace in perturbed_runs(run, uncertain=size, derive=False):
+        start = trace.qpos[0]
+        assert np.linalg.norm(start[3:]) == pytest.approx(1.0, abs=1e-15)
+        assert 2 * np.arccos(start[3]) == pytest.approx(0.01, rel=1e-6)
+        assert np.linalg.norm(start[:3] - [0, 0, 0.4]) == pytest.approx(1e-4, rel=1e-6)
+
+
+def test_a_seed_gives_the_same_runs_again_and_another_gives_others(tmp_path: Path) -> None:
+    run = rerun(model_of(tmp_path, DOUBLE), 0.1)
+    starts = [
+        [trace.qpos[0].tobytes() for trace in perturbed_runs(run, seed=seed, derive=False)]
+        for seed in (0, 0, 1)
+    ]
+    assert starts[0] == starts[1]
+    assert len({*starts[0], *starts[2]}) == 8
+
+
+def test_a_command_that_stays_as_it_is_does_not_wander() -> None:
+    model = sm.load("so101")
+    run = Rerun(model, lambda _: lambda _time, data: None, 0.1)
+    for trace in perturbed_runs(run, runs=1, derive=False):
+        assert (trace.ctrl == trace.ctrl[0]).all()
+        assert 0 < np.abs(trace.ctrl[0]).max() <= ROUNDING
+
+
+def test_the_ruler_of_causes_has_a_floor_too(tmp_path: Path) -> None:
+    run = rerun(model_of(tmp_path, DOUBLE), 2.0, qpos=np.array([2.5, 1.0]))
+    trace = run.record(derive=False)
+    ruler = Ruler(run.model, trace, trace)
+    curves = ruler.curves(trace)
+    assert curves is not None
+    floor = ruler.floor(curves, perturbed_runs(run, derive=False))
+    assert 0 < floor["joints"].worst < 1e-9
+    assert floor["joints"].unit == "rad"
+
+
+@pytest.mark.parametrize("word", ["0.1", "mm", "-1mm", "0deg", "1furlong", "nanmm"])
+def test_what_is_no_uncertainty_is_refused(word: str) -> None:
+    with pytest.raises(BadInputError, match="reads like"):
+        parse_uncertainty([word])
+
+
+def test_uncertainties_are_read_in_their_units() -> None:
+    size = parse_uncertainty(["0.1mm", "0.5deg"])
+    assert (size.length, size.angle) == pytest.approx((1e-4, np.radians(0.5)))
+    with pytest.raises(BadInputError, match="twice"):
+        parse_uncertainty(["1mm", "2cm"])
+
+
+def test_the_command_line_shows_the_floor(cli: Cli) -> None:
+    need_engine("pybullet")
+    asked = ("compare", "hold", "--seconds", "0.4")
+    words = " ".join(cli(*asked, "--floor", "0.1deg").stdout.split())
+    assert "The chaos floor: mujoco was run 4 times more" in words
+    assert "and its start by 0.1°" in words
+    told = json.loads(cli(*asked, "--json").stdout)["floor"]
+    assert told["runs"] == 4
+    assert {"name", "most", "inside_from", "beyond"} <= told["bands"][0].keys()
+    assert "width" not in told["bands"][0]
+    assert "chaos" not in cli(*asked, "--no-floor").stdout
+
+
+def test_a_trace_of_a_file_has_no_left_side_to_run_again(cli: Cli, tmp_path: Path) -> None:
+    file = str(tmp_path / "a.npz")
+    cli("trace", "record", "droop", "--seconds", "0.2", "-o", file)
+    assert "chaos" not in cli("compare", file, file).stdout
+    refused = cli("compare", file, file, "--floor", "1mm")
+    assert refused.returncode == 2
+    assert "recorded run" in refused.stderr
