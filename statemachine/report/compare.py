@@ -83,7 +83,7 @@ def page(
         *([Text(one.header.says)] if one.header.says else []),
         *commanded(one, two, labels),
         *in_words(comparison, events, attribution),
-        *contact_words(comparison, touching),
+        *(() if comparison.ended else contact_words(comparison, touching)),
         *([Items(notes)] if notes else []),
     ]
     both = _over_time(comparison, one, two, curves, events, attribution, tip, floor)

@@ -67,11 +67,14 @@ class Runs:
 
     def curves(self, place: int, changes: Changes) -> Curves | None:
         """A run of one side, 0 or 1; None, with a reason in `ended`, if it did not end well."""
-        key = place, tuple(
-            sorted(
-                (name, change.how, str(change.values.get("integrator", "")))
-                for name, change in changes.items()
-            )
+        key = (
+            place,
+            tuple(
+                sorted(
+                    (name, change.how, str(change.values.get("integrator", "")))
+                    for name, change in changes.items()
+                )
+            ),
         )
         if key not in self._curves:
             side = (self.one, self.two)[place]
