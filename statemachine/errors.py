@@ -50,6 +50,12 @@ class BadInputError(StateMachineError, ValueError):
     """A value has the wrong shape, kind or size, or is not finite."""
 
 
+class EndedEarlyError(BadInputError, ArithmeticError):
+    """A run ended before its time, and what was asked for needs all of it."""
+
+    ended: str
+
+
 class ForeignDataError(StateMachineError, ValueError):
     """A Data was handed to a Model that did not make it."""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +11,11 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine.compare import Request, sides_of
+from statemachine.compare import compare as compare_traces
 from statemachine.errors import BadInputError, DivergedError, UnsupportedError
 from statemachine.interface.checks import HUGE
+from statemachine.report import compare as report
 
 from .conftest import need_engine
 
@@ -163,3 +168,66 @@ def test_the_record_shows_the_bound(tmp_path: Path) -> None:
     assert "beyond 1e+10, the engine's own bound" in str(model.capabilities)
     with pytest.raises(UnsupportedError, match="max_qvel"):
         model.replace(max_qvel=1e5)
+
+
+@pytest.fixture
+def compare(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Any:
+    """`statemachine compare` where PyBullet's side diverges at 1 rad/s."""
+    need_engine("pybullet")
+    from statemachine.backends import pybullet_backend
+    from statemachine.cli import main
+
+    monkeypatch.setattr(pybullet_backend, "fastest", lambda raw: np.ones(raw.nv))
+
+    def run(*words: str) -> tuple[int, str]:
+        code = main(["compare", *words])
+        return code, capsys.readouterr().out
+
+    return run
+
+
+@pytest.mark.parametrize("why", [(), ("--why",)])
+def test_a_comparison_in_which_a_side_diverges_says_that(compare: Any, why: tuple[str]) -> None:
+    """Which side, when, and what of it; the verdicts until then; no shares."""
+    code, text = compare("hold", *why)
+    words = re.sub(r"(mujoco|pybullet) \d+(\.\d+)+", r"\1 #", " ".join(text.split()))
+    assert code == 1
+    assert "pybullet # ended before its time: the rest of the run cannot be compared" in words
+    assert "and no cause is named. All 10 quantities agree until then." in words
+    assert "qvel[1] (shoulder_lift) = -1.04 went beyond max_qvel, 1, at time 0.015 s." in words
+    assert "The runs are 2 and 0.01 s long: what mujoco # does after 0.01 s" in words
+    assert "shoulder_lift agrees" in words
+    assert "✗ All 10 quantities agree until 0.01 s, and pybullet # ended" in words
+    assert "explain" not in words
+    assert "This Data" not in words
+
+
+def test_the_same_as_json_and_as_a_page(compare: Any, tmp_path: Path) -> None:
+    code, text = compare("hold", "--why", "--json")
+    found = json.loads(text)["comparison"]
+    assert code == 1
+    assert not found["one"]["ended"]
+    assert found["two"]["ended"].startswith("qvel[1] (shoulder_lift) = -1.04 went beyond")
+    assert {each["verdict"] for each in found["agreements"]} == {"agrees"}
+    file = tmp_path / "page.html"
+    assert compare("hold", "--html", str(file))[0] == 1
+    page = file.read_text()
+    assert "no cause is named" in page
+    assert "What causes it" not in page
+
+
+def test_both_sides_may_diverge(tmp_path: Path) -> None:
+    """A motor that pushes the faster, the faster its wheel turns."""
+    need_engine("pybullet")
+    text = """<mujoco><option timestep="0.01"/><worldbody><body><joint name="wheel" axis="0 0 1"/>
+      <geom type="cylinder" size=".1 .02"/></body></worldbody><actuator><general joint="wheel"
+      gainprm="1" biastype="affine" biasprm=".1 0 2" ctrlrange="-1 1"/></actuator></mujoco>"""
+    path = tmp_path / "runaway.xml"
+    path.write_text(text)
+    (one, two), _ = sides_of(Request(("droop",), model=str(path)))
+    found = compare_traces(one, two)
+    assert found.one.ended
+    assert found.two.ended
+    page = report.page(found, one, two)
+    assert page.headline is not None
+    assert "ended before their time" in page.headline.text

@@ -69,7 +69,9 @@ def write(
     from ..report import compare as pages
     from ..report.html import report, write_report
 
-    attribution, why_not = (None, "") if options.no_why else _why(request, traces, options.quantity)
+    attribution, why_not = None, ""
+    if not (options.no_why or comparison.ended):
+        attribution, why_not = _why(request, traces, options.quantity)
     page = pages.page(
         comparison,
         *traces,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..errors import BadInputError
+from ..errors import BadInputError, EndedEarlyError
 from ..installed import PAIR
 from . import _compare_floor, _compare_html, _compare_models
 from . import _compare_pictures as pictures
@@ -27,7 +27,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.epilog = (
         f"experiments:\n{experiments()}\n\n"
-        "Exit code 1: something differs; with --why: something stays unexplained."
+        "Exit code 1: something differs, or a run ends before its time; with --why: something\n"
+        "stays unexplained."
     )
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument(
@@ -221,10 +222,13 @@ def _run_why(options: argparse.Namespace) -> int:
         raise BadInputError("--why takes no --tolerance: it explains the gap, whatever its size")
     if options.plot or options.film:
         raise BadInputError("--why runs many times: --plot and --film go without it")
-    return run_why(request_of(options), options.quantity, options.json)
+    try:
+        return run_why(request_of(options), options.quantity, options.json)
+    except EndedEarlyError as error:  # what there is until then, and no cause
+        return _run_compare(options, f"No cause is named: {error}.")
 
 
-def _run_compare(options: argparse.Namespace) -> int:
+def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
     from ..compare import compare, run_sides, sides_of, touches, witness
     from ..comparison import parse_tolerances
     from ..report import compare as report
@@ -252,8 +256,17 @@ def _run_compare(options: argparse.Namespace) -> int:
     floor = _compare_floor.floor_of(options, request, found, (one, two), rerun)
     if options.html:
         _compare_html.write(options, request, found, (one, two), said, asked, run, played, floor)
+    why_not = "" if found.ended else why_not  # which the page says itself
     page = report.page(
-        found, one, two, said=said, witness=asked, run=run, played=played, floor=floor
+        found,
+        one,
+        two,
+        said=said,
+        witness=asked,
+        run=run,
+        played=played,
+        floor=floor,
+        why_not=why_not,
     )
     result = {
         "comparison": found,

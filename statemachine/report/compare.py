@@ -91,7 +91,7 @@ def page(
         *told(run),
         *commanded(one, two, labels),
         *in_words(comparison, events, attribution),
-        *contact_words(comparison, touching),
+        *(() if comparison.ended else contact_words(comparison, touching)),
         *([Items(notes)] if notes else []),
     ]
     both = _over_time(comparison, one, two, curves, events, attribution, tip, floor)

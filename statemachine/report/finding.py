@@ -42,14 +42,13 @@ def headline(
         return Headline(
             f"The two runs agree for {comparison.until:g} s: nothing leaves its tolerance"
         )
-    of = subject(comparison, attribution)
-    if all(found.verdict == "agrees" for found in comparison.agreements):
-        sides = [side.label for side in (comparison.one, comparison.two) if side.ended]
+    if comparison.ended:
         return Headline(
-            f"The two runs agree for {comparison.until:g} s, and {' and '.join(sides)} ended "
-            "before its time",
+            f"{_agreeing(comparison)} until {comparison.until:g} s, and "
+            f"{_ended(comparison)} before {_its(comparison)} time",
             holds=False,
         )
+    of = subject(comparison, attribution)
     if of is None:
         return Headline("The two runs differ", holds=False)
     if of.found is not None and of.found.kind == "contact":
@@ -69,6 +68,25 @@ def headline(
         _in_the_end(comparison, curves),
         holds=False,
     )
+
+
+def _ended(comparison: Comparison) -> str:
+    """Which sides did not reach the end of the run."""
+    labels = zip(long_labels(comparison), (comparison.one, comparison.two), strict=True)
+    return f"{' and '.join(label for label, side in labels if side.ended)} ended"
+
+
+def _its(comparison: Comparison) -> str:
+    return "their" if comparison.one.ended and comparison.two.ended else "its"
+
+
+def _agreeing(comparison: Comparison) -> str:
+    """How many quantities are within tolerance at every moment, as "2 of 5 quantities agree"."""
+    total = len(comparison.agreements)
+    count = sum(found.verdict == "agrees" for found in comparison.agreements)
+    if count == total:
+        return f"All {total} quantities agree"
+    return f"{count or 'None'} of {total} quantities {_s(count, 'agree')}"
 
 
 def _parting(comparison: Comparison, events: Sequence[Event]) -> list[str]:
@@ -230,6 +248,16 @@ def in_words(
                 f"{quantity(worst.max, worst.unit)} of {quantity(worst.tolerance, worst.unit)}."
             )
         found.append(Text(text))
+    elif comparison.ended:
+        at = parting(comparison)
+        text = (
+            f"{_ended(comparison)} before {_its(comparison)} time: the rest of the run cannot be "
+            f"compared, and no cause is named. {_agreeing(comparison)} until then"
+        )
+        if at is not None:
+            first = next(each for each in comparison.agreements if each.since == at)
+            text += f"; the first to leave its tolerance is {named(first)}, at {short_time(at)}"
+        found.append(Text(f"{text}."))
     else:
         still = counts["differs"]
         text = (

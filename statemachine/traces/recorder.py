@@ -285,7 +285,7 @@ def _run(
         try:
             step(model, data)
         except DivergedError as error:
-            ended = str(error)
+            ended = str(error).partition(". This Data")[0]  # whose advice is of no use here
             break
         if k % 256 == 0:
             progress(k / total)

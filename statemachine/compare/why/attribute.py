@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ...errors import BadInputError, unknown_name
+from ...errors import EndedEarlyError, unknown_name
 from ...interface import Model
 from ...scenarios import Scenario
 from ...scenarios.runs import Progress, silent
@@ -59,6 +59,7 @@ def attribute(
 
     Raises:
         BadInputError: The models have other joints, or one of them cannot do the experiment.
+        EndedEarlyError: As they come, one of them does not reach the end.
         UnknownNameError: There is no such quantity.
     """
     scenario = scenario.on(one)
@@ -72,7 +73,9 @@ def attribute(
     runs.quantity = quantity or runs.natural
     first = runs.gaps({}, {})
     if not first:
-        raise BadInputError(f"as they come, a side does not reach the end: {runs.ended}")
+        raise EndedEarlyError(
+            f"as they come, a side does not reach the end: {runs.ended}", ended=runs.ended
+        )
     nothing = first[runs.quantity].worst <= _ROUNDING[names[runs.quantity]]
     ladder, parity = ((), ({}, {})) if nothing else _ladder(runs)
     alone = () if nothing else _alone(runs, *parity)
