@@ -36,7 +36,11 @@ def check(options: argparse.Namespace) -> None:
 
 
 def floor_of(
-    options: argparse.Namespace, request: Any, comparison: Any, traces: tuple[Any, Any]
+    options: argparse.Namespace,
+    request: Any,
+    comparison: Any,
+    traces: tuple[Any, Any],
+    rerun: Any = None,
 ) -> Any:
     """The chaos floor of an experiment; None where nothing can be run again.
 
@@ -45,6 +49,7 @@ def floor_of(
         request: The `compare.Request`.
         comparison: Of the traces.
         traces: Both sides.
+        rerun: How the left was run, if sides were given.
 
     Raises:
         BadInputError: An uncertainty was given, and the left side was not run here.
@@ -52,21 +57,21 @@ def floor_of(
     one, two = traces
     if options.no_floor:
         return None
-    if (request.is_traces and not request.sides) or one.header.recorded:
+    if request.is_traces or one.header.recorded:
         if options.floor:
             raise BadInputError("--floor runs the left side again, and it is a recorded run")
         return None
     from ..compare import chaos_floor
     from ..compare.perturbed import parse_uncertainty
     from ..report.progress import progress
-    from ._compare_rerun import left_of
+    from ._compare_rerun import side_of
 
     with progress("chaos floor") as told:
         return chaos_floor(
             comparison,
             one,
             two,
-            left_of(request),
+            rerun or side_of(request, 0),
             seed=request.seed,
             uncertain=parse_uncertainty(options.floor),
             progress=told,

@@ -9,23 +9,36 @@ from ..errors import BadInputError
 from ._common import PROGRAM
 
 
-def left_of(request: Any) -> Any:
-    """The left side of a request, as a `compare.Rerun`.
+def both_of(request: Any) -> tuple[Any, Any]:
+    """How both sides of a request are run: each a `compare.Rerun`.
 
     Args:
         request: A `compare.Request`; not of recorded traces alone.
     """
+    if not request.sides:
+        return side_of(request, 0), side_of(request, 1)
+    from ..compare import run_sides
+    from ..compare.perturbed import replayed
+
+    run = run_sides(request)
+    if run.reruns:
+        return run.reruns
+    found = []
+    for side, trace in zip(request.sides, (run.left, run.right), strict=True):
+        options = trace.header.options
+        found.append(replace(replayed(trace, side.load(**options)), options=dict(options)))
+    return found[0], found[1]
+
+
+def side_of(request: Any, place: int) -> Any:
+    """How one of two engines runs an experiment, as a `compare.Rerun`."""
     from ..backends import load
     from ..compare import rerun_of
 
-    if request.sides:
-        return _left_side(request)
-    from ..scenarios import scenario
-
-    asked = scenario(request.what[0])
+    asked = request.scenario()
     model = load(
         request.model or asked.model,
-        backend=request.backends[0],
+        backend=request.backends[place],
         defaults=request.defaults,
         menagerie=request.menagerie,
     )
@@ -39,54 +52,15 @@ def left_of(request: Any) -> Any:
     )
 
 
-def _left_side(request: Any) -> Any:
-    from ..compare import Rerun, rerun_of, run_sides
-    from ..compare.perturbed import replayed
-
-    side = request.sides[0]
-    if request.is_traces:
-        left = run_sides(request).left
-        options = {**left.header.options}
-        return replace(replayed(left, side.load(**options)), options=options)
-    asked = request.scenario()
-    found: Rerun = rerun_of(
-        asked,
-        side.load(),
-        seconds=request.seconds,
-        seed=request.seed,
-        defaults=side.defaults,
-        options={**request.options, **side.options},
-    )
-    return found
-
-
-def right_of(request: Any) -> Any:
-    """The Model of the right side of a request, with all its options."""
-    from ..backends import load
-    from ..scenarios import scenario
-
-    if request.sides:
-        given = {} if request.is_traces else dict(request.scenario().options)
-        return request.sides[1].load(**{**given, **request.options})
-    asked = scenario(request.what[0])
-    model = load(
-        request.model or asked.model,
-        backend=request.backends[1],
-        defaults=request.defaults,
-        menagerie=request.menagerie,
-    )
-    chosen = {**asked.options, **request.options}
-    return model.replace(**chosen) if chosen else model
-
-
 def finer(request: Any, times: int) -> Any:
     """The same request with so many engine steps to one of before."""
     given = request.options.get("substeps", 1)
-    sides = tuple(
-        replace(side, options={**side.options, "substeps": side.options.get("substeps", given) * times})
-        for side in request.sides
-    )
-    return replace(request, options={**request.options, "substeps": given * times}, sides=sides)
+    sides = []
+    for side in request.sides:
+        own = side.options.get("substeps", given) * times
+        sides.append(replace(side, options={**side.options, "substeps": own}))
+    options = {**request.options, "substeps": given * times}
+    return replace(request, options=options, sides=tuple(sides))
 
 
 def refuse_recorded(request: Any, flag: str) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..errors import BadInputError
 from ._common import show
-from ._compare_rerun import finer, left_of, refuse_recorded, right_of
+from ._compare_rerun import both_of, finer, refuse_recorded
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -59,9 +59,9 @@ def _one_step(options: argparse.Namespace, request: Any) -> int:
     from ..report.one_step import page
     from ..report.progress import progress
 
-    left, right = left_of(request), right_of(request)
+    left, right = both_of(request)
     with progress("one step") as told:
-        found = one_step(left, right, names=request.names, progress=told)
+        found = one_step(left, right.model, names=request.names, progress=told)
     return show(page(found, _labels(request), _name(request)), found, options.json)
 
 
