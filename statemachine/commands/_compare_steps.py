@@ -70,8 +70,8 @@ def _converge(options: argparse.Namespace, request: Any) -> int:
     from ..report.convergence import page
     from ..report.progress import progress
 
-    def run(finer: int) -> Any:
-        traces, _ = sides_of(finer(request, finer))
+    def run(times: int) -> Any:
+        traces, _ = sides_of(finer(request, times))
         return traces
 
     with progress("converge") as told:

@@ -18,12 +18,13 @@ from ..errors import EndedEarlyError
 from ..interface import Array
 from ..scenarios.runs import Progress, silent
 from ..traces import Trace
+from .labels import labels_of
 from .series import Series, default_tip, series
 
 FINER = (1, 2, 4)  # engine steps to one of the first runs
 _ROUNDING = 1e-9  # of the largest value of a quantity, or of 1
 _FIRST_ORDER = 1.6  # the least ratio of two gaps, one with half of the other's steps
-_PART = 0.1  # of the gap: less is left by chance
+_PART, _MOST = 0.1, 0.75  # of the gap: less is left by chance, more is all of it
 
 Limit = Literal["rounding", "discretisation", "stays", "in part", "unclear"]
 
@@ -39,8 +40,9 @@ class QuantityLimit:
             its run with the finest; right: the same of the right side.
         limit: What the gap tends to for steps of no length, on the line through the last two.
         verdict: "rounding" where there is no gap; "discretisation" if each halving takes away
-            half of it or more, and nothing is left; "stays" if all of it is left; "in part" if
-            some is; "unclear" if it does not shrink from run to run.
+            half of it or about that, and nothing is left; "stays" if three quarters or more are
+            there with the finest steps; "in part" if less is left, but some; "unclear" if it does
+            not shrink from run to run.
     """
 
     name: str
@@ -116,8 +118,11 @@ def convergence(
     curves = _Curves(runs, tip)
     whole = curves.limits(np.ones(len(time), dtype=bool))
     return TimestepConvergence(
-        labels=(one.header.label, two.header.label),
-        steps=(one.header.timestep / one.header.substeps, two.header.timestep / two.header.substeps),
+        labels=labels_of(one.header, two.header).long,
+        steps=(
+            one.header.timestep / one.header.substeps,
+            two.header.timestep / two.header.substeps,
+        ),
         until=float(time[-1]),
         touch=touch,
         before=whole if touch is None else curves.limits(before) if before.any() else (),
@@ -179,8 +184,7 @@ class _Curves:
 
 def _gaps(curves: list[Series], rows: Array | None) -> dict[str, Array]:
     return {
-        curve.name: curve.difference if rows is None else curve.difference[rows]
-        for curve in curves
+        curve.name: curve.difference if rows is None else curve.difference[rows] for curve in curves
     }
 
 
@@ -188,10 +192,9 @@ def _verdict(gaps: list[float], limit: float, rounding: float) -> Limit:
     first, second, third = gaps
     if first <= rounding:
         return "rounding"
-    if second > 1.1 * first or third > 1.1 * second:
-        return "unclear"
+    if third >= _MOST * first:
+        return "stays"
+    if limit > max(_PART * first, rounding):
+        return "in part" if third <= second <= first else "unclear"
     ratios = first / max(second, rounding), second / max(third, rounding)
-    if limit <= max(_PART * first, rounding):
-        shrinks = min(ratios) >= _FIRST_ORDER or third <= rounding
-        return "discretisation" if shrinks else "unclear"
-    return "stays" if limit >= (1 - _PART) * first else "in part"
+    return "discretisation" if min(ratios) >= _FIRST_ORDER or third <= rounding else "unclear"

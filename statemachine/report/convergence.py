@@ -5,17 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..compare import QuantityLimit, TimestepConvergence
-from ..comparison.text import listed, milliseconds, percent, quantity, short_time
+from ..comparison.text import listed, milliseconds, quantity, short_time
 from ..page import Block, Headline, Page, Table, TableCell, Text
 from .finding import name_of
-
-_WORDS = {
-    "rounding": "rounding",
-    "discretisation": "discretisation",
-    "stays": "stays",
-    "in part": "in part",
-    "unclear": "unclear",
-}
 
 
 def page(result: TimestepConvergence, experiment: str, said: Sequence[str] = ()) -> Page:
@@ -52,12 +44,10 @@ def page(result: TimestepConvergence, experiment: str, said: Sequence[str] = ())
                 "timestep makes it."
             ),
         ]
+    if result.whole:
+        blocks.append(Text(_own(result)))
     blocks.append(
-        Text(
-            "Left for no step at all: on the line through the last two. own: how far the side's "
-            "first run is from its finest.",
-            small=True,
-        )
+        Text("Left, where the steps have no length: on the line through the last two.", small=True)
     )
     origin = f"{one} and {two}, {result.until:g} s"
     title = f"{experiment}: does the gap vanish with the timestep?"
@@ -72,7 +62,7 @@ def _table(limits: Sequence[QuantityLimit], title: str) -> Table:
     rows = [
         (
             name_of(each.name),
-            _WORDS[each.verdict],
+            each.verdict,
             *(quantity(gap, each.unit) for gap in each.gaps),
             quantity(each.limit, each.unit),
             quantity(each.left[0], each.unit),
@@ -81,7 +71,7 @@ def _table(limits: Sequence[QuantityLimit], title: str) -> Table:
         for each in limits
     ]
     return Table(
-        ("quantity", "the gap is", "at h", "h/2", "h/4", "left", "own, left", "own, right"),
+        ("quantity", "the gap is", "at h", "h/2", "h/4", "left", "left's own", "right's own"),
         rows,
         title,
         words=frozenset({0, 1}),
@@ -98,21 +88,30 @@ def _headline(result: TimestepConvergence) -> Headline:
     if result.vanishes:
         return Headline("The gap vanishes with the timestep: it is discretisation")
     stay = [each for each in result.whole if each.verdict in ("stays", "in part")]
-    named = listed([name_of(each.name) for each in (stay or result.whole)][:3])
-    if not stay:
-        lead = "The gap neither vanishes with the timestep nor stays as it is"
-    elif result.touch is None:
-        most = max(stay, key=lambda each: each.limit / (each.gaps[0] or 1.0))
-        lead = (
-            f"The gap does not vanish with the timestep: {percent(most.limit / most.gaps[0])} of "
-            f"that of {name_of(most.name)} stays"
+    lead, end = "The gap neither vanishes with the timestep nor stays as it is", ""
+    if stay:
+        most = max(
+            (each for each in stay if each.unit == stay[0].unit), key=lambda each: each.gaps[2]
         )
-    else:
-        lead = f"The gap of {named} does not vanish with the timestep"
-    end = ""
-    if result.touch is not None and result.before:
-        if all(each.verdict in ("rounding", "discretisation") for each in result.before):
-            end = f"Before the first touch, at {short_time(result.touch)}, nothing else is there."
-            if all(each.verdict == "rounding" for each in result.before):
-                end = f"Before the first touch, at {short_time(result.touch)}, there is no gap."
+        sizes = [quantity(most.gaps[k], most.unit) for k in (0, 2)]
+        lead = (
+            f"The gap does not vanish with the timestep: that of {name_of(most.name)} is "
+            f"{sizes[0]}, and {sizes[1]} with a quarter of it"
+        )
+    verdicts = {each.verdict for each in result.before}
+    if result.touch is not None and result.before and verdicts <= {"rounding", "discretisation"}:
+        what = "no gap" if verdicts == {"rounding"} else "nothing but discretisation"
+        end = f"Before the first touch, at {short_time(result.touch)}, there is {what}."
     return Headline(lead, end=end, holds=False)
+
+
+def _own(result: TimestepConvergence) -> str:
+    """How far each side moves itself when its steps get finer."""
+    known = [each for each in result.whole if each.unit == result.whole[0].unit]
+    words = []
+    for label, place in zip(result.labels, ("left", "right"), strict=True):
+        most = max(known, key=lambda each: getattr(each, place)[0])
+        words.append(
+            f"{label} by {quantity(getattr(most, place)[0], most.unit)} ({name_of(most.name)})"
+        )
+    return f"With a quarter of its step a side moves away from its own first run: {listed(words)}."

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..compare import StepComparison
 from ..compare.step_samples import StageGap
-from ..comparison.text import NONE, count, quantity, sentence, short_time
+from ..comparison.text import NONE, count, figure, quantity, sentence, short_time
 from ..page import Block, Headline, Items, Page, Table, TableCell, Text
 
 
@@ -24,8 +24,9 @@ def page(
     one, two = labels
     each = "each" if result.every == 1 else f"every {_ordinal(result.every)}"
     primed = (
-        f" {two} gets {result.primed}." if result.primed else f" {two} takes nothing of the step "
-        "before."
+        f" {two} gets {result.primed}."
+        if result.primed
+        else f" {two} takes nothing of the step before."
     )
     blocks: list[Block] = [Text(line) for line in said]
     blocks += [
@@ -42,8 +43,8 @@ def page(
             wide=frozenset({7, 8}),
         ),
         Text(
-            f"Differs: at how many moments it is beyond {result.relative:g} of its usual size, and "
-            f"beyond the null: how far {one} gets from its own run when it is put back to its own "
+            f"Differs: at how many moments it is beyond {figure(result.relative)} of its usual "
+            f"size, and beyond the null: how far {one} gets from its own run when it is put back to its own "
             f"states, since a restore may forget what the engine knows of contacts. {_null(result)}"
         ),
     ]
