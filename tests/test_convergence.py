@@ -23,7 +23,7 @@ FALL = """<mujoco><option timestep="0.01" integrator="{integrator}">{flag}</opti
 
 def found_of(folder: Path, *changes: dict[str, str], seconds: float = 1.0) -> TimestepConvergence:
     usual = {"integrator": "implicitfast", "flag": "", "mass": "0.1", "height": "0.3"}
-    usual["touch"] = 'contype="0"'
+    usual["touch"] = 'contype="0" conaffinity="0"'
     models = []
     for k, change in enumerate(changes):
         file = folder / f"{k}.xml"
