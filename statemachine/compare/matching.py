@@ -1,6 +1,6 @@
 """Which joint, body, site and actuator of one Model is which of another.
 
-By name, then by structure: `models.match` says how, and `names` overrules it.
+By name, then by structure: `description.match` says how, and `names` overrules it.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..description.match import Matching, Pair, match, renamed
 from ..description.records import Robot
+from ..description.tree import GroupTree
 from ..engines import needed_part
 from ..engines.parts import BodyPair, CompilerPart
 from ..errors import BadInputError, unknown_name
 from ..installed import DEFAULT
 from ..interface import Array, Model
-from .models.match import Matching, Pair, match, renamed
-from .models.tree import GroupTree
 
 Pairs = tuple[tuple[int, int], ...]
 Only = Mapping[str, tuple[str, ...]]

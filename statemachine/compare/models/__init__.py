@@ -2,10 +2,8 @@
 
 `read` makes a description of a file, `compare` says where two of them differ:
 
-- `..description` has the records, and the reader of URDF; an engine's own is the part `reading`
+- `..description` has the records, the reader of URDF, rigid groups and which joint is which; an engine's own is the part `reading`
   of its room
-- `tree`: rigid groups, composite inertia, M_ii, poses
-- `match`: which joint is which, and how the frames of links lie
 - `diff`: every difference with its size, entered into a `ledger`; by subject in `_places`,
   `_joints`, `_solids`, `_shapes`, `_settings`
 - `engines`: what engines do of themselves
@@ -23,7 +21,9 @@ import numpy as np
 from ... import __version__
 from ...backends import backend_engine, backend_names
 from ...description import urdf
+from ...description.match import renamed
 from ...description.records import Robot
+from ...description.tree import GroupTree
 from ...engines import needed_part, part, rooms_with
 from ...engines.parts import CompilerPart, ReadingPart
 from ...errors import UnsupportedError
@@ -32,8 +32,6 @@ from ...models import resolve
 from .diff import Found, diff
 from .engines import own_ways
 from .ledger import AgreedFigures, Difference
-from .match import renamed
-from .tree import GroupTree
 
 __all__ = [
     "AgreedFigures",

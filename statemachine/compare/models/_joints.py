@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from ...comparison.text import milliseconds, rounded
+from ...description.match import Pair
 from ...description.records import Actuator, Robot, RobotJoint
+from ...description.tree import GroupTree
 from .ledger import Ledger
-from .match import Pair
-from .tree import GroupTree
 
 _UNITS = {
     "hinge": {"limits": "rad", "speed": "rad/s", "effort": "N·m", "armature": "kg m²"},

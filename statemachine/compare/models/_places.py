@@ -7,12 +7,12 @@ import math
 import numpy as np
 
 from ...comparison.text import rounded
+from ...description.match import Pair
 from ...description.records import RobotJoint
+from ...description.tree import GroupTree
 from ...interface import Array
 from ...rotations import angle_between
 from .ledger import Ledger
-from .match import Pair
-from .tree import GroupTree
 
 
 def compare(book: Ledger, pair: Pair, above: Pair, tree: GroupTree, reach: float) -> None:

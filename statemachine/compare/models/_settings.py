@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...description.records import Setting
+from ...description.tree import GroupTree
 from .ledger import Ledger
-from .tree import GroupTree
 
 
 def compare(book: Ledger, one: GroupTree, two: GroupTree, notes: list[str]) -> None:

@@ -10,12 +10,12 @@ from itertools import permutations
 
 import numpy as np
 
+from ...description.match import Pair
 from ...description.meshes import extent
 from ...description.records import CollisionShape, Placement, rotation
+from ...description.tree import GroupTree
 from ...interface import Array
 from .ledger import Ledger
-from .match import Pair
-from .tree import GroupTree
 
 _AXES = [sign * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
 _SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
+from ...description.match import Pair
 from ...description.records import Inertial, Placement
+from ...description.tree import Group, GroupTree
 from ...interface import Array
 from .ledger import Ledger
-from .match import Pair
-from .tree import Group, GroupTree
 
 _STILL = "stands still"
 

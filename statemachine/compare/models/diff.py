@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...comparison.text import few, rounded
+from ...description.match import Matching, frame_names, match
 from ...description.records import HERE
+from ...description.tree import Group, GroupTree
 from . import _joints, _places, _settings, _shapes, _solids
 from .ledger import AgreedFigures, Difference, Ledger
-from .match import Matching, frame_names, match
-from .tree import Group, GroupTree
 
 POSES = 100  # at which the same positions are put into both
 

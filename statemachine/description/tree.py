@@ -13,8 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ...description.meshes import with_capsules
-from ...description.records import (
+from ..interface import Array
+from .meshes import with_capsules
+from .records import (
     HERE,
     CollisionShape,
     Inertial,
@@ -24,7 +25,6 @@ from ...description.records import (
     RobotJoint,
     moved,
 )
-from ...interface import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...description.records import HERE, Placement, Robot
-from ...errors import unknown_name
-from ...interface import Array
+from ..errors import unknown_name
+from ..interface import Array
+from .records import HERE, Placement, Robot
 from .tree import Group, GroupTree
 
 _NEAR, _TILT = 5e-3, 0.1  # [m] and [rad] within which two axes may be one
