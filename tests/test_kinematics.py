@@ -14,6 +14,7 @@ from hypothesis.extra.numpy import arrays
 import statemachine as sm
 from statemachine.errors import BadInputError, ModelError, ModelFileError, UnknownNameError
 from statemachine.rotations import matrix_from_quat
+from statemachine.scenarios.provenance import model_digest
 
 pytestmark = pytest.mark.usefixtures("pinocchio")
 
@@ -364,6 +365,76 @@ def test_the_same_numbers_give_the_same_places(tmp_path: Path, trap: str) -> Non
     same = sm.Kinematics.same_reading(model)
     assert same.grade == "same reading"
     assert _poses_agree(model, same) < 1e-12
+
+
+ATTACHED = """<mujoco model="arm"><compiler angle="radian" eulerseq="{order}"/>
+<default><joint axis="0 1 0" ref="0.2"/><site pos="0 0 0.1"/>
+<default class="wrist"><joint axis="1 0 0" pos="0.01 0 0"/></default></default>
+<worldbody>
+<body name="base" pos="0.1 0 0.2" euler="0.3 0.2 0.1" childclass="wrist">
+<geom size=".05"/><joint name="a"/>
+<body name="hand" pos="0.3 0 0"><geom size=".05"/><joint name="b"/><site name="tip" euler="1 2 3"/>
+<body name="finger" pos="0 0.1 0" euler="0 0 0.4"><geom size=".02"/><joint name="c"/>
+<site name="nail"/></body></body></body>
+<body name="other" pos="1 0 0" euler="0 0.5 0"><geom size=".05"/><joint name="o"/></body>
+</worldbody></mujoco>"""
+STAND = """<mujoco><compiler angle="degree"/><default><joint axis="0 0 1"/>
+<default class="tilted"><joint axis="0 1 1"/></default></default>
+<asset><model {name} file="parts/arm.xml"/></asset><worldbody>
+<body name="stand" pos="0 0 1" euler="0 0 30" childclass="tilted"><geom size=".1"/><joint name="s"/>
+{inside}</body>{beside}</worldbody></mujoco>"""
+TWO_ARMS = """<attach model="arm" body="base" prefix="left-"/><frame pos="0 .5 0" euler="90 0 0">
+<attach model="arm" body="base" prefix="right-"/></frame>"""
+
+
+@pytest.mark.parametrize("order", ["xyz", "zyx"])
+@pytest.mark.parametrize(
+    ("inside", "beside", "name"),
+    [
+        (TWO_ARMS, "", "name='arm'"),
+        (TWO_ARMS, "", ""),
+        ("<attach model='arm' body='hand' prefix='x'/>", "", "name='arm'"),
+        ("", "<attach model='arm' body='finger' prefix='x'/>", "name='arm'"),
+        ("", "<attach model='arm' prefix='whole-'/>", "name='arm'"),
+        ("<replicate count='2' euler='0 0 90'><attach model='arm' body='base' prefix='x'/>"
+         "</replicate>", "", "name='arm'"),
+    ],
+)  # fmt: skip
+def test_an_attached_file_is_read(
+    tmp_path: Path, inside: str, beside: str, name: str, order: str
+) -> None:
+    (tmp_path / "parts").mkdir()
+    part = _write(tmp_path / "parts", ATTACHED.format(order=order), "arm.xml")
+    model = sm.load(_write(tmp_path, STAND.format(inside=inside, beside=beside, name=name)))
+    own = sm.Kinematics(model.path)
+    assert own.grade == "own reading"
+    assert set(own.joint_names) == set(model.joint_names)
+    assert _poses_agree(model, own) < 1e-12
+    assert any(text.startswith("<attach> written out") for text in own.prepared)
+    before = model_digest(model.path)
+    part.write_text(part.read_text().replace("0.01 0 0", "0.02 0 0"))
+    assert model_digest(model.path) != before
+
+
+@pytest.mark.parametrize(
+    ("attach", "said"),
+    [
+        ("model='leg' body='base'", "no <model> is called so"),
+        ("model='arm' body='leg'", "no body 'leg' to attach"),
+        ("model='arm' body='moved'", "in a <frame>"),
+    ],
+)
+def test_an_attachment_that_cannot_be_read_is_refused(
+    tmp_path: Path, attach: str, said: str
+) -> None:
+    (tmp_path / "parts").mkdir()
+    text = ATTACHED.format(order="xyz").replace(
+        "</worldbody>", "<frame pos='1 0 0'><body name='moved'/></frame></worldbody>"
+    )
+    _write(tmp_path / "parts", text, "arm.xml")
+    stand = STAND.format(inside=f"<attach {attach} prefix='x'/>", beside="", name="name='arm'")
+    with pytest.raises(ModelError, match=said):
+        sm.Kinematics(_write(tmp_path, stand))
 
 
 def test_what_was_done_to_the_text_is_told(tmp_path: Path) -> None:

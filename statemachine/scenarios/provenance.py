@@ -54,12 +54,12 @@ def provenance(model: Model, seed: int | None = None, **others: str) -> Provenan
 
 
 def model_digest(path: Path) -> str:
-    """SHA-256 of a model's file and of those it includes."""
+    """SHA-256 of a model's file and of those it includes or attaches."""
     return hashlib.sha256(b"".join(file.read_bytes() for file in model_files(path))).hexdigest()
 
 
 def model_files(path: Path) -> Iterator[Path]:
-    """A model's file, then those it includes, theirs and so on, each once."""
+    """A model's file, then those it includes or attaches, theirs and so on, each once."""
     if not path.is_file():
         return
     waiting, seen = [path], set[Path]()
@@ -70,8 +70,9 @@ def model_files(path: Path) -> Iterator[Path]:
         seen.add(file.resolve())
         yield file
         try:
-            includes = ElementTree.parse(file).iter("include")
+            root = ElementTree.parse(file)
         except ElementTree.ParseError:  # a binary model
             continue
-        found = [included_file(element.get("file", ""), path, file) for element in includes]
+        parts = [*root.iter("include"), *root.iterfind("asset/model")]
+        found = [included_file(element.get("file", ""), path, file) for element in parts]
         waiting += [each for each in found if each is not None]

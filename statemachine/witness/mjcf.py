@@ -20,7 +20,7 @@ import numpy as np
 from ..errors import ModelError
 from ..rotations import Array
 from .mjcf_places import Place, numbers, own_place
-from .mjcf_text import classes, compiler_of, with_includes
+from .mjcf_text import Source, attached_source, body_of, source_of
 
 Element = ElementTree.Element
 _MOST_BODIES = 100_000
@@ -57,11 +57,25 @@ class FileBody:
 
 
 class _Surroundings(NamedTuple):
-    """Where an element stands: the frame around it, its class, what its names end in."""
+    """Where an element stands.
+
+    Attributes:
+        frame: Around it.
+        childclass: Its class, if it names none.
+        sources: The main file, then each that is attached in the one before; it is in the last.
+        prefix, suffix: What its names begin with, and end in.
+    """
 
     frame: Place
     childclass: str
-    suffix: str
+    sources: tuple[Source, ...]
+    prefix: str = ""
+    suffix: str = ""
+
+    @property
+    def source(self) -> Source:
+        """The file that it is in."""
+        return self.sources[-1]
 
 
 class PlainMjcf:
@@ -85,11 +99,9 @@ class PlainMjcf:
         """
         self._path = path
         self._done: Counter[str] = Counter()
-        root, included = with_includes(root, path)
-        self._done["included files"] = included
-        self._compiler = compiler_of(root, path)
-        self._classes = classes(root, path, self._done)
-        angle = "degree" if self._compiler.degrees else "radian"
+        source = source_of(root, path, self._done)
+        self._degrees = source.compiler.degrees
+        angle = "degree" if self._degrees else "radian"
         self.root: Element = ElementTree.Element("mujoco", model="robot")
         ElementTree.SubElement(self.root, "compiler", angle=angle)
         world = ElementTree.SubElement(self.root, "worldbody")
@@ -100,8 +112,8 @@ class PlainMjcf:
         still = ElementTree.SubElement(ground, "body", name="body 0")
         self.bodies: list[FileBody] = [FileBody("world", "body 0")]
         self._sites = self._joints = 0
-        around = _Surroundings(Place.IDENTITY, "", "")
-        for worldbody in root.findall("worldbody"):
+        around = _Surroundings(Place.IDENTITY, "", (source,))
+        for worldbody in source.root.findall("worldbody"):
             self._write(worldbody, ground, self.bodies[0], around, still)
         roots = ground.findall("body")
         self._done["root bodies"] = len(roots) - 1 if len(roots) > 2 else 0
@@ -146,26 +158,53 @@ class PlainMjcf:
                 self._done[child.tag] += 1
                 for inner in self._copies(child, around):
                     self._write(child, target, body, inner, sites)
+            elif child.tag == "attach":
+                self._attach(child, target, body, around, sites)
             elif isinstance(child.tag, str) and child.tag not in _WITHOUT_PLACES:
                 raise ModelError(
-                    f"{self._path.name} uses <{child.tag}>, which Pinocchio does not read, and "
+                    f"{around.source.path.name} uses <{child.tag}>, which Pinocchio does not read, and "
                     "which is not written out for it"
                 )
+
+    def _attach(
+        self,
+        element: Element,
+        target: Element,
+        body: FileBody,
+        around: _Surroundings,
+        sites: Element,
+    ) -> None:
+        """Write a body of another file with all below it; or all bodies, where none is named."""
+        source = attached_source(element.get("model", ""), around.source, self._done)
+        if source.path.resolve() in [each.path.resolve() for each in around.sources]:
+            raise ModelError(f"{source.path.name} attaches itself")
+        self._done["attach"] += 1
+        inside = around._replace(
+            childclass="",
+            sources=(*around.sources, source),
+            prefix=around.prefix + element.get("prefix", ""),
+        )
+        if name := element.get("body"):
+            found, childclass = body_of(source, name)
+            self._body(found, target, inside._replace(childclass=childclass))
+            return
+        for worldbody in source.root.findall("worldbody"):
+            self._write(worldbody, target, body, inside, sites)
 
     def _copies(self, element: Element, around: _Surroundings) -> Iterator[_Surroundings]:
         """The surroundings within a <frame>, or within each copy of a <replicate>."""
         childclass = element.get("childclass") or around.childclass
         if element.tag == "frame":
-            place = own_place(element.attrib, self._compiler)
-            yield _Surroundings(around.frame @ place, childclass, around.suffix)
+            place = own_place(element.attrib, around.source.compiler)
+            yield around._replace(frame=around.frame @ place, childclass=childclass)
             return
         step = {"pos": element.get("offset", "0 0 0"), "euler": element.get("euler", "0 0 0")}
-        move, frame = own_place(step, self._compiler), around.frame
+        move, frame = own_place(step, around.source.compiler), around.frame
         count = int(numbers(element.get("count", ""), 1)[0])
         width = len(str(count))
         for k in range(count):
             suffix = f"{element.get('sep', '')}{k:0{width}d}{around.suffix}"
-            yield _Surroundings(frame, childclass, suffix)
+            yield around._replace(frame=frame, childclass=childclass, suffix=suffix)
             frame = frame @ move
 
     def _body(self, element: Element, target: Element, around: _Surroundings) -> None:
@@ -179,7 +218,7 @@ class PlainMjcf:
         written = ElementTree.SubElement(target, "body", name=body.written)
         self._place(element.attrib, written, around)
         childclass = element.get("childclass") or around.childclass
-        inside = _Surroundings(Place.IDENTITY, childclass, around.suffix)
+        inside = around._replace(frame=Place.IDENTITY, childclass=childclass)
         self._write(element, written, body, inside, written)
 
     def _joint(
@@ -188,14 +227,15 @@ class PlainMjcf:
         given = self._resolved(element, "joint", around)
         free = element.tag == "freejoint" or given.get("type") == "free"
         kind = "free" if free else given.get("type", "hinge")
-        if free and (element.get("align") == "true" or self._compiler.aligned):
+        compiler = around.source.compiler
+        if free and (element.get("align") == "true" or compiler.aligned):
             raise ModelError(
-                f"{self._path.name} aligns a free body with its inertia, which its text does not "
+                f"{around.source.path.name} aligns a free body with its inertia, which its text does not "
                 "tell the place of"
             )
         ref = float(numbers(given.get("ref", "0"), 1)[0]) if kind in ("hinge", "slide") else 0.0
         self._done["ref"] += bool(ref)
-        if kind == "hinge" and self._compiler.degrees:
+        if kind == "hinge" and compiler.degrees:
             ref = float(np.deg2rad(ref))
         name = self._name(element, around)
         body.joints.append(FileJoint(name, kind, ref))
@@ -222,17 +262,21 @@ class PlainMjcf:
     def _place(self, given: dict[str, str], target: Element, around: _Surroundings) -> None:
         """Give `target` a place: in the words of the file, where Pinocchio reads them rightly."""
         by = _PLACED_BY & given.keys()
-        plain = {"quat", "xyaxes"} | ({"euler"} if self._compiler.eulerseq == "xyz" else set())
+        compiler = around.source.compiler
+        plain = {"quat", "xyaxes"}
+        if compiler.eulerseq == "xyz" and compiler.degrees == self._degrees:
+            plain.add("euler")
         if around.frame.is_identity and by <= plain:
             for name in ("pos", *by):
                 if name in given:
                     target.set(name, given[name])
             return
-        place = around.frame @ own_place(given, self._compiler)
+        place = around.frame @ own_place(given, compiler)
         target.set("pos", _text(place.pos))
         target.set("quat", _text(place.quat))
         for name in by - plain:
-            self._done[name] += 1
+            unit = name == "euler" and compiler.eulerseq == "xyz"
+            self._done["unit" if unit else name] += 1
 
     def _resolved(self, element: Element, tag: str, around: _Surroundings) -> dict[str, str]:
         """Attributes of a joint or a site, those from its class included."""
@@ -240,9 +284,9 @@ class PlainMjcf:
         if element.tag == "freejoint":
             return own
         name = element.get("class") or around.childclass or "main"
-        if name not in self._classes:
-            raise ModelError(f"{self._path.name} has no default class {name!r}")
-        preset = self._classes[name].get(tag, {})
+        if name not in around.source.classes:
+            raise ModelError(f"{around.source.path.name} has no default class {name!r}")
+        preset = around.source.classes[name].get(tag, {})
         preset = {key: text for key, text in preset.items() if key in _KINEMATIC[tag]}
         if _PLACED_BY & own.keys():  # an orientation replaces that of the class
             preset = {key: text for key, text in preset.items() if key not in _PLACED_BY}
@@ -251,7 +295,7 @@ class PlainMjcf:
 
     def _name(self, element: Element, around: _Surroundings) -> str:
         name = element.get("name", "")
-        return name + around.suffix if name else ""
+        return around.prefix + name + around.suffix if name else ""
 
 
 _CHANGES = {
@@ -263,7 +307,9 @@ _CHANGES = {
     "ref": "ref of joints subtracted from qpos: {}",
     "frame": "<frame> written out: {}",
     "replicate": "<replicate> written out: {}",
+    "attach": "<attach> written out: {}",
     "euler": "euler in another order written as quat: {}",
+    "unit": "euler in another unit written as quat: {}",
     "axisangle": "axisangle written as quat: {}",
     "zaxis": "zaxis written as quat: {}",
     "fromto": "fromto of a site written as pos and quat: {}",

@@ -1,10 +1,11 @@
-"""What an MJCF says about its own text: includes, the compiler's settings, default classes."""
+"""What an MJCF says about its own text: includes, settings, classes, files it attaches."""
 
 from __future__ import annotations
 
 import copy
 from collections import Counter
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 from ..errors import ModelError
@@ -14,6 +15,76 @@ from .mjcf_places import Compiler
 Element = ElementTree.Element
 # By class: by element: attributes.
 Classes = dict[str, dict[str, dict[str, str]]]
+
+
+class Source(NamedTuple):
+    """An MJCF that bodies are read from: the main file, or one that is attached.
+
+    Attributes:
+        path: Where it is.
+        root: Its text, the includes resolved.
+        compiler, classes: What it says of angles, and its default classes.
+    """
+
+    path: Path
+    root: Element
+    compiler: Compiler
+    classes: Classes
+
+
+def source_of(root: Element, path: Path, done: Counter[str]) -> Source:
+    """A file with all that is needed to read its bodies; `done` is told what was resolved.
+
+    Raises:
+        ModelError: It has a meaning that is not that of MuJoCo today, or a part is missing.
+    """
+    root, included = with_includes(root, path)
+    done["included files"] += included
+    return Source(path, root, compiler_of(root, path), classes(root, path, done))
+
+
+def attached_source(name: str, main: Source, done: Counter[str]) -> Source:
+    """The file that an <attach> of `main` calls `name`.
+
+    Raises:
+        ModelError: None is called so, or it cannot be read.
+    """
+    for element in main.root.findall("asset/model"):
+        file = included_file(element.get("file", ""), main.path, main.path)
+        if file is None:
+            raise ModelError(f"{main.path.name} names {element.get('file')!r}, which is not there")
+        root = parse(file)
+        if name == (element.get("name") or root.get("model")):
+            return source_of(root, file, done)
+    raise ModelError(f"{main.path.name} has an <attach> of {name!r}, and no <model> is called so")
+
+
+def body_of(source: Source, name: str) -> tuple[Element, str]:
+    """A body of a file by its name, and the class that its parents give it.
+
+    Raises:
+        ModelError: There is none, or a <frame> or <replicate> around it moves it.
+    """
+
+    def below(element: Element, childclass: str, moved: bool) -> tuple[Element, str] | None:
+        for child in element:
+            if child.tag == "body" and child.get("name") == name:
+                if moved:
+                    raise ModelError(
+                        f"{source.path.name} has {name!r}, which is attached elsewhere, in a "
+                        "<frame> or <replicate>"
+                    )
+                return child, childclass
+            if child.tag in ("body", "frame", "replicate"):
+                inner = child.get("childclass") or childclass
+                if found := below(child, inner, child.tag != "body"):
+                    return found
+        return None
+
+    for worldbody in source.root.findall("worldbody"):
+        if found := below(worldbody, "", False):
+            return found
+    raise ModelError(f"{source.path.name} has no body {name!r} to attach")
 
 
 def parse(path: Path) -> Element:
@@ -105,7 +176,7 @@ def classes(root: Element, path: Path, done: Counter[str]) -> Classes:
             read(nested, own)
 
     blocks = root.findall("default")
-    done["default blocks"] = len(blocks) if len(blocks) > 1 else 0
+    done["default blocks"] += len(blocks) if len(blocks) > 1 else 0
     for block in blocks:
         if block.get("class", "main") != "main":
             raise ModelError(f"{path.name} calls its outermost default {block.get('class')!r}")
