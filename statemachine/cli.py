@@ -27,6 +27,17 @@ _SAID: set[str] = set()
 class _Parser(argparse.ArgumentParser):
     """A parser whose every complaint is one line, with the nearest spelling."""
 
+    def parse_known_args(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self, args: Any = None, namespace: Any = None
+    ) -> Any:
+        """As argparse does it, but words behind an option are taken where words are wanted."""
+        found, rest = super().parse_known_args(args, namespace)
+        words = self.get_default("words_in")
+        if words and not any(word.startswith("-") for word in rest):
+            setattr(found, words, [*getattr(found, words), *rest])
+            rest = []
+        return found, rest
+
     def error(self, message: str) -> NoReturn:
         message = message.replace("'", "")
         wrong, _, rest = message.partition("invalid choice: ")

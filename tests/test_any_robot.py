@@ -388,7 +388,11 @@ def test_a_robot_by_name_without_a_network(
 @pytest.mark.parametrize(
     ("name", "code", "said"),
     [
-        ("menagerie:unitree_g1", 2, "unitree_g1 is not on this machine and could not be downloaded"),
+        (
+            "menagerie:unitree_g1",
+            2,
+            "unitree_g1 is not on this machine and could not be downloaded",
+        ),
         ("menagerie:", 2, "'menagerie:' names no robot: type menagerie:NAME"),
         ("menagerie:unitre_g1", 2, "Did you mean 'unitree_g1'?"),
         ("robot_descriptions:panda_mj_description", 3, "pip install 'statemachine-sim[robots]'"),

@@ -9,7 +9,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ..errors import MissingEngineError, ModelError, StateMachineError, UnsupportedError
+from ..errors import (
+    BadInputError,
+    MissingEngineError,
+    ModelError,
+    StateMachineError,
+    UnsupportedError,
+)
 from ..installed import DEFAULT
 
 PROGRAM = "statemachine"
@@ -105,6 +111,17 @@ def on_each_backend(
     if not results:
         raise refusals[-1]
     return results
+
+
+def pairs_of(given: list[str], option: str) -> dict[str, str]:
+    """Names of the left and what the right calls them, from words A=B."""
+    found: dict[str, str] = {}
+    for text in given:
+        one, sign, two = text.partition("=")
+        if not (one and sign and two):
+            raise BadInputError(f"{option} wants A=B, a name of A's and one of B's; got {text!r}")
+        found[one] = two
+    return found
 
 
 def show(page: Any, result: Any, as_json: bool, footer: str = "", reader: Any = None) -> int:

@@ -36,7 +36,11 @@ def check(options: argparse.Namespace) -> None:
 
 
 def floor_of(
-    options: argparse.Namespace, request: Any, comparison: Any, traces: tuple[Any, Any]
+    options: argparse.Namespace,
+    request: Any,
+    comparison: Any,
+    traces: tuple[Any, Any],
+    rerun: Any = None,
 ) -> Any:
     """The chaos floor of an experiment; None where nothing can be run again.
 
@@ -45,6 +49,7 @@ def floor_of(
         request: The `compare.Request`.
         comparison: Of the traces.
         traces: Both sides.
+        rerun: How the left was run, if sides were given.
 
     Raises:
         BadInputError: An uncertainty was given, and the left side was not run here.
@@ -56,27 +61,11 @@ def floor_of(
         if options.floor:
             raise BadInputError("--floor runs the left side again, and it is a recorded run")
         return None
-    from ..backends import load
-    from ..compare import chaos_floor, rerun_of
+    from ..compare import chaos_floor
     from ..compare.perturbed import parse_uncertainty
     from ..report.progress import progress
-    from ..scenarios import scenario
 
-    asked = scenario(request.what[0])
-    model = load(
-        request.model or asked.model,
-        backend=request.backends[0],
-        defaults=request.defaults,
-        menagerie=request.menagerie,
-    )
-    rerun = rerun_of(
-        asked,
-        model,
-        seconds=request.seconds,
-        seed=request.seed,
-        defaults=request.defaults,
-        options=request.options,
-    )
+    rerun = rerun or _rerun(request)
     with progress("chaos floor") as told:
         return chaos_floor(
             comparison,
@@ -87,3 +76,25 @@ def floor_of(
             uncertain=parse_uncertainty(options.floor),
             progress=told,
         )
+
+
+def _rerun(request: Any) -> Any:
+    """How the first of two engines runs an experiment."""
+    from ..backends import load
+    from ..compare import rerun_of
+
+    asked = request.scenario()
+    model = load(
+        request.model or asked.model,
+        backend=request.backends[0],
+        defaults=request.defaults,
+        menagerie=request.menagerie,
+    )
+    return rerun_of(
+        asked,
+        model,
+        seconds=request.seconds,
+        seed=request.seed,
+        defaults=request.defaults,
+        options=request.options,
+    )

@@ -49,6 +49,8 @@ def write(
     traces: tuple[Any, Any],
     said: tuple[str, ...],
     witness: Any = None,
+    run: Any = None,
+    played: Any = None,
     floor: Any = None,
 ) -> None:
     """Look for causes and shapes, and write the page.
@@ -60,6 +62,8 @@ def write(
         traces: Both sides.
         said: What stood in for a run.
         witness: The third party's figures, or None.
+        run: The `compare.SidesRun`, if sides were given.
+        played: The figures of its open loop, if that is another run.
         floor: The chaos floor, or None.
     """
     from ..report import compare as pages
@@ -77,6 +81,8 @@ def write(
         why_not=why_not,
         models=_models(request, traces),
         command=_typed(options, request),
+        run=run,
+        played=played,
         floor=floor,
     )
     text = report(page, _looks(request, traces))
@@ -109,6 +115,8 @@ def _why(request: Any, traces: tuple[Any, Any], quantity: str | None) -> tuple[A
 def _models(request: Any, traces: tuple[Any, Any]) -> Any:
     """The page of what each engine makes of the model; None where that cannot be read."""
     names = [trace.header.provenance.model_file for trace in traces]
+    if request.sides:
+        names = [side.path for side in request.sides]
     engines = tuple(trace.header.backend for trace in traces)
     if engines[0] == engines[1] and names[0] == names[1]:
         return None
@@ -124,13 +132,13 @@ def _models(request: Any, traces: tuple[Any, Any]) -> Any:
 
 def _looks(request: Any, traces: tuple[Any, Any]) -> tuple[Any, Any]:
     """What each side is drawn as: its model, if it is the one that the trace is of."""
-    one = _look(request, traces[0])
+    one = _look(request, traces[0], 0)
     a, b = (trace.header for trace in traces)
     same = (a.provenance.model_sha256, a.bodies) == (b.provenance.model_sha256, b.bodies)
-    return one, one if same else _look(request, traces[1])
+    return one, one if same else _look(request, traces[1], 1)
 
 
-def _look(request: Any, trace: Any) -> Any:
+def _look(request: Any, trace: Any, place: int) -> Any:
     from ..backends import load
     from ..drawing import drawing_of
     from ..report.html import SideDrawing
@@ -138,9 +146,10 @@ def _look(request: Any, trace: Any) -> Any:
 
     header = trace.header
     file = header.provenance.model_file
+    wanted = request.sides[place].path if request.sides else request.model or file
     try:
-        model = load(request.model or file, menagerie=request.menagerie)
-        if model.body_names != header.bodies:
+        model = load(wanted, menagerie=request.menagerie)
+        if model.nbody != len(header.bodies):
             return SideDrawing(None, f"{file} as it is here has other bodies")
         if provenance(model).model_sha256 != header.provenance.model_sha256:
             return SideDrawing(None, f"{file} as it is here has another digest")
@@ -156,7 +165,8 @@ def _typed(options: argparse.Namespace, request: Any) -> str:
     from ..comparison.text import command
 
     words = [PROGRAM, "compare", *(Path(word).name for word in request.what)]
-    if tuple(request.backends) != PAIR:
+    words += [side.label for side in request.sides]
+    if not request.sides and tuple(request.backends) != PAIR:
         words += ["--backends", *request.backends]
     return command(
         words,
@@ -166,6 +176,9 @@ def _typed(options: argparse.Namespace, request: Any) -> str:
         ("--seconds", request.seconds, None),
         ("--timestep", request.options.get("timestep"), None),
         ("--seed", request.seed, 0),
+        ("--every", request.every, 1),
+        ("--keyframe", request.keyframe, None),
+        *(("--map", f"{a}={b}", None) for a, b in request.names.items()),
         *(("--tolerance", text, None) for text in options.tolerance),
         *(("--floor", text, None) for text in options.floor),
         ("--no-floor", options.no_floor, False),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from ..errors import BadInputError
-from ._common import show
+from ._common import pairs_of, show
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     given = [split(text) for text in options.models]
     if options.what:
         raise BadInputError(f"--models compares descriptions; {options.what[0]} is a run")
-    for name in ("model", "seconds", "timestep", "tolerance", "plot", "film"):
+    for name in ("model", "seconds", "timestep", "tolerance", "plot", "film", "every", "keyframe"):
         if getattr(options, name) not in (None, []):
             raise BadInputError(f"--{name} is of a run, and --models runs nothing")
     if options.backends:
@@ -66,8 +66,8 @@ def run(options: argparse.Namespace) -> int:
             given[0][0],
             given[1][0],
             engines=(given[0][1], given[1][1]),
-            frames=_pairs(options.frame, "--frame"),
-            rename=_pairs(options.rename, "--rename"),
+            frames=pairs_of(options.frame, "--frame"),
+            rename=pairs_of(options.rename, "--rename"),
             digits=digits,
             seed=options.seed,
             menagerie=options.menagerie,
@@ -82,13 +82,3 @@ def refuse_alone(options: argparse.Namespace) -> None:
             raise BadInputError(f"--{name} goes with --models")
     if options.digits is not None:
         raise BadInputError("--digits goes with --models")
-
-
-def _pairs(given: list[str], option: str) -> dict[str, str]:
-    found: dict[str, str] = {}
-    for text in given:
-        one, sign, two = text.partition("=")
-        if not (one and sign and two):
-            raise BadInputError(f"{option} wants A=B, a name of A's and one of B's; got {text!r}")
-        found[one] = two
-    return found

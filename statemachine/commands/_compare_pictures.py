@@ -108,6 +108,7 @@ def write(
     one: Any,
     two: Any = None,
     comparison: Any = None,
+    request: Any = None,
     floor: Any = None,
 ) -> None:
     """Write what was asked for; a line for each file on standard error.
@@ -118,6 +119,7 @@ def write(
         one: A trace.
         two: The other one; None for pictures of one trace.
         comparison: Of the two.
+        request: The `compare.Request`; its sides say what a film of theirs shows.
         floor: The chaos floor of the comparison, or None.
     """
     from ..report.progress import progress
@@ -136,7 +138,12 @@ def write(
     if pictures.film is not None:
         from ..report import film as films
 
-        models = _models(options, *(trace for trace in (one, two) if trace is not None))
+        files = [side.path for side in request.sides] if request else []
+        models = _models(options, files, *(trace for trace in (one, two) if trace is not None))
+        if files and two is not None:
+            from ..compare.alike import with_bodies_of
+
+            one, two = with_bodies_of(one, models[0]), with_bodies_of(two, models[1])
         with progress("film") as told:
             film = films.write_film(
                 pictures.film,
@@ -157,15 +164,15 @@ def write(
         )
 
 
-def _models(options: Any, *traces: Any) -> Any:
+def _models(options: Any, files: Any, *traces: Any) -> Any:
     """What the traces are drawn with; a word where it is not what they were recorded with."""
     from ..backends import load
     from ..scenarios.provenance import provenance
 
     models = []
-    for trace in traces:
+    for k, trace in enumerate(traces):
         known = trace.header.provenance
-        name = options.model or known.model_file
+        name = files[k] if files else options.model or known.model_file
         try:
             model = load(name, menagerie=options.menagerie)
         except (ModelFileError, UnknownNameError) as error:

@@ -9,15 +9,21 @@ from ..errors import BadInputError, EndedEarlyError
 from ..installed import PAIR
 from . import _compare_floor, _compare_html, _compare_models
 from . import _compare_pictures as pictures
-from ._common import PROGRAM, add_json, add_menagerie, complain, show
+from ._common import PROGRAM, add_json, add_menagerie, complain, pairs_of, show
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Its options."""
     parser.description = (
-        "Run an experiment on two engines, or open recorded traces, and compare: each\n"
-        "quantity with its tolerance and a verdict. One trace: its ctrl is played on\n"
-        "the other engine."
+        "Run something on two sides, or open recorded traces, and compare: each quantity\n"
+        "with its tolerance and a verdict. An experiment alone runs on both engines; the\n"
+        "ctrl of one trace is played on the other engine.\n\n"
+        "A side is FILE, FILE@ENGINE or FILE@ENGINE:engine (as the engine's own users\n"
+        "meet it), and options behind it, such as timestep=0.002 contacts=off:\n"
+        f"  {PROGRAM} compare hold A.xml@mujoco B.urdf@pybullet\n"
+        f"  {PROGRAM} compare hold so101 timestep=0.002 so101 timestep=0.001\n"
+        f"  {PROGRAM} compare walk.py:policy A.xml B.xml --every 5 --keyframe home\n"
+        f"  {PROGRAM} compare run.npz A.xml B.xml"
     )
     parser.epilog = (
         f"experiments:\n{experiments()}\n\n"
@@ -28,8 +34,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "what",
         nargs="*",
-        metavar="EXPERIMENT|TRACE",
-        help="an experiment, or one or two files .npz or .parquet",
+        metavar="WHAT",
+        help="what is run: an experiment, FILE.py:FUNCTION or a recorded TRACE; then nothing, two "
+        "sides, or a second trace",
     )
     parser.add_argument(
         "--backends",
@@ -53,12 +60,30 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quantity", default=None, metavar="NAME", help="of --why: what the gap is measured in"
     )
+    group = parser.add_argument_group("two sides")
+    group.add_argument(
+        "--map",
+        action="append",
+        default=[],
+        metavar="LEFT=RIGHT",
+        help="a joint, body, site or actuator of the left and what the right calls it",
+    )
+    group.add_argument(
+        "--every",
+        type=int,
+        default=None,
+        metavar="N",
+        help="steps for which what FUNCTION(model, data) returned holds (1)",
+    )
+    group.add_argument(
+        "--keyframe", default=None, metavar="NAME", help="where a FUNCTION starts, on both sides"
+    )
     _compare_floor.add_options(parser)
     _compare_html.add_options(parser)
     pictures.add(parser)
     _compare_models.add_options(parser)
     add_json(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, words_in="what")
 
 
 # As `scenarios.SCENARIOS`, which needs NumPy; a test compares them.
@@ -87,10 +112,29 @@ def add_defaults(parser: argparse.ArgumentParser) -> None:
     )
 
 
+class _Once(argparse.Action):
+    """An option whose second value would silently replace the first."""
+
+    def __call__(self, parser: Any, namespace: Any, values: Any, option_string: Any = None) -> None:
+        """Keep the value, or refuse a second one."""
+        given = getattr(namespace, self.dest)
+        if given is not None:
+            what = (getattr(namespace, "what", None) or ["hold"])[0]
+            parser.error(
+                f"{option_string} is given twice; two models are two sides: "
+                f"{PROGRAM} compare {what} {given} {values}"
+            )
+        setattr(namespace, self.dest, values)
+
+
 def add_run(parser: argparse.ArgumentParser) -> None:
     """Options that change what is run."""
     parser.add_argument(
-        "--model", default=None, metavar="NAME|FILE", help="instead of the experiment's own"
+        "--model",
+        default=None,
+        action=_Once,
+        metavar="NAME|FILE",
+        help="instead of the experiment's own",
     )
     add_menagerie(parser)
     parser.add_argument("--seconds", type=float, default=None, metavar="S", help="simulated time")
@@ -102,11 +146,13 @@ def add_run(parser: argparse.ArgumentParser) -> None:
 
 def request_of(options: argparse.Namespace) -> Any:
     """What was asked for, as a Request."""
-    from ..compare import Request
+    from ..compare import Request, split_words
 
     one, two = options.backends or PAIR
+    what, sides = split_words(options.what, options.menagerie)
+    _check_sides(options, what, sides)
     return Request(
-        what=tuple(options.what),
+        what=what,
         backends=(one, two),
         defaults=options.defaults,
         model=options.model,
@@ -114,7 +160,35 @@ def request_of(options: argparse.Namespace) -> Any:
         seconds=options.seconds,
         seed=options.seed,
         options={} if options.timestep is None else {"timestep": options.timestep},
+        sides=sides,
+        names=pairs_of(options.map, "--map"),
+        every=1 if options.every is None else options.every,
+        keyframe=options.keyframe,
     )
+
+
+def _check_sides(options: argparse.Namespace, what: tuple[str, ...], sides: Any) -> None:
+    """Refuse an option that has no meaning for what was asked."""
+    from ..traces.controllers import is_function
+
+    if sides:
+        for name, instead in (
+            ("model", "each side names its file"),
+            ("backends", "each side names its engine: FILE@ENGINE"),
+            ("defaults", "each side says whose: FILE@ENGINE:engine"),
+        ):
+            if getattr(options, name) not in (None, "model"):
+                raise BadInputError(f"--{name} goes without sides: {instead}")
+    elif options.map:
+        raise BadInputError(
+            f"--map is of two sides: {PROGRAM} compare hold LEFT RIGHT --map NAME=NAME"
+        )
+    function = len(what) == 1 and is_function(what[0])
+    for name in ("every", "keyframe"):
+        if getattr(options, name) is not None and not function:
+            raise BadInputError(f"--{name} goes with FILE.py:FUNCTION")
+    if options.every is not None and options.every < 1:
+        raise BadInputError(f"--every wants a number of steps, at least 1; got {options.every}")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -131,7 +205,7 @@ def run(options: argparse.Namespace) -> int:
     _compare_models.refuse_alone(options)
     if not options.what:
         raise BadInputError(
-            f"compare what? An experiment ({', '.join(EXPERIMENTS)}) or traces: "
+            f"compare what? An experiment ({', '.join(EXPERIMENTS)}), FILE.py:FUNCTION or traces: "
             f"{PROGRAM} compare hold"
         )
     if options.quantity and not (options.why or options.html):
@@ -155,7 +229,7 @@ def _run_why(options: argparse.Namespace) -> int:
 
 
 def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
-    from ..compare import compare, sides_of, touches, witness
+    from ..compare import compare, run_sides, sides_of, touches, witness
     from ..comparison import parse_tolerances
     from ..report import compare as report
     from ..report.progress import progress
@@ -165,24 +239,49 @@ def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
     if request.is_traces and len(request.what) == 2 and options.backends:
         raise BadInputError("--backends is of a run, and two traces are runs that were made")
     wanted = pictures.checked(options)
+    run = None
     with progress("compare") as told:
-        (one, two), said = sides_of(request, told)
+        if request.sides:
+            run = run_sides(request, told)
+            (one, two), said = (run.left, run.right), run.said
+        else:
+            (one, two), said = sides_of(request, told)
     found = compare(one, two, tolerances=tolerances)
+    played = compare(one, run.played, tolerances=tolerances) if run and run.is_apart else None
     if options.json:
-        for line in said:
+        for line in (*(run.unmatched if run else ()), *said):
             complain(line, 0)
-    asked = witness(one, two)
-    floor = _compare_floor.floor_of(options, request, found, (one, two))
+    asked = witness(one, two, run.file if run else None)
+    rerun = run.reruns[0] if run and run.reruns else None
+    floor = _compare_floor.floor_of(options, request, found, (one, two), rerun)
     if options.html:
-        _compare_html.write(options, request, found, (one, two), said, asked, floor)
+        _compare_html.write(options, request, found, (one, two), said, asked, run, played, floor)
     why_not = "" if found.ended else why_not  # which the page says itself
-    page = report.page(found, one, two, said=said, witness=asked, floor=floor, why_not=why_not)
+    page = report.page(
+        found,
+        one,
+        two,
+        said=said,
+        witness=asked,
+        run=run,
+        played=played,
+        floor=floor,
+        why_not=why_not,
+    )
     result = {
         "comparison": found,
         "witness": asked,
         "touches": touches(one, two),
         "floor": floor,
     }
+    if run:
+        result |= {
+            "sides": request.sides,
+            "commands": run.commands,
+            "open_loop": found if played is None else played,
+            "unmatched": run.unmatched,
+            "only": run.matched.only if run.matched else ({}, {}),
+        }
     code = show(page, result, options.json)
-    pictures.write(wanted, options, one, two, found, floor)
+    pictures.write(wanted, options, one, two, found, request, floor)
     return code

@@ -14,6 +14,7 @@ from ..errors import TraceError
 from ..interface import Array
 from ..scenarios.provenance import Provenance
 from ..traces import Trace
+from .labels import labels_of
 from .notes import notes_on
 from .series import Series, series
 from .tolerances import tolerance_for
@@ -62,11 +63,13 @@ class Agreement:
 
 
 @dataclass(frozen=True)
-class Side:
-    """Whose trace it is.
+class SideRun:
+    """Whose run it is.
 
     Attributes:
-        label: Engine, version, and what is unusual; backend: the engine's name alone.
+        label: What tells it from the other: engine and version, or file, or options; short:
+            the same for tables.
+        engine: Engine, version, and what is unusual; backend: its name alone.
         experiment: What was done.
         rows: How many rows it has; timestep: their distance [s].
         defaults: What `load` was given.
@@ -76,6 +79,8 @@ class Side:
     """
 
     label: str
+    short: str
+    engine: str
     backend: str
     experiment: str
     rows: int
@@ -97,8 +102,8 @@ class Comparison:
         notes: What makes the comparison less than one of two engines.
     """
 
-    one: Side
-    two: Side
+    one: SideRun
+    two: SideRun
     moments: int
     until: float
     agreements: tuple[Agreement, ...]
@@ -150,9 +155,10 @@ def compare(
         for each in found
         if each.note.startswith("no number")
     ]
+    labels = labels_of(one.header, two.header)
     return Comparison(
-        one=_side(one),
-        two=_side(two),
+        one=_side(one, labels.long[0], labels.short[0]),
+        two=_side(two, labels.long[1], labels.short[1]),
         moments=len(curves[0].time),
         until=float(curves[0].time[-1]),
         agreements=tuple(found),
@@ -212,12 +218,12 @@ def _touches(
         allowed = tolerance_for(curve, one, two, given)
         note = ""
         if first[0] is None or first[1] is None:
-            missing, seen = (one, first[1]) if first[0] is None else (two, first[0])
+            missing, seen = (0, first[1]) if first[0] is None else (1, first[0])
             # As late as can be: it had not touched when the comparison ended.
             gap, at = until - float(seen or 0.0), float(seen or 0.0)
-            later = touches[0 if missing is one else 1].get(pair)
+            later = touches[missing].get(pair)
             word = "never" if later is None or not later.any() else "later"
-            note = f"{word} on {missing.header.backend}"
+            note = f"{word} on {labels_of(one.header, two.header).short[missing]}"
             verdict: Verdict = "differs"
         else:
             gap, at = abs(first[0] - first[1]), min(first[0], first[1])
@@ -249,10 +255,12 @@ def _first(touching: NDArray[np.bool_] | None, trace: Trace, until: float) -> fl
     return time if time <= until + SAME * trace.header.timestep else None
 
 
-def _side(trace: Trace) -> Side:
+def _side(trace: Trace, label: str, short: str) -> SideRun:
     header = trace.header
-    return Side(
-        label=header.label,
+    return SideRun(
+        label=label,
+        short=short,
+        engine=header.label,
         backend=header.backend,
         experiment=header.experiment,
         rows=len(trace),

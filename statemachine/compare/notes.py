@@ -10,6 +10,7 @@ from ..comparison import SAME, Common
 from ..comparison.text import milliseconds, numbers, significant
 from ..interface import JointType
 from ..traces import Header, Trace
+from .labels import labels_of
 from .series import tell
 
 # Columns that are compared, and what a page calls them.
@@ -32,6 +33,7 @@ def notes_on(one: Trace, two: Trace, common: Common, of_quantities: Iterable[str
         of_quantities: What is to be said of single quantities.
     """
     a, b = one.header, two.header
+    labels = labels_of(a, b).long
     if a.provenance.model_sha256 != b.provenance.model_sha256:
         yield (
             f"the models are two: {a.provenance.model_file} and {b.provenance.model_file} "
@@ -54,12 +56,12 @@ def notes_on(one: Trace, two: Trace, common: Common, of_quantities: Iterable[str
         yield "the actuators differ, in name or in order"
     elif _commands_differ(one, two, common):
         yield "the commands differ: the controllers saw different states, or are two"
-    for header in (a, b):
+    for header, label in zip((a, b), labels, strict=True):
         if header.ended:
-            yield f"{header.label} ended early: {header.ended}"
+            yield f"{label} ended early: {header.ended}"
         if header.rewritten:
             yield (
-                f"{header.label}: in {header.rewritten} rows the state was written, by the "
+                f"{label}: in {header.rewritten} rows the state was written, by the "
                 "controller; that is no part of the commands"
             )
         if header.single:
@@ -70,7 +72,8 @@ def notes_on(one: Trace, two: Trace, common: Common, of_quantities: Iterable[str
 
 def _of_joints(one: Trace, two: Trace) -> Iterator[str]:
     a, b = one.header, two.header
-    only = [*_lacking(a, b), *_lacking(b, a)]
+    labels = labels_of(a, b).long
+    only = [*_lacking(a, b, labels[0]), *_lacking(b, a, labels[1])]
     if only:
         yield f"compared is what both have; missing on one side: {', '.join(only)}"
     shared = [name for name in a.joint_labels if name in b.joint_labels]
@@ -107,9 +110,9 @@ def _of_time(one: Trace, two: Trace, common: Common) -> Iterator[str]:
         )
     ends = [float(trace.time[-1] - trace.time[0]) for trace in (one, two)]
     if abs(ends[0] - ends[1]) > max(steps) * (1 + SAME):
-        longer = (one, two)[ends[1] > ends[0]].header
+        longer = labels_of(one.header, two.header).long[ends[1] > ends[0]]
         yield (
-            f"the runs are {ends[0]:g} and {ends[1]:g} s long: what {longer.label} does after "
+            f"the runs are {ends[0]:g} and {ends[1]:g} s long: what {longer} does after "
             f"{common.time[-1]:g} s is not compared"
         )
 
@@ -133,5 +136,5 @@ def _start(trace: Trace, name: str, column: str) -> np.ndarray:
     return trace[column][0, start : start + width]
 
 
-def _lacking(a: Header, b: Header) -> list[str]:
-    return [f"{name} ({a.label})" for name in a.joint_labels if name not in b.joint_labels]
+def _lacking(a: Header, b: Header, label: str) -> list[str]:
+    return [f"{name} ({label})" for name in a.joint_labels if name not in b.joint_labels]

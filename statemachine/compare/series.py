@@ -50,10 +50,10 @@ def series(one: Trace, two: Trace, tip: str | None = None) -> list[Series]:
     """
     common = common_moments(one, two)
     found: list[Series] = []
-    for place, name in enumerate(one.header.joints):
-        other = _counterpart(place, name, two.header)
-        if other is not None:
-            found += _joint(name or f"joint {place}", (place, other), one, two, common)
+    theirs = two.header.joint_labels
+    for place, name in enumerate(one.header.joint_labels):
+        if name in theirs:
+            found += _joint(name, (place, theirs.index(name)), one, two, common)
     site = default_tip(one.header, two.header) if tip is None else tip
     if site and tell(one, two, "site_xpos") and tell(one, two, "site_xmat"):
         found += _site(site, one, two, common)
@@ -133,13 +133,6 @@ def tell(one: Trace, two: Trace, column: str) -> bool:
 
 def _scalar(name: str, kind: str, common: Common, one: Array, two: Array) -> Series:
     return Series(name, kind, common.time, one, two, np.abs(one - two))
-
-
-def _counterpart(place: int, name: str, header: Header) -> int | None:
-    """The joint of that name; of one without a name, the one in its place if it has none too."""
-    if name:
-        return header.joints.index(name) if name in header.joints else None
-    return place if place < len(header.joints) and not header.joints[place] else None
 
 
 def _joint(

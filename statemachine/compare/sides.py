@@ -2,71 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
 
 from ..backends import backend_names, load
 from ..comparison.text import command
 from ..errors import BadInputError, MissingEngineError, StateMachineError, unknown_name
-from ..installed import DEFAULT, PAIR
+from ..installed import DEFAULT
 from ..scenarios import SCENARIOS, scenario
 from ..scenarios.runs import Progress, part_of, silent
 from ..traces import Trace, model_file, play, read, record_scenario, shipped
-from ..traces.files import SUFFIXES
-
-
-@dataclass(frozen=True)
-class Request:
-    """What to compare.
-
-    Attributes:
-        what: Name of an experiment, or one or two files of traces.
-        backends: The two engines; of one trace the second that is not its own.
-        defaults: What `load` is given.
-        model: Instead of the experiment's own; menagerie: where its name is looked up.
-        seconds: Instead of the experiment's own time [s].
-        seed: Of an experiment that draws something.
-        options: For `Model.replace`, on both sides.
-    """
-
-    what: Sequence[str]
-    backends: tuple[str, str] = PAIR
-    defaults: Literal["model", "engine"] = "model"
-    model: str | None = None
-    menagerie: str | None = None
-    seconds: float | None = None
-    seed: int = 0
-    options: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def is_traces(self) -> bool:
-        """Whether files were named, not an experiment."""
-        return any(Path(word).suffix.lower() in SUFFIXES for word in self.what)
-
-    @property
-    def plain(self) -> bool:
-        """Whether it is what the recorded traces of the package are of."""
-        return (
-            self.model is None
-            and self.menagerie is None
-            and self.seconds is None
-            and self.seed == 0
-            and not self.options
-        )
-
-    def typed(self, backend: str) -> str:
-        """The command that records one side."""
-        return command(
-            ["statemachine", "trace", "record", *self.what, "--backend", backend],
-            ("--defaults", self.defaults, "model"),
-            ("--model", self.model, None),
-            ("--menagerie", self.menagerie and "DIR", None),
-            ("--seconds", self.seconds, None),
-            ("--seed", self.seed, 0),
-            ("--timestep", self.options.get("timestep"), None),
-        )
+from .request import Request, is_trace
+from .two_sides import run_sides
 
 
 def sides_of(
@@ -85,6 +31,9 @@ def sides_of(
     """
     if isinstance(request, str):
         request = Request((request,))
+    if request.sides:
+        run = run_sides(request, progress)
+        return (run.left, run.right), run.said
     if not 1 <= len(request.what) <= 2:
         raise BadInputError("compare takes one experiment, or one or two traces")
     if request.is_traces:
@@ -142,7 +91,7 @@ def _run(request: Request, backend: str, said: list[str], progress: Progress) ->
 
 def _of_traces(request: Request, progress: Progress) -> tuple[tuple[Trace, Trace], tuple[str, ...]]:
     for word in request.what:
-        if Path(word).suffix.lower() not in SUFFIXES:
+        if not is_trace(word):
             hint = " (an experiment runs on both engines alone)" if word in SCENARIOS else ""
             raise BadInputError(f"{word!r} is no trace{hint}: a trace ends in .npz or .parquet")
     opened = [read(word) for word in request.what]

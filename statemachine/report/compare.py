@@ -11,6 +11,7 @@ from ..compare import (
     ChaosFloor,
     Comparison,
     Series,
+    SidesRun,
     Witness,
     default_tip,
     series,
@@ -37,6 +38,7 @@ from .finding import (
     window,
 )
 from .floor import floor_words
+from .loops import also_open, loops, told, unmatched
 from .over_time import BothRuns, QuantityChart, chart_of, foot_of
 from .provenance import emulated, provenance
 
@@ -57,6 +59,8 @@ def page(
     why_not: str = "",
     models: Page | None = None,
     command: str = "",
+    run: SidesRun | None = None,
+    played: Comparison | None = None,
     floor: ChaosFloor | None = None,
 ) -> Page:
     """What was found in comparing two runs.
@@ -72,6 +76,8 @@ def page(
         why_not: Why there is none, as a sentence.
         models: The differences between what the engines make of the model, if asked.
         command: What makes the page again.
+        run: How two sides were run, if sides were given.
+        played: The comparison of their open loop, where it is not that of the closed one.
         floor: The chaos floor, if it was looked for.
     """
     labels = long_labels(comparison)
@@ -80,7 +86,9 @@ def page(
     events = events_of(comparison, touching)
     notes = [sentence(line) for line in (*said, *comparison.notes)]
     blocks: list[Block] = [
+        *unmatched(run),
         *([Text(one.header.says)] if one.header.says else []),
+        *told(run),
         *commanded(one, two, labels),
         *in_words(comparison, events, attribution),
         *(() if comparison.ended else contact_words(comparison, touching)),
@@ -88,6 +96,7 @@ def page(
     ]
     both = _over_time(comparison, one, two, curves, events, attribution, tip, floor)
     blocks.append(both)
+    blocks += loops(comparison, played)
     if attribution is not None:
         blocks.append(
             Section("why", "What causes it", [*_rerun(attribution), *why.causes(attribution)])
@@ -113,7 +122,7 @@ def page(
         f"{one.header.experiment}: {comparison.one.label} and {comparison.two.label}",
         _origin(comparison),
         blocks,
-        headline(comparison, events, attribution, curves),
+        also_open(headline(comparison, events, attribution, curves), played),
     )
 
 
@@ -306,11 +315,14 @@ def _models(models: Page, has_emulated: bool) -> Section:
 
 
 def _origin(comparison: Comparison) -> str:
+    one, two = comparison.one, comparison.two
     words = []
-    for side in (comparison.one, comparison.two):
+    for side in (one, two):
         seed = side.provenance.seed
         text = f"{side.label}, {milliseconds(side.timestep)}"
         words.append(text + (f", seed {seed}" if seed is not None else ""))
-    file = comparison.one.provenance.model_file
-    digest = comparison.one.provenance.model_sha256[:8]
-    return f"{file} ({digest}); {'; '.join(words)}"
+    files = dict.fromkeys(
+        f"{side.provenance.model_file} ({side.provenance.model_sha256[:8]})" for side in (one, two)
+    )
+    engine = [] if one.engine in one.label else [f"both on {one.engine}"]
+    return "; ".join([*files, *engine, *words])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..compare import Comparison, Series, series
+from ..compare import Comparison, Series, labels_of, series
 from ..comparison.text import reading
 from ..errors import BadInputError, MissingEngineError
 from ..interface import Model
@@ -17,7 +17,6 @@ from ..scenarios.runs import Progress, silent
 from ..traces import Trace
 from .film_files import SUFFIXES, write_mp4, write_webp
 from .film_overlay import Overlay, Strip
-from .plot_panels import side_labels
 
 SMALLEST = (240, 180)  # in which the strip and the text have room
 
@@ -99,7 +98,7 @@ def write_film(
     timing = timing_of(one, two, fps, slow)
     renderer = renderer_here() if renderer is None else renderer
     strip = _strip(one, two, comparison)
-    labels = [one.header.label] if two is None else side_labels(one, two)
+    labels = [one.header.label] if two is None else labels_of(one.header, two.header).long
     overlay = Overlay(size, timing, one.header.experiment, labels, strip)
     drawn = frames(
         one,

@@ -56,8 +56,10 @@ def headline(
         lead = f"{name_of(found.name)}: {found.note or of.far + ' apart'}"
     else:
         lead = f"{of.named} is up to {of.far} apart"
-        names = comparison.one.backend, comparison.two.backend
-        if names[0] != names[1]:
+        names = short_labels(comparison)
+        if names != (comparison.one.backend, comparison.two.backend):
+            lead += f" between {names[0]} and {names[1]}"
+        else:
             lead += f" on {names[0]} and {names[1]}"
         lead += f", at {short_time(of.at)}"
     return Headline(
@@ -112,15 +114,13 @@ def _spacing(comparison: Comparison) -> float | None:
 
 
 def short_labels(comparison: Comparison) -> tuple[str, str]:
-    """What the sides are called for short: their engines, or which of two of one engine."""
-    one, two = comparison.one.backend, comparison.two.backend
-    return (f"{one} (first)", f"{two} (second)") if one == two else (one, two)
+    """What the sides are called for short: their engines, or what tells two of one apart."""
+    return comparison.one.short, comparison.two.short
 
 
 def long_labels(comparison: Comparison) -> tuple[str, str]:
-    """What the sides are called: engine and version, and which of two that are alike."""
-    one, two = comparison.one.label, comparison.two.label
-    return (f"{one} (first)", f"{two} (second)") if one == two else (one, two)
+    """What the sides are called: engine and version, or what tells two of one apart."""
+    return comparison.one.label, comparison.two.label
 
 
 def window(comparison: Comparison) -> str:

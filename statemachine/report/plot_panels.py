@@ -8,7 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compare import Agreement, ChaosFloor, Comparison, Series, default_tip, series
+from ..compare import (
+    Agreement,
+    ChaosFloor,
+    Comparison,
+    Series,
+    default_tip,
+    labels_of,
+    series,
+)
 from ..compare.tolerances import COUNT
 from ..comparison import QUANTITIES
 from ..comparison.text import few, milliseconds, quantity, reading, short_time
@@ -119,7 +127,7 @@ def of_comparison(
     return Plot(
         title=one.header.experiment,
         lines=_origin(one, two),
-        labels=side_labels(one, two),
+        labels=labels_of(one.header, two.header).long,
         panels=panels,
         touches=_touches([one, two], comparison.until),
         seconds=comparison.until,
@@ -241,19 +249,6 @@ def _spans(
         if begin <= until:
             spans.append((begin, max(stop - begin, 0.0)))
     return spans
-
-
-def side_labels(one: Trace, two: Trace) -> list[str]:
-    """Names of the sides; of one engine twice, with what tells them apart."""
-    labels = [one.header.label, two.header.label]
-    if labels[0] == labels[1]:
-        labels = [f"{t.header.label}, {t.header.provenance.model_file}" for t in (one, two)]
-    if labels[0] == labels[1]:
-        labels = [
-            f"{t.header.label}, {milliseconds(t.header.timestep, 3)} ({k})"
-            for k, t in enumerate((one, two), start=1)
-        ]
-    return labels
 
 
 def _origin(*traces: Trace) -> list[str]:

@@ -20,23 +20,23 @@ PHYSICS = {
 def emulated(comparison: Comparison) -> list[Block]:
     """What of the model a backend keeps instead of its engine."""
     blocks: list[Block] = []
-    labels = set()
+    engines = set()
     for side in (comparison.one, comparison.two):
         kept = side.provenance.emulated
-        if not kept or side.defaults != "model" or side.label in labels:
+        if not kept or side.defaults != "model" or side.engine in engines:
             continue
-        labels.add(side.label)
+        engines.add(side.engine)
         moving = [PHYSICS[name] for name in kept if name in PHYSICS]
         rest = [name for name in kept if name not in PHYSICS]
         if moving:
             blocks.append(
                 Text(
-                    f"{side.label} lacks some of what the model asks for, so this library "
+                    f"{side.engine} lacks some of what the model asks for, so this library "
                     f"computes it: {listed(moving)}. The engine without that: --defaults engine."
                 )
             )
         if rest:
-            told = f"What else is kept around {side.label}"
+            told = f"What else is kept around {side.engine}"
             text = "Promises of this library, and conventions of its states and forces: "
             text += f"{'; '.join(rest)}."
             blocks.append(Section("", told, [Text(text)], folded=True, detail=True))

@@ -40,6 +40,7 @@ class Scenario:
         keyframe: Where it starts; None for the model's default state.
         options: What `Model.replace` is given.
         seeded: Whether the seed changes anything.
+        own: Whether it is the user's: the same on every robot, and it may look at the state.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Scenario:
     keyframe: str | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
     seeded: bool = False
+    own: bool = False
 
     def on(self, model: Model) -> Scenario:
         """This scenario as it is on a Model: its start, and words that are true of it.
@@ -61,7 +63,7 @@ class Scenario:
         Raises:
             BadInputError: It makes no sense on the Model; with the names of those that do.
         """
-        if is_the_arm(model) and (has_floor(model) or not self.says.count("floor")):
+        if self.own or (is_the_arm(model) and (has_floor(model) or not self.says.count("floor"))):
             return self
         try:
             says = self.elsewhere(model)

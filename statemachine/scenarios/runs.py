@@ -49,3 +49,12 @@ def steps_in(model: Model, seconds: float) -> int:
             f"at most {_STEPS_MOST:,}"
         )
     return round(steps)
+
+
+def check_length(model: Model, seconds: float) -> None:
+    """Raise BadInputError for a run that is shorter than a timestep."""
+    if 0 < seconds < model.timestep:
+        raise BadInputError(
+            f"a timestep of {model.timestep:g} s is longer than the run of {seconds:g} s; "
+            "both are in seconds"
+        )

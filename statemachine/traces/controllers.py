@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import difflib
 import importlib.util
+import inspect
 import sys
 import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError, StateMachineError
-from ..interface import Data
+from ..interface import Data, Model
+from ..interface.checks import as_vector
 from ..scenarios import Controller
+
+Function = Callable[..., Any]
 
 
 def controller_from(spec: str) -> Controller:
-    """The function that "FILE.py:NAME" says; without a name, `controller`.
+    """The function (time, data) that "FILE.py:NAME" says; without a name, `controller`.
 
     The file is run, as Python would run it. A mistake in it, then or later, becomes one
     line that says where.
@@ -23,46 +29,125 @@ def controller_from(spec: str) -> Controller:
     Raises:
         BadInputError: There is no such file or function, or the file fails.
     """
+    path, name = _place(spec, "controller")
+    function = _imported(path, name, ("time", "data"))
+
+    def controller(time: float, data: Data) -> Any:
+        with _errors_of(path, time):
+            return function(time, data)
+
+    return controller
+
+
+def is_function(spec: str) -> bool:
+    """Whether a word is FILE.py or FILE.py:NAME."""
+    return Path(_place(spec, "")[0]).suffix == ".py"
+
+
+def command_function(spec: str, every: int = 1) -> Callable[[Model], Controller]:
+    """What makes a controller of the function (model, data) that "FILE.py:NAME" says.
+
+    Each controller has the file's names to itself: it is run anew for each.
+
+    Args:
+        spec: A file and a function of it; without a name, `controller`.
+        every: The function is called at the first of so many steps, and its ctrl holds.
+
+    Raises:
+        BadInputError: There is no such file or function, or the file fails; the controller
+            raises it where the function fails, or returns what is no ctrl.
+    """
+    path, name = _place(spec, "controller")
+    _imported(path, name, ("model", "data"))  # that it fails is said before anything is loaded
+
+    def controller_of(model: Model) -> Controller:
+        function = _imported(path, name, ("model", "data"))
+        steps = 0
+
+        def controller(time: float, data: Data) -> Any:
+            nonlocal steps
+            steps += 1
+            if (steps - 1) % every:
+                return None
+            with _errors_of(path, time):
+                ctrl = function(model, data)
+            if ctrl is None:
+                return None
+            try:
+                return as_vector(ctrl, (model.nu,), "ctrl")
+            except StateMachineError as error:
+                raise BadInputError(
+                    f"what {name} of {path.name} returned at {time:.3f} s is no ctrl of "
+                    f"{model.path.name}: {error}"
+                ) from None
+
+        return controller
+
+    return controller_of
+
+
+def _place(spec: str, usual: str) -> tuple[Path, str]:
+    """The file and the name of a function."""
     file, colon, name = spec.rpartition(":")
     if not colon or name.endswith(".py") or "/" in name or "\\" in name:
-        file, name = spec, "controller"
-    path = Path(file)
+        file, name = spec, usual
+    return Path(file), name
+
+
+def _imported(path: Path, name: str, takes: tuple[str, ...]) -> Function:
+    """A function of a file, which is run for it."""
     if path.suffix != ".py" or not path.is_file():
-        raise _missing(path, spec)
+        raise _missing(path)
     module_spec = importlib.util.spec_from_file_location(f"controller_{path.stem}", path)
     if module_spec is None or module_spec.loader is None:
         raise BadInputError(f"{path.name} cannot be loaded as Python")
     module = importlib.util.module_from_spec(module_spec)
     sys.modules[module_spec.name] = module  # dataclasses look themselves up there
-    try:
+    with _errors_of(path):
         module_spec.loader.exec_module(module)
-    except Exception as error:
-        raise _failed(error, path) from error
     function = getattr(module, name, None)
+    listed = ", ".join(takes)
     if not callable(function):
-        raise BadInputError(f"{path.name} has no function {name}(time, data)")
+        functions = [key for key, value in vars(module).items() if inspect.isfunction(value)]
+        close = difflib.get_close_matches(name, functions, n=1, cutoff=0.5)
+        hint = f". Did you mean {close[0]}?" if close else ""
+        raise BadInputError(f"{path.name} has no function {name}({listed}){hint}")
+    try:
+        inspect.signature(function).bind(*takes)
+    except TypeError:
+        raise BadInputError(
+            f"{name} of {path.name} takes {inspect.signature(function)}, and is called with "
+            f"({listed})"
+        ) from None
+    except ValueError:  # something of C's without a signature
+        pass
+    return function
 
-    def controller(time: float, data: Data) -> Any:
-        try:
-            return function(time, data)
-        except StateMachineError:
-            raise
-        except Exception as error:
-            raise _failed(error, path, time) from error
 
-    return controller
-
-
-def _missing(path: Path, spec: str) -> BadInputError:
+def _missing(path: Path) -> BadInputError:
     if path.suffix != ".py":
-        return BadInputError(f"a controller is given as FILE.py or FILE.py:NAME; got {spec!r}")
+        return BadInputError(f"a controller is given as FILE.py or FILE.py:NAME; got {str(path)!r}")
     beside = [f.name for f in path.parent.glob("*.py")] if path.parent.is_dir() else []
     close = difflib.get_close_matches(path.name, beside, n=1, cutoff=0.6)
     hint = f". Did you mean {close[0]}?" if close else ""
     return BadInputError(f"there is no controller file {path}{hint}")
 
 
-def _failed(error: Exception, path: Path, time: float | None = None) -> BadInputError:
+@contextmanager
+def _errors_of(path: Path, time: float | None = None) -> Iterator[None]:
+    """Run what is in a file, its folder among those of Python; an error is one line about it."""
+    folder = str(path.parent.absolute())
+    sys.path.insert(0, folder)  # as when the file is run
+    try:
+        yield
+    except (Exception, SystemExit) as error:
+        raise _failed(error, path, time) from error
+    finally:
+        if folder in sys.path:
+            sys.path.remove(folder)
+
+
+def _failed(error: BaseException, path: Path, time: float | None = None) -> BadInputError:
     """What went wrong in the file, and at which of its lines."""
     lines = [
         frame.lineno
@@ -73,6 +158,8 @@ def _failed(error: Exception, path: Path, time: float | None = None) -> BadInput
         lines = [error.lineno]
     where = path.name + (f", line {lines[-1]}" if lines else "")
     when = "" if time is None else f", at {time:.3f} s"
+    if isinstance(error, SystemExit):
+        return BadInputError(f"{where}{when}: it ends the program (exit with {error.code!r})")
     # A SyntaxError's text names file and line once more.
     said = error.msg if isinstance(error, SyntaxError) else str(error)
     return BadInputError(f"{where}{when}: {type(error).__name__}: {said}")

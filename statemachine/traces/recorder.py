@@ -17,7 +17,7 @@ from ..interface import Array, Data, Model, State, make_data, reset, set_state, 
 from ..interface.checks import HUGE
 from ..scenarios import Controller, Scenario
 from ..scenarios.provenance import provenance
-from ..scenarios.runs import Progress, part_of, silent, steps_in
+from ..scenarios.runs import Progress, check_length, part_of, silent, steps_in
 from .derived import derived
 from .energy import energies
 from .header import Header
@@ -109,21 +109,7 @@ def record(
         timestep=model.timestep,
         substeps=model.substeps,
         gravity=tuple(model.gravity.tolist()),
-        nq=model.nq,
-        nv=model.nv,
-        nu=model.nu,
-        joints=model.joint_names,
-        sites=model.site_names,
-        bodies=model.body_names,
-        geoms=model.geom_names,
-        actuators=model.actuator_names,
-        jnt_type=tuple(int(kind) for kind in model.jnt_type),
-        jnt_qposadr=tuple(model.jnt_qposadr.tolist()),
-        jnt_dofadr=tuple(model.jnt_dofadr.tolist()),
-        geom_bodyid=tuple(model.geom_bodyid.tolist()),
-        body_parentid=tuple(model.body_parentid.tolist()),
-        actuator_jntid=tuple(model.actuator_jntid.tolist()),
-        ctrlrange=tuple(tuple(row) for row in model.actuator_ctrlrange.tolist()),
+        **layout_of(model),
         energy_by=energy_by,
         rewritten=rewritten,
         ended=ended,
@@ -164,11 +150,7 @@ def record_scenario(
     chosen = {**scenario.options, **(options or {})}
     replaced = model.replace(**chosen) if chosen else model
     seconds = scenario.seconds if seconds is None else seconds
-    if 0 < seconds < replaced.timestep:
-        raise BadInputError(
-            f"a timestep of {replaced.timestep:g} s is longer than the run of {seconds:g} s; "
-            "both are in seconds"
-        )
+    check_length(replaced, seconds)
     trace = record(
         replaced,
         scenario.controller(replaced, seed),
@@ -243,6 +225,27 @@ def play(
     if played.header.rewritten:
         raise _not_repeated(played.header.rewritten)
     return played
+
+
+def layout_of(model: Model) -> dict[str, Any]:
+    """What a header says of a model: lengths, names, and where everything is."""
+    return {
+        "nq": model.nq,
+        "nv": model.nv,
+        "nu": model.nu,
+        "joints": model.joint_names,
+        "sites": model.site_names,
+        "bodies": model.body_names,
+        "geoms": model.geom_names,
+        "actuators": model.actuator_names,
+        "jnt_type": tuple(int(kind) for kind in model.jnt_type),
+        "jnt_qposadr": tuple(model.jnt_qposadr.tolist()),
+        "jnt_dofadr": tuple(model.jnt_dofadr.tolist()),
+        "geom_bodyid": tuple(model.geom_bodyid.tolist()),
+        "body_parentid": tuple(model.body_parentid.tolist()),
+        "actuator_jntid": tuple(model.actuator_jntid.tolist()),
+        "ctrlrange": tuple(tuple(row) for row in model.actuator_ctrlrange.tolist()),
+    }
 
 
 def _not_repeated(rows: int) -> EngineError:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...compare import labels_of
 from ...drawing import Drawing
 from ...drawing.camera import Camera
 from ...interface import Array
@@ -94,7 +95,7 @@ def scene_of(
     if frames.between:
         notes.append(
             f"The timesteps differ: for the picture alone, and for no figure, poses of "
-            f"{two.header.label} are taken between two of its rows."
+            f"{labels_of(one.header, two.header).long[1]} are taken between two of its rows."
         )
     if frames.left_out:
         notes.append(f"{frames.left_out} of the compared moments are not shown, for their number.")
@@ -168,6 +169,7 @@ def _drawings(
     """A drawing for each side, of sticks where there is none better."""
     notes: list[str] = []
     found: list[Drawing] = []
+    labels = labels_of(*(trace.header for trace in traces)).long
     for k, (trace, look) in enumerate(zip(traces, looks, strict=True)):
         if look.drawing is not None:
             found.append(look.drawing)
@@ -179,7 +181,7 @@ def _drawings(
             found.append(found[0])
             continue
         notes.append(
-            f"The shapes of {trace.header.label} cannot be had ({look.why_not}): sticks join its "
+            f"The shapes of {labels[k]} cannot be had ({look.why_not}): sticks join its "
             "bodies instead."
         )
         found.append(bones_of(trace))

@@ -1,0 +1,87 @@
+"""Runs of two models in each other's terms: names of joints, order of commands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from ..interface import Array, Model
+from ..traces import Header, Trace
+from ..traces.recorder import layout_of
+from .matching import Matched, Pairs
+
+
+def told_alike(one: Trace, two: Trace, matched: Matched) -> tuple[Trace, Trace]:
+    """Both runs with the names of the first; commands in its order where both have all of them.
+
+    What a joint, body or site of the first is called, its counterpart is called too. One
+    without a counterpart whose name is taken is "NAME (right)".
+
+    Args:
+        one: A run of the first Model.
+        two: A run of the second.
+        matched: Which is which.
+    """
+    a, b = one.header, two.header
+    joints, bodies = a.joint_labels, a.body_labels
+    renamed: dict[str, Any] = {
+        "joints": _renamed(joints, b.joint_labels, matched.joints),
+        "bodies": _renamed(bodies, b.body_labels, matched.bodies),
+        "sites": _renamed(a.sites, b.sites, matched.sites),
+        "actuators": _renamed(a.actuators, b.actuators, matched.actuators),
+    }
+    columns = dict(two.columns)
+    order = [there for _, there in matched.actuators]
+    if len(order) == a.nu == b.nu:
+        columns["ctrl"] = columns["ctrl"][:, order]
+        for name, values in (
+            ("actuators", renamed["actuators"]),
+            ("actuator_jntid", b.actuator_jntid),
+            ("ctrlrange", b.ctrlrange),
+        ):
+            renamed[name] = tuple(values[there] for there in order)
+    first = Trace(replace(a, joints=joints, bodies=bodies), one.columns)
+    return first, Trace(replace(b, **renamed), columns)
+
+
+def translated(trace: Trace, matched: Matched, start: tuple[Array, Array, Array]) -> Trace:
+    """The start and the commands of a run of the first Model, as the second takes them.
+
+    Args:
+        trace: The run.
+        matched: Which is which.
+        start: Qpos (nq,), qvel (nv,) and ctrl (nu,) of the second, for what the first has no
+            counterpart of.
+    """
+    qpos, qvel, ctrl = start
+    return replace_layout(
+        trace,
+        matched.two,
+        matched.qpos(trace.qpos, qpos),
+        matched.qvel(trace.qvel, qvel),
+        matched.ctrl(trace.ctrl, ctrl),
+    )
+
+
+def replace_layout(trace: Trace, model: Model, qpos: Array, qvel: Array, ctrl: Array) -> Trace:
+    """A run as if it were one of another Model: states and commands, and nothing derived."""
+    header: Header = replace(trace.header, **layout_of(model))
+    return Trace(header, {"time": trace.time, "qpos": qpos, "qvel": qvel, "ctrl": ctrl})
+
+
+def with_bodies_of(trace: Trace, model: Model) -> Trace:
+    """A run whose bodies go by the names that its own Model has, for what is drawn with that."""
+    return Trace(replace(trace.header, bodies=model.body_names), trace.columns)
+
+
+def _renamed(ours: Sequence[str], theirs: Sequence[str], pairs: Pairs) -> tuple[str, ...]:
+    """The names of the second, those of the first for what both have."""
+    names = list(theirs)
+    taken = {ours[one] for one, _ in pairs if ours[one]}
+    for k, name in enumerate(names):
+        if name in taken:
+            names[k] = f"{name} (right)"
+    for one, two in pairs:
+        names[two] = ours[one]
+    return tuple(names)

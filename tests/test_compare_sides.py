@@ -1,0 +1,518 @@
+"""Two sides, freely chosen: files, engines, options; what is run, and what they are called."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.compare import (
+    Request,
+    Side,
+    compare,
+    labels_of,
+    parse_sides,
+    run_sides,
+    split_words,
+)
+from statemachine.errors import BadInputError, StateMachineError, TraceError, UnknownNameError
+from statemachine.report import compare as report
+from statemachine.report import terminal
+from statemachine.traces import record, write
+from statemachine.traces.controllers import command_function, controller_from
+
+from .conftest import Cli, need_engine
+
+# Two hinges one after the other, each with a servo, and a tip; one link may be heavier.
+_ARM = """<mujoco><option timestep="0.002"/><worldbody>
+<geom name="floor" type="plane" size="2 2 .1" contype="0" conaffinity="0"/>
+<body name="upper" pos="0 0 1"><joint name="shoulder" axis="0 1 0" range="-2 2" damping=".3"/>
+<geom type="capsule" fromto="0 0 0 .3 0 0" size=".03" mass=".5"/>
+<body name="fore" pos=".3 0 0"><joint name="elbow" axis="0 1 0" range="-2 2" damping=".2"/>
+<geom type="capsule" fromto="0 0 0 .2 0 0" size=".02" mass="{mass}"/>
+<site name="gripperframe" pos=".2 0 0"/></body></body></worldbody><actuator>{drives}</actuator>
+<keyframe>{keys}</keyframe></mujoco>"""
+_DRIVES = [
+    f'<position name="{name}" joint="{name}" kp="{kp}" ctrlrange="-2 2"/>'
+    for name, kp in (("shoulder", 20), ("elbow", 10))
+]
+_BENT = '<key name="bent" qpos="{qpos}" ctrl=".3 -.4"/>'
+_FUNCTION = """
+calls = 0
+
+def hold(model, data):
+    import numpy as np
+    global calls
+    calls += 1
+    ctrl = np.zeros(model.nu)
+    ctrl[model.actuator_id("shoulder")] = 0.4
+    return ctrl
+
+def feedback(model, data):
+    ctrl = data.ctrl.copy()
+    elbow = model.jnt_qposadr[model.joint_id("elbow")]
+    ctrl[model.actuator_id("shoulder")] = 0.4 - 0.5 * data.qpos[elbow]
+    return ctrl
+
+def counted(model, data):
+    global calls
+    calls += 1
+    return [0.001 * calls, 0]
+
+def helped(model, data):
+    from helper_of_two_sides import WANTED
+    return WANTED
+
+def fails(model, data):
+    return 1 / 0
+
+def short(model, data):
+    return [1.0]
+
+def name(model, data):
+    model.joint_id("elbw")
+
+def one(model):
+    pass
+
+def leaves(model, data):
+    return None
+
+def ends(model, data):
+    raise SystemExit(3)
+"""
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    """A folder with an arm in several forms, and the user's functions."""
+    keys = _BENT.format(qpos=".2 -.3")
+    arm = _ARM.format(mass="0.2", drives="".join(_DRIVES), keys=keys)
+    (tmp_path / "arm.xml").write_text(arm)
+    (tmp_path / "heavy.xml").write_text(_ARM.format(mass="0.4", drives="".join(_DRIVES), keys=keys))
+    (tmp_path / "keyless.xml").write_text(_ARM.format(mass="0.2", drives="".join(_DRIVES), keys=""))
+    turned = _ARM.format(mass="0.2", drives="".join(reversed(_DRIVES)), keys="")
+    (tmp_path / "turned.xml").write_text(turned)
+    renamed = arm.replace("elbow", "Gelenk_2").replace("shoulder", "Gelenk_1")
+    (tmp_path / "renamed.xml").write_text(renamed)
+    for folder in ("old", "new"):
+        (tmp_path / folder / "robot").mkdir(parents=True)
+        (tmp_path / folder / "robot" / "arm.xml").write_text(
+            arm if folder == "old" else arm.replace('damping=".3"', 'damping=".2"')
+        )
+    (tmp_path / "own.py").write_text(_FUNCTION)
+    (tmp_path / "helper_of_two_sides.py").write_text("WANTED = [0.2, 0.1]\n")
+    return tmp_path
+
+
+def asked(what: str, left: Side, right: Side, **others: Any) -> Request:
+    return Request((what,), sides=(left, right), seconds=others.pop("seconds", 0.4), **others)
+
+
+def largest(found: Any) -> float:
+    return max(each.max for each in found.agreements)
+
+
+# What a side is.
+
+
+def test_a_side_is_read_as_it_is_typed(files: Path) -> None:
+    arm = str(files / "arm.xml")
+    sides = parse_sides(
+        [arm, f"{arm}@mujoco timestep=0.001 contacts=off", "so101@mujoco:engine", "gravity=0,0,-1"]
+    )
+    assert [side.engine for side in sides] == ["mujoco"] * 3
+    assert [side.defaults for side in sides] == ["model", "model", "engine"]
+    assert [dict(side.options) for side in sides] == [
+        {},
+        {"timestep": 0.001, "contacts": False},
+        {"gravity": [0.0, 0.0, -1.0]},
+    ]
+    assert sides[1].label == "arm.xml@mujoco timestep=0.001 contacts=off"
+    model = sides[1].load()
+    assert model.timestep == 0.001
+    assert parse_sides(["so101 substeps=2 integrator=euler"])[0].load().substeps == 2
+
+
+def test_a_file_whose_name_looks_like_more_is_a_file(files: Path) -> None:
+    odd = files / "a b@mujoco timestep=1.xml"
+    odd.write_text((files / "arm.xml").read_text())
+    (side,) = parse_sides([str(odd)])
+    assert (side.file, side.engine, dict(side.options)) == (str(odd), "mujoco", {})
+    spaced = files / "my arm.xml"
+    spaced.write_text((files / "arm.xml").read_text())
+    (side,) = parse_sides([f"{spaced} timestep=0.001"])
+    assert (side.file, dict(side.options)) == (str(spaced), {"timestep": 0.001})
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["so101@mujco"], "no engine named 'mujco'.*Did you mean 'mujoco'"),
+        (["so101", "timstep=1"], "no option named 'timstep'.*Did you mean 'timestep'"),
+        (["timestep=1", "so101"], "timestep=1 stands before any side"),
+        (["so101", "timestep="], "timestep= has no value"),
+        (["so101", "timestep=fast"], "timestep=fast is no value"),
+        (["so101 timestep=1", "timestep=2"], "timestep is given twice"),
+        (["so101@pybullet:users"], "'users'; known: engine"),
+        (["no/such.xml"], "no/such.xml does not exist"),
+        (["sO101"], "Did you mean 'so101"),
+    ],
+)
+def test_what_is_no_side_is_said_in_one_line(words: list[str], says: str) -> None:
+    with pytest.raises(StateMachineError, match=says) as caught:
+        parse_sides(words)
+    assert "\n" not in str(caught.value)
+
+
+# The four combinations.
+
+
+def test_identical_sides_differ_by_nothing_at_all(files: Path) -> None:
+    for engine in ("mujoco", "pybullet"):
+        need_engine(engine)
+        side = Side(str(files / "arm.xml"), engine)
+        run = run_sides(asked("hold", side, side))
+        found = compare(run.left, run.right)
+        assert largest(found) == 0
+        assert (run.commands, run.is_apart, run.unmatched) == ("the same", False, ())
+        assert (found.one.short, found.two.short) == (f"{engine} (first)", f"{engine} (second)")
+
+
+def test_two_files_on_one_engine(files: Path) -> None:
+    run = run_sides(asked("hold", Side(str(files / "arm.xml")), Side(str(files / "heavy.xml"))))
+    found = compare(run.left, run.right)
+    assert (found.one.label, found.two.label) == ("arm.xml", "heavy.xml")
+    assert largest(found) > 0.01
+    assert run.commands == "the same"  # the left's, told to both
+
+
+def test_one_file_with_two_sets_of_options(files: Path) -> None:
+    arm = str(files / "arm.xml")
+    sides = Side(arm, options={"damping": 0.3}), Side(arm, options={"damping": 0.1})
+    run = run_sides(asked("hold", *sides))
+    found = compare(run.left, run.right)
+    assert (found.one.label, found.two.label) == ("damping=0.3", "damping=0.1")
+    assert largest(found) > 0.01
+    # What only one says is told of the other, too, where that is known.
+    run = run_sides(asked("hold", Side(arm), Side(arm, options={"timestep": 0.001})))
+    assert labels_of(run.left.header, run.right.header).short == (
+        "timestep=0.002",
+        "timestep=0.001",
+    )
+
+
+def test_one_file_on_two_engines(files: Path) -> None:
+    need_engine("pybullet")
+    arm = str(files / "arm.xml")
+    run = run_sides(asked("hold", Side(arm), Side(arm, "pybullet")))
+    found = compare(run.left, run.right)
+    assert found.agrees
+    assert (found.one.short, found.two.short) == ("mujoco", "pybullet")
+    as_it_comes = run_sides(
+        asked("hold", Side(arm, options={"timestep": 1 / 240}), Side(arm, "pybullet", "engine"))
+    )
+    assert not compare(as_it_comes.left, as_it_comes.right).agrees
+    assert as_it_comes.right.header.label.endswith("engine defaults")
+
+
+def test_two_files_on_two_engines(files: Path) -> None:
+    need_engine("pybullet")
+    sides = Side(str(files / "arm.xml")), Side(str(files / "heavy.xml"), "pybullet")
+    run = run_sides(asked("hold", *sides))
+    found = compare(run.left, run.right)
+    assert found.one.label.startswith("mujoco ")
+    assert found.one.label.endswith(", arm.xml")
+    assert found.two.label.endswith(", heavy.xml")
+    same = run_sides(asked("hold", Side(str(files / "heavy.xml")), sides[1]))
+    assert compare(same.left, same.right).agrees
+    assert not found.agrees
+
+
+def test_an_mjcf_against_its_own_urdf() -> None:
+    root = Path(sm.__file__).parent.parent / "models"
+    if not root.is_dir():
+        pytest.skip("no checkout")
+    request = asked("fall", Side("so101"), Side(str(root / "so101" / "so101.urdf")))
+    run = run_sides(request)
+    names = {each.name for each in compare(run.left, run.right).agreements}
+    assert {"shoulder_pan", "elbow_flex", "gripper", "energy"} <= names
+    (line,) = run.unmatched
+    assert line.startswith("only so101.xml has actuator shoulder_pan")
+
+
+def test_the_shortest_path_that_tells_two_files_apart(files: Path) -> None:
+    sides = [Side(str(files / name / "robot" / "arm.xml")) for name in ("old", "new")]
+    run = run_sides(asked("hold", *sides))
+    assert labels_of(run.left.header, run.right.header).short == (
+        "old/robot/arm.xml",
+        "new/robot/arm.xml",
+    )
+
+
+# Joints and commands by name, by structure, by a map.
+
+
+def test_permuted_joints_and_actuators_are_the_same_robot(files: Path) -> None:
+    run = run_sides(asked("hold", Side(str(files / "arm.xml")), Side(str(files / "turned.xml"))))
+    assert run.right.header.actuators == ("shoulder", "elbow")
+    found = compare(run.left, run.right)
+    assert largest(found) < 1e-12
+    assert not [note for note in found.notes if "actuators" in note or "commands" in note]
+    back = run_sides(asked("hold", Side(str(files / "turned.xml")), Side(str(files / "arm.xml"))))
+    assert largest(compare(back.left, back.right)) < 1e-12
+
+
+def test_renamed_joints_are_matched_by_place_and_by_a_map(files: Path) -> None:
+    sides = Side(str(files / "arm.xml")), Side(str(files / "renamed.xml"))
+    names = {"shoulder": "Gelenk_1", "elbow": "Gelenk_2"}
+    for given in ({}, names):
+        run = run_sides(asked("hold", *sides, names=given))
+        found = compare(run.left, run.right)
+        assert largest(found) == 0
+        assert {"shoulder", "elbow"} <= {each.name for each in found.agreements}
+        assert bool(run.unmatched) == (not given)  # a guess is said
+    # A map that says otherwise is followed: the elbow is then held against the shoulder.
+    with pytest.raises(UnknownNameError, match="Gelenk_3"):
+        run_sides(asked("hold", *sides, names={"elbow": "Gelenk_3"}))
+
+
+def test_what_cannot_be_matched_is_said_first(
+    files: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    extra = (files / "arm.xml").read_text()
+    extra = extra.replace(
+        "</worldbody>",
+        '<body name="ball" pos="1 0 1"><freejoint name="ball"/><geom size=".1"/></body>'
+        "</worldbody>",
+    ).replace('qpos=".2 -.3"', 'qpos=".2 -.3 1 0 1 1 0 0 0"')
+    (files / "more.xml").write_text(extra)
+    run = run_sides(asked("hold", Side(str(files / "arm.xml")), Side(str(files / "more.xml"))))
+    assert run.unmatched == ("only more.xml has joint ball: not compared",)
+    found = compare(run.left, run.right)
+    page = report.page(found, run.left, run.right, run=run)
+    terminal.show(page)
+    out = " ".join(capsys.readouterr().out.split())
+    assert out.index("Only more.xml has joint ball") < out.index("position servo")
+    assert {each.max for each in found.agreements if each.name in ("shoulder", "elbow")} == {0.0}
+
+
+def test_robots_that_share_nothing_are_refused(files: Path) -> None:
+    (files / "ball.xml").write_text(
+        '<mujoco><worldbody><body name="b" pos="0 0 1"><freejoint/><geom size=".1"/></body>'
+        "</worldbody></mujoco>"
+    )
+    with pytest.raises(TraceError, match=r"no joint in common.*--map LEFT=RIGHT"):
+        run_sides(asked("gravity", Side(str(files / "arm.xml")), Side(str(files / "ball.xml"))))
+
+
+# What is run.
+
+
+def test_a_function_sees_its_own_side(files: Path) -> None:
+    what = f"{files / 'own.py'}:hold"
+    run = run_sides(asked(what, Side(str(files / "arm.xml")), Side(str(files / "turned.xml"))))
+    assert run.left.ctrl[0].tolist() == [0.4, 0.0]
+    assert largest(compare(run.left, run.right)) < 1e-12
+    assert run.left.header.experiment == "own.py:hold"
+    assert run.commands == "the same"
+
+
+def test_a_function_is_asked_every_so_many_steps_and_starts_anew_on_each_side(files: Path) -> None:
+    what, arm = f"{files / 'own.py'}:counted", Side(str(files / "arm.xml"))
+    run = run_sides(asked(what, arm, arm, seconds=0.04, every=5))
+    assert run.left.ctrl[:, 0] == pytest.approx(0.001 * (1 + np.arange(21) // 5))
+    assert np.array_equal(run.left.ctrl, run.right.ctrl)
+
+
+def test_a_function_starts_at_a_keyframe_and_the_right_without_it_where_the_left_does(
+    files: Path,
+) -> None:
+    what = f"{files / 'own.py'}:leaves"
+    sides = Side(str(files / "arm.xml")), Side(str(files / "keyless.xml"))
+    run = run_sides(asked(what, *sides, keyframe="bent"))
+    assert run.left.qpos[0].tolist() == run.right.qpos[0].tolist() == [0.2, -0.3]
+    assert run.right.ctrl[0].tolist() == [0.3, -0.4]
+    assert largest(compare(run.left, run.right)) == 0
+    assert any("no keyframe 'bent'" in line for line in run.said)
+    with pytest.raises(UnknownNameError, match="no keyframe named 'home'"):
+        run_sides(asked(what, *sides, keyframe="home"))
+
+
+def test_a_function_imports_what_lies_beside_it(files: Path) -> None:
+    arm = Side(str(files / "arm.xml"))
+    run = run_sides(asked(f"{files / 'own.py'}:helped", arm, arm, seconds=0.01))
+    assert run.left.ctrl[0].tolist() == [0.2, 0.1]
+    (files / "beside.py").write_text(
+        "from helper_of_two_sides import WANTED\ndef controller(time, data): return WANTED\n"
+    )
+    assert controller_from(f"{files / 'beside.py'}")(0.0, None) == [0.2, 0.1]  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("fails", r"own.py, line \d+, at 0.000 s: ZeroDivisionError: division by zero"),
+        ("short", "what short of own.py returned at 0.000 s is no ctrl of arm.xml.*2 numbers"),
+        ("name", r"own.py, line \d+, at 0.000 s: UnknownNameError.*Did you mean 'elbow'"),
+        ("one", r"one of own.py takes \(model\), and is called with \(model, data\)"),
+        ("hodl", r"no function hodl\(model, data\). Did you mean hold\?"),
+        ("ends", "own.py, line .*ends the program"),
+    ],
+)
+def test_a_mistake_in_a_function_is_one_line_about_it(files: Path, name: str, says: str) -> None:
+    arm = Side(str(files / "arm.xml"))
+    with pytest.raises(BadInputError, match=says) as caught:
+        run_sides(asked(f"{files / 'own.py'}:{name}", arm, arm))
+    assert "\n" not in str(caught.value)
+    with pytest.raises(BadInputError, match=r"no controller file.*Did you mean own.py"):
+        command_function(str(files / "owm.py:hold"))
+
+
+# Closed loop and open loop.
+
+
+def test_feedback_and_the_machine_are_told_apart(files: Path) -> None:
+    sides = Side(str(files / "arm.xml")), Side(str(files / "heavy.xml"))
+    run = run_sides(asked(f"{files / 'own.py'}:feedback", *sides))
+    assert run.commands == "its own"
+    assert np.array_equal(run.played.ctrl, run.left.ctrl)
+    assert not np.array_equal(run.right.ctrl, run.left.ctrl)
+    closed, opened = compare(run.left, run.right), compare(run.left, run.played)
+    assert largest(opened) > 0.01
+    assert largest(opened) != largest(closed)
+    assert any("commands differ" in note for note in closed.notes)
+    assert not any("commands differ" in note for note in opened.notes)
+
+
+def test_feedback_that_makes_the_difference_and_a_machine_that_is_the_same(files: Path) -> None:
+    """The function looks at who it drives: in open loop nothing differs."""
+    (files / "two.py").write_text(
+        "def f(model, data):\n    return [0.5 if 'keyless' in model.path.name else 0.2, 0]\n"
+    )
+    sides = Side(str(files / "arm.xml")), Side(str(files / "keyless.xml"))
+    run = run_sides(asked(f"{files / 'two.py'}:f", *sides))
+    closed, opened = compare(run.left, run.right), compare(run.left, run.played)
+    assert not closed.agrees
+    assert largest(opened) == 0
+    page = report.page(closed, run.left, run.right, run=run, played=opened)
+    assert page.headline is not None
+    assert "in open loop, with the left's commands on both, they agree" in page.headline.lead
+    assert not page.holds
+
+
+def test_the_commands_of_the_left_are_played_by_name(files: Path) -> None:
+    sides = Side(str(files / "arm.xml")), Side(str(files / "turned.xml"))
+    (files / "two.py").write_text(
+        "def f(model, data):\n    return [0.2, 0.1]\n"  # by place: another robot is told another
+    )
+    run = run_sides(asked(f"{files / 'two.py'}:f", *sides))
+    assert run.commands == "its own"
+    assert largest(compare(run.left, run.played)) < 1e-12
+    assert largest(compare(run.left, run.right)) > 0.01
+
+
+def test_a_recorded_run_is_played_on_both(files: Path) -> None:
+    model = sm.load(files / "arm.xml")
+    ctrl = [0.3, -0.2]
+    path = write(record(model, lambda time, data: ctrl, 0.2, qpos=[0.1, 0.2]), files / "run.npz")
+    sides = Side(str(files / "turned.xml")), Side(str(files / "heavy.xml"))
+    run = run_sides(Request((str(path),), sides=sides))
+    assert run.commands == "recorded"
+    for trace in (run.left, run.right):
+        joints = trace.header.joints
+        assert trace.qpos[0, joints.index("shoulder")] == 0.1
+        told = dict(zip(trace.header.actuators, trace.ctrl[0], strict=True))
+        assert told == {"shoulder": 0.3, "elbow": -0.2}
+    same = run_sides(Request((str(path),), sides=(Side(str(files / "arm.xml")),) * 2))
+    assert largest(compare(same.left, same.right)) == 0
+    with pytest.raises(BadInputError, match="--seconds is of a run"):
+        run_sides(Request((str(path),), sides=sides, seconds=1.0))
+
+
+# The words.
+
+
+def test_words_are_sorted_into_what_and_sides() -> None:
+    assert split_words(["hold"]) == (("hold",), ())
+    assert split_words(["a.npz", "b.npz"]) == (("a.npz", "b.npz"), ())
+    what, sides = split_words(["a.npz", "so101", "timestep=0.001", "so101@mujoco:engine"])
+    assert what == ("a.npz",)
+    assert [dict(side.options) for side in sides] == [{"timestep": 0.001}, {}]
+    assert split_words(["x.py:f", "so101", "so101"])[0] == ("x.py:f",)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("hold", "so101"), "name the other, as in: statemachine compare hold so101"),
+        (("x.py:f",), "runs on two sides, as in: statemachine compare x.py:f so101@mujoco so101@"),
+        (("hold", "so101", "so101", "so101"), "3 sides"),
+        (("arm.xml", "heavy.xml"), "statemachine compare hold arm.xml heavy.xml runs"),
+        (("arm.xml", "heavy.xml"), "statemachine compare --models arm.xml heavy.xml lists"),
+        (("so101", "so101/scene"), "two sides need something to do first"),
+        (("hold", "so101", "so101", "--model", "so101"), "--model goes without sides"),
+        (("hold", "so101", "so101", "--backends", "mujoco", "mujoco"), "FILE@ENGINE"),
+        (("hold", "so101", "so101", "--defaults", "engine"), "FILE@ENGINE:engine"),
+        (("hold", "--model", "a.xml", "--model", "b.xml"), "compare hold a.xml b.xml"),
+        (("hold", "--map", "a=b"), "--map is of two sides"),
+        (("hold", "--every", "2"), "--every goes with FILE.py:FUNCTION"),
+        (("hold", "so101", "so101", "--keyframe", "x"), "--keyframe goes with FILE.py:FUNCTION"),
+        (("own.py:hold", "arm.xml", "arm.xml", "--every", "0"), "at least 1; got 0"),
+    ],
+)
+def test_mistakes_say_what_to_type(
+    words: tuple[str, ...], says: str, files: Path, cli: Cli
+) -> None:
+    done = cli("compare", *words)
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert says in line
+    assert not done.stdout
+
+
+def test_the_command_shows_both_loops(files: Path, cli: Cli) -> None:
+    words = ("own.py:feedback", "--every", "2", "arm.xml", "heavy.xml", "--seconds", "0.4")
+    done = cli("compare", *words)
+    assert (done.returncode, done.stderr) == (1, "")
+    text = " ".join(done.stdout.split())
+    assert "Closed loop: each side computes its commands from its own state" in text
+    assert "arm.xml against heavy.xml" in text
+    assert "mujoco against" not in text
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    result = json.loads(cli("compare", *words, "--json").stdout)
+    assert [side["file"] for side in result["sides"]] == ["arm.xml", "heavy.xml"]
+    assert result["commands"] == "its own"
+    assert result["open_loop"]["agreements"] != result["comparison"]["agreements"]
+    assert result["comparison"]["one"]["short"] == "arm.xml"
+    same = cli("compare", "hold", "arm.xml", "arm.xml", "--seconds", "0.2")
+    assert same.returncode == 0
+    assert "no command depends on the state" in " ".join(same.stdout.split())
+
+
+@pytest.mark.slow
+def test_pages_and_pictures_name_the_sides(files: Path, cli: Cli) -> None:
+    out = files / "page.html"
+    words = ("compare", "hold", "arm.xml", "more.xml", "--seconds", "0.2", "--no-why")
+    (files / "more.xml").write_text(
+        (files / "heavy.xml")
+        .read_text()
+        .replace("<keyframe>", "<!--")
+        .replace("</keyframe>", "-->")
+        .replace(
+            "</worldbody>",
+            '<body name="ball" pos="1 0 1"><freejoint/><geom size=".1"/></body></worldbody>',
+        )
+    )
+    done = cli(*words, "--html", out)
+    assert done.returncode == 1, done.stderr
+    page = out.read_text()
+    assert "Only more.xml has" in page
+    assert "other bodies" not in page
+    done = cli(*words[:-1], "--plot", files / "a.svg")
+    assert done.returncode == 1, done.stderr
+    assert "more.xml" in (files / "a.svg").read_text()
