@@ -11,7 +11,7 @@ import statemachine as sm
 from statemachine.compare import TimestepConvergence, convergence
 from statemachine.errors import EndedEarlyError
 from statemachine.report.convergence import page
-from statemachine.traces import record
+from statemachine.traces import Trace, record
 
 from .conftest import Cli, need_engine
 
@@ -30,10 +30,17 @@ def found_of(folder: Path, *changes: dict[str, str], seconds: float = 1.0) -> Ti
         file.write_text(FALL.format(**{**usual, **change}))
         models.append(sm.load(file))
 
-    def run(finer: int):
-        return tuple(record(model.replace(substeps=finer), None, seconds) for model in models)
+    def run(finer: int) -> tuple[Trace, Trace]:
+        one, two = (record(model.replace(substeps=finer), None, seconds) for model in models)
+        return one, two
 
     return convergence(run)
+
+
+def headline(found: TimestepConvergence) -> str:
+    told = page(found, "fall").headline
+    assert told is not None
+    return told.text
 
 
 def test_explicit_against_implicit_damping_is_discretisation(tmp_path: Path) -> None:
@@ -47,7 +54,7 @@ def test_explicit_against_implicit_damping_is_discretisation(tmp_path: Path) -> 
     assert joint.left[0] + joint.right[0] > joint.gaps[0] - joint.gaps[2]
     assert found.vanishes
     assert page(found, "fall").holds
-    assert "it is discretisation" in page(found, "fall").headline.text
+    assert "it is discretisation" in headline(found)
 
 
 def test_another_order_of_integration_is_discretisation(tmp_path: Path) -> None:
@@ -61,7 +68,7 @@ def test_a_changed_mass_stays(tmp_path: Path) -> None:
     assert not found.vanishes
     shown = page(found, "fall")
     assert not shown.holds
-    assert "does not vanish with the timestep" in shown.headline.text
+    assert "does not vanish with the timestep" in headline(found)
 
 
 def test_what_is_both_is_so_in_part(tmp_path: Path) -> None:
@@ -76,7 +83,7 @@ def test_one_side_twice_has_no_gap(tmp_path: Path) -> None:
     found = found_of(tmp_path, {}, {})
     assert {each.verdict for each in found.whole} == {"rounding"}
     assert found.before == found.whole
-    assert "no gap" in page(found, "fall").headline.text
+    assert "no gap" in headline(found)
 
 
 def test_a_touch_parts_what_can_be_said(tmp_path: Path) -> None:
@@ -93,7 +100,7 @@ def test_a_run_that_ends_early_is_no_limit(tmp_path: Path) -> None:
     file.write_text(FALL.format(integrator="Euler", flag="", mass="0.1", height="1", touch=""))
     model = sm.load(file)
 
-    def run(finer: int):
+    def run(finer: int) -> tuple[Trace, Trace]:
         trace = record(model.replace(substeps=finer), None, 0.1)
         object.__setattr__(trace.header, "ended", "it left every bound")
         return trace, trace

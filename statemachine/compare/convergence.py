@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..comparison import common_moments
 from ..errors import EndedEarlyError
-from ..interface import Array
+from ..interface import Array, Ints
 from ..scenarios.runs import Progress, silent
 from ..traces import Trace
 from .labels import labels_of
@@ -152,7 +153,7 @@ class _Curves:
             for side, rows in ((0, common.one), (1, common.two))
         ]
 
-    def limits(self, chosen: Array) -> tuple[QuantityLimit, ...]:
+    def limits(self, chosen: NDArray[np.bool_]) -> tuple[QuantityLimit, ...]:
         """Each quantity that every pair has, at some of the moments (n,)."""
         found = []
         for curve in self._first:
@@ -182,7 +183,7 @@ class _Curves:
         return tuple(found)
 
 
-def _gaps(curves: list[Series], rows: Array | None) -> dict[str, Array]:
+def _gaps(curves: list[Series], rows: Ints | None) -> dict[str, Array]:
     return {
         curve.name: curve.difference if rows is None else curve.difference[rows] for curve in curves
     }
