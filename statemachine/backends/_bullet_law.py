@@ -212,13 +212,19 @@ class Law:
             friction = moved
             solve = dense.dot(change, change) > self._steady
         if solve:
-            friction, limit = self._constrained(explicit, others, x, friction, hit)
+            friction, limit = self._constrained(explicit, others, q, speed, friction, hit)
             others = others + limit
         acceleration = dense.solved(implicit, others + friction)
         return Solution(q, v, speed, bias, mass, actuator, passive, friction, limit, acceleration)
 
     def _constrained(
-        self, factor: Array, others: Array, x: Array, friction: Array, hit: list[int]
+        self,
+        factor: Array,
+        others: Array,
+        q: Sequence[float],
+        speed: Array,
+        friction: Array,
+        hit: list[int],
     ) -> tuple[Array, Array]:
         """Friction and limit force, by pivoting between free and bounded rows.
 
@@ -228,10 +234,10 @@ class Law:
         n, rubs, rubbing = len(friction), self._rubs, len(self._rubs)
         at, rows = rubs, np.empty((5, rubbing + len(hit)))
         rows[:, :rubbing] = self._rub_rows
-        rows[2, :rubbing] *= x[n:-1][rubs]
+        rows[2, :rubbing] *= speed[rubs]
         if hit:
             at = np.array([*rubs, *hit])
-            rows[:, rubbing:] = np.array([self._stop(i, *x[[i, n + i]].tolist()) for i in hit]).T
+            rows[:, rubbing:] = np.array([self._stop(i, q[i], float(speed[i])) for i in hit]).T
         sign, soft, goal, least, most = rows
         matrix = dense.inverse_rows(factor, at)[:, at] * sign[:, None] * sign
         matrix.flat[:: len(at) + 1] += soft
@@ -266,6 +272,8 @@ def _pivoted(matrix: Array, right: Array, least: Array, most: Array, start: Arra
     for _ in range(_PIVOTS):
         if free.all():
             force = dense.solved(dense.factored(matrix.copy()), right)
+            if ((least <= force) & (force <= most)).all():
+                return force
         else:
             inside, held = free.nonzero()[0], (~free).nonzero()[0]
             rows = inside[:, None]

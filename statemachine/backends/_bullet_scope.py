@@ -137,7 +137,7 @@ def softness(plan: Plan) -> str:
     raw = plan.raw
     touching = (raw.geom_contype | raw.geom_conaffinity).astype(bool)
     own = (raw.geom_solref != _SOLREF).any(axis=1) | (raw.geom_solimp != _SOLIMP).any(axis=1)
-    geoms = np.flatnonzero(own & touching) if plan.surfaces.solids else []
+    geoms = np.flatnonzero(own & touching).tolist() if plan.surfaces.solids else []
     named = [str(_name(raw, "geom", geom)) for geom in geoms]
     rest = f", and {len(named) - 3} more" if len(named) > 3 else ""
     return ", ".join(named[:3]) + rest

@@ -85,9 +85,7 @@ _AS_IT_COMES = {
 }
 
 
-def _capabilities(
-    as_it_comes: bool, max_qvel: Array | None = None, soft: str = ""
-) -> Capabilities:
+def _capabilities(as_it_comes: bool, max_qvel: Array | None = None, soft: str = "") -> Capabilities:
     """The record of a Model; before there is one, without its bound and its geoms' softness."""
     behaviours = {name: Behaviour("emulated", note) for name, note in _EMULATED.items()}
     behaviours |= {name: Behaviour("native", note) for name, note in _NATIVE.items()}
