@@ -64,37 +64,15 @@ def floor_of(
     from ..compare import chaos_floor
     from ..compare.perturbed import parse_uncertainty
     from ..report.progress import progress
+    from ._compare_rerun import side_of
 
-    rerun = rerun or _rerun(request)
     with progress("chaos floor") as told:
         return chaos_floor(
             comparison,
             one,
             two,
-            rerun,
+            rerun or side_of(request, 0),
             seed=request.seed,
             uncertain=parse_uncertainty(options.floor),
             progress=told,
         )
-
-
-def _rerun(request: Any) -> Any:
-    """How the first of two engines runs an experiment."""
-    from ..backends import load
-    from ..compare import rerun_of
-
-    asked = request.scenario()
-    model = load(
-        request.model or asked.model,
-        backend=request.backends[0],
-        defaults=request.defaults,
-        menagerie=request.menagerie,
-    )
-    return rerun_of(
-        asked,
-        model,
-        seconds=request.seconds,
-        seed=request.seed,
-        defaults=request.defaults,
-        options=request.options,
-    )

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..errors import BadInputError, EndedEarlyError
 from ..installed import PAIR
-from . import _compare_floor, _compare_html, _compare_models
+from . import _compare_floor, _compare_html, _compare_models, _compare_steps
 from . import _compare_pictures as pictures
 from ._common import PROGRAM, add_json, add_menagerie, complain, pairs_of, show
 
@@ -79,6 +79,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--keyframe", default=None, metavar="NAME", help="where a FUNCTION starts, on both sides"
     )
     _compare_floor.add_options(parser)
+    _compare_steps.add_options(parser)
     _compare_html.add_options(parser)
     pictures.add(parser)
     _compare_models.add_options(parser)
@@ -195,6 +196,7 @@ def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
     _compare_html.check(options)
     _compare_floor.check(options)
+    steps = _compare_steps.asked(options)
     pictures.complete(options)
     if options.models:
         if options.why or options.quantity:
@@ -210,6 +212,8 @@ def run(options: argparse.Namespace) -> int:
         )
     if options.quantity and not (options.why or options.html):
         raise BadInputError("--quantity belongs to --why")
+    if steps:
+        return _compare_steps.run(options, request_of(options))
     if options.why and not options.html:
         return _run_why(options)
     return _run_compare(options)

@@ -146,7 +146,7 @@ def _check_moments(models: list[Model], seconds: float) -> None:
     """Raise TraceError, before anything runs, where the timesteps hardly ever meet."""
     steps = [model.timestep for model in models]
     one, two = (
-        _Clock(model.timestep * np.arange(steps_in(model, seconds) + 1), model.timestep)
+        _Clock(np.arange(0.0, steps_in(model, seconds) + 1) * model.timestep, model.timestep)
         for model in models
     )
     try:

@@ -67,6 +67,7 @@ def page(result: Compared, everything: bool = False) -> Page:
         *(f"A: {note}" for note in result.one.notes),
         *(f"B: {note}" for note in result.two.notes),
         *result.found.notes,
+        *result.skipped,
     ]
     blocks += [Text(sentence(note)) for note in notes]
     origin = ", ".join(f"{name} {version}" for name, version in result.versions.items())
@@ -95,6 +96,8 @@ def _sides(result: Compared) -> Text:
 
 def _verdict(result: Compared) -> Verdict:
     matter = [each for each in result.found.differences if each.matters]
+    if not matter and result.skipped:
+        return Verdict("nothing that was compared differs; not everything was compared", False)
     if not matter:
         return Verdict(f"nothing differs that matters, to {result.digits} digits", True)
     subjects = ", ".join(dict.fromkeys(each.subject for each in matter))

@@ -2,10 +2,11 @@
 
 `read` makes a description of a file, `compare` says where two of them differ:
 
-- `..description` has the records, the reader of URDF, rigid groups and which joint is which; an engine's own is the part `reading`
-  of its room
+- `..description` has the records, the reader of URDF, rigid groups and which joint is which; an
+  engine's own is the part `reading` of its room
 - `diff`: every difference with its size, entered into a `ledger`; by subject in `_places`,
   `_joints`, `_solids`, `_shapes`, `_settings`
+- `_compiled`: what only compiled models tell, by the list that `..why` explains a gap with
 - `engines`: what engines do of themselves
 """
 
@@ -14,7 +15,7 @@ from __future__ import annotations
 import os
 import platform
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from ...engines.parts import CompilerPart, ReadingPart
 from ...errors import UnsupportedError
 from ...installed import DEFAULT
 from ...models import resolve
+from ._compiled import further
 from .diff import Found, diff
 from .engines import own_ways
 from .ledger import AgreedFigures, Difference
@@ -76,6 +78,7 @@ class Compared:
         found: Differences and agreements.
         digits: Figures that agree to so many counted as equal.
         versions: Of what computed it.
+        skipped: What was not compared, in sentences.
     """
 
     one: DescribedFile
@@ -83,11 +86,12 @@ class Compared:
     found: Found
     digits: int
     versions: dict[str, str]
+    skipped: tuple[str, ...] = ()
 
     @property
     def equal(self) -> bool:
-        """Whether nothing was found that matters."""
-        return not any(each.matters for each in self.found.differences)
+        """Whether everything was compared, and nothing was found that matters."""
+        return not self.skipped and not any(each.matters for each in self.found.differences)
 
 
 def split(text: str) -> tuple[str, str | None]:
@@ -164,6 +168,10 @@ def compare(
     robots = [read(m, e, menagerie) for m, e in zip((one, two), engines, strict=True)]
     trees = [GroupTree(renamed(robots[0], rename or {})), GroupTree(robots[1])]
     found = diff(trees[0], trees[1], frames, digits, seed, own_ways(*engines))
+    more, skipped = list[Difference](), list[str]()
+    if engines == (None, None) and any(robot.format != "URDF" for robot in robots):
+        more, skipped = further([resolve(m, menagerie) for m in (one, two)], rename or {})
+        found = replace(found, differences=(*found.differences, *more))
     versions = {
         "statemachine": __version__,
         "numpy": np.__version__,
@@ -173,7 +181,8 @@ def compare(
         if robot.format != "URDF":  # which no engine has read
             engine, _, version = robot.reader.partition(" ")
             versions[engine] = version
-    return Compared(_side(trees[0]), _side(trees[1]), found, digits, versions)
+    sides = _side(trees[0]), _side(trees[1])
+    return Compared(sides[0], sides[1], found, digits, versions, tuple(skipped))
 
 
 def _side(tree: GroupTree) -> DescribedFile:

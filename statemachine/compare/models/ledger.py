@@ -29,6 +29,7 @@ SUBJECTS = {
     "shapes": "What touches",
     "contact": "How it touches",
     "settings": "Settings of the simulation",
+    "further": "What else can change a motion",
     "engine": "What the engines do of themselves, measured on small models of their own",
 }
 

@@ -26,7 +26,7 @@ _ASKED = 64  # moments at which commands are compared
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class SideStart:
     """Where a side starts: keyframe, qpos (nq,), qvel (nv,), ctrl (nu,)."""
 
     keyframe: str | None
@@ -241,10 +241,10 @@ def _elsewhere(scenario: Scenario, two: Model) -> Scenario:
         return scenario
 
 
-def _start(model: Model, scenario: Scenario) -> Start:
+def _start(model: Model, scenario: Scenario) -> SideStart:
     key = scenario.keyframe
     if key is not None and key not in [frame.name for frame in model.keyframes]:
         key = None
     with make_data(model) as data:
         reset(model, data, key)
-        return Start(key, data.qpos.copy(), data.qvel.copy(), data.ctrl.copy())
+        return SideStart(key, data.qpos.copy(), data.qvel.copy(), data.ctrl.copy())

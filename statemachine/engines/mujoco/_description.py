@@ -240,23 +240,15 @@ def _flags(bits: Any, value: int) -> str:
 
 
 def _notes(raw: Any) -> list[str]:
-    """What no other format has a word for, and is not compared one by one."""
+    """What no other format has a word for."""
     linear = sum(_follows(raw, joint) is not None for joint in range(raw.njnt))
     counted = {
         "further equality constraints": raw.neq - linear,
         "tendons": raw.ntendon,
         "contact pairs of its own": raw.npair,
         "pairs without contact": raw.nexclude,
+        "bodies freed of weight (gravcomp)": np.count_nonzero(raw.body_gravcomp),
     }
     said = [f"{count} {what}" for what, count in counted.items() if count]
-    notes = [f"it has {', '.join(said)}, which are not compared"] if said else []
-    for name in ("dof_dampingpoly", "jnt_stiffnesspoly"):
-        if np.any(getattr(raw, name, 0)):
-            notes.append("it has damping or springs that are not linear, which are not compared")
-    notes += [text for i in range(raw.nactuator) if (text := drives.beyond(raw, i))]
-    if np.any(raw.body_gravcomp):
-        notes.append(
-            f"it frees {np.count_nonzero(raw.body_gravcomp)} bodies of their weight (gravcomp), "
-            "which is not compared"
-        )
-    return notes
+    notes = [f"it has {', '.join(said)}"] if said else []
+    return notes + [text for i in range(raw.nactuator) if (text := drives.beyond(raw, i))]

@@ -60,7 +60,7 @@ class Elements:
         yield from self._contacts()
 
     def _rows(
-        self, kind: str, rows: Sequence[fields.Row], pairs: Pairs, name: str = ""
+        self, kind: str, rows: Sequence[fields.FieldRow], pairs: Pairs, name: str = ""
     ) -> Iterator[ModelDifference]:
         """Rows of elements; `name` is what they are called, else each by its own."""
         for a, b in pairs:
@@ -71,7 +71,7 @@ class Elements:
                     yield found
 
     def _row(
-        self, kind: str, row: fields.Row, a: int, b: int, where: str
+        self, kind: str, row: fields.FieldRow, a: int, b: int, where: str
     ) -> ModelDifference | None:
         one, two = self._one, self._two
         if row.when and not (

@@ -15,7 +15,7 @@ def _words(text: str) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Row:
+class FieldRow:
     """Entries of one element that are one thing.
 
     Attributes:
@@ -43,70 +43,72 @@ LIMITED = {
 }
 
 JOINT = (
-    Row("range", ("jnt_limited", "jnt_range"), "rad"),
-    Row("stop", ("jnt_solref", "jnt_solimp", "jnt_margin"), when="jnt_limited"),
-    Row("spring", ("jnt_stiffness", "jnt_stiffnesspoly", "jnt_springyield"), "N·m/rad"),
-    Row("force limit", ("jnt_actfrclimited", "jnt_actfrcrange"), "N·m"),
-    Row("weight carried by its motor", ("jnt_actgravcomp",)),
+    FieldRow("range", ("jnt_limited", "jnt_range"), "rad"),
+    FieldRow("stop", ("jnt_solref", "jnt_solimp", "jnt_margin"), when="jnt_limited"),
+    FieldRow("spring", ("jnt_stiffness", "jnt_stiffnesspoly", "jnt_springyield"), "N·m/rad"),
+    FieldRow("force limit", ("jnt_actfrclimited", "jnt_actfrcrange"), "N·m"),
+    FieldRow("weight carried by its motor", ("jnt_actgravcomp",)),
 )
 DOF = (
-    Row("armature", ("dof_armature",), "kg m²"),
-    Row("damping", ("dof_damping", "dof_dampingpoly"), "N·m·s"),
-    Row("dry friction", ("dof_frictionloss",), "N·m"),
-    Row("softness of dry friction", ("dof_solref", "dof_solimp"), when="dof_frictionloss"),
+    FieldRow("armature", ("dof_armature",), "kg m²"),
+    FieldRow("damping", ("dof_damping", "dof_dampingpoly"), "N·m·s"),
+    FieldRow("dry friction", ("dof_frictionloss",), "N·m"),
+    FieldRow("softness of dry friction", ("dof_solref", "dof_solimp"), when="dof_frictionloss"),
 )
 GEOM = (
-    Row("filter", ("geom_contype", "geom_conaffinity")),
-    Row("friction", ("geom_friction",)),
-    Row("friction dimensions", ("geom_condim",)),
-    Row("softness", ("geom_solref", "geom_solimp", "geom_solmix")),
-    Row("priority", ("geom_priority",)),
-    Row("margin", ("geom_margin", "geom_gap"), "m"),
-    Row("adhesion", ("geom_adhesion",)),
-    Row("moving surface", ("geom_surfacevel",), "m/s"),
+    FieldRow("filter", ("geom_contype", "geom_conaffinity")),
+    FieldRow("friction", ("geom_friction",)),
+    FieldRow("friction dimensions", ("geom_condim",)),
+    FieldRow("softness", ("geom_solref", "geom_solimp", "geom_solmix")),
+    FieldRow("priority", ("geom_priority",)),
+    FieldRow("margin", ("geom_margin", "geom_gap"), "m"),
+    FieldRow("adhesion", ("geom_adhesion",)),
+    FieldRow("moving surface", ("geom_surfacevel",), "m/s"),
 )
 ACTUATOR = (
-    Row(
+    FieldRow(
         "gains",
         ("actuator_gaintype", "actuator_gainprm", "actuator_biastype", "actuator_biasprm"),
     ),
-    Row("gear", ("actuator_gear", "actuator_cranklength")),
-    Row("force range", ("actuator_forcelimited", "actuator_forcerange"), "N·m"),
-    Row("dynamics", ("actuator_dynprm", "actuator_actearly")),
-    Row("range of its activation", ("actuator_actlimited", "actuator_actrange")),
-    Row("delay", ("actuator_delay",), "s"),
-    Row("rotor", ("actuator_armature",)),
-    Row("damping", ("actuator_damping", "actuator_dampingpoly")),
-    Row("length range", ("actuator_lengthrange",)),
+    FieldRow("gear", ("actuator_gear", "actuator_cranklength")),
+    FieldRow("force range", ("actuator_forcelimited", "actuator_forcerange"), "N·m"),
+    FieldRow("dynamics", ("actuator_dynprm", "actuator_actearly"), when="actuator_dyntype"),
+    FieldRow("range of its activation", ("actuator_actlimited", "actuator_actrange")),
+    FieldRow("delay", ("actuator_delay",), "s"),
+    FieldRow("rotor", ("actuator_armature",)),
+    FieldRow("damping", ("actuator_damping", "actuator_dampingpoly")),
+    FieldRow("length range", ("actuator_lengthrange",), when="actuator_gaintype"),
 )
-CONTROL = (Row("range of ctrl", ("actuator_ctrllimited", "actuator_ctrlrange")),)
+CONTROL = (FieldRow("range of ctrl", ("actuator_ctrllimited", "actuator_ctrlrange")),)
 TENDON = (
-    Row("range", ("tendon_limited", "tendon_range"), "m"),
-    Row("stop", ("tendon_solref_lim", "tendon_solimp_lim", "tendon_margin"), when="tendon_limited"),
-    Row("spring", ("tendon_stiffness", "tendon_stiffnesspoly", "tendon_springyield")),
-    Row("slack length", ("tendon_lengthspring",), "m", when="tendon_stiffness"),
-    Row("damping", ("tendon_damping", "tendon_dampingpoly")),
-    Row("dry friction", ("tendon_frictionloss",)),
-    Row(
+    FieldRow("range", ("tendon_limited", "tendon_range"), "m"),
+    FieldRow(
+        "stop", ("tendon_solref_lim", "tendon_solimp_lim", "tendon_margin"), when="tendon_limited"
+    ),
+    FieldRow("spring", ("tendon_stiffness", "tendon_stiffnesspoly", "tendon_springyield")),
+    FieldRow("slack length", ("tendon_lengthspring",), "m", when="tendon_stiffness"),
+    FieldRow("damping", ("tendon_damping", "tendon_dampingpoly")),
+    FieldRow("dry friction", ("tendon_frictionloss",)),
+    FieldRow(
         "softness of dry friction",
         ("tendon_solref_fri", "tendon_solimp_fri"),
         when="tendon_frictionloss",
     ),
-    Row("armature", ("tendon_armature",)),
-    Row("force limit", ("tendon_actfrclimited", "tendon_actfrcrange")),
+    FieldRow("armature", ("tendon_armature",)),
+    FieldRow("force limit", ("tendon_actfrclimited", "tendon_actfrcrange")),
 )
 EQUALITY = (
-    Row("active", ("eq_active0",)),
-    Row("what it keeps", ("eq_data",)),
-    Row("softness", ("eq_solref", "eq_solimp")),
+    FieldRow("active", ("eq_active0",)),
+    FieldRow("what it keeps", ("eq_data",)),
+    FieldRow("softness", ("eq_solref", "eq_solimp")),
 )
 PAIR = (
-    Row("friction", ("pair_friction", "pair_dim")),
-    Row("softness", ("pair_solref", "pair_solimp", "pair_solreffriction")),
-    Row("margin", ("pair_margin", "pair_gap")),
-    Row("adhesion", ("pair_adhesion",)),
+    FieldRow("friction", ("pair_friction", "pair_dim")),
+    FieldRow("softness", ("pair_solref", "pair_solimp", "pair_solreffriction")),
+    FieldRow("margin", ("pair_margin", "pair_gap")),
+    FieldRow("adhesion", ("pair_adhesion",)),
 )
-BODY = (Row("weight taken off", ("body_gravcomp",)),)
+BODY = (FieldRow("weight taken off", ("body_gravcomp",)),)
 
 # What is compared with regard to frames, shapes and owners, element by element.
 PLACED = _words(
