@@ -45,7 +45,8 @@ def page(
         Text(
             f"Differs: at how many moments it is beyond {figure(result.relative)} of its usual "
             f"size, and beyond the null: how far {one} gets from its own run when it is put back "
-            f"to its own states, since a restore may forget what the engine knows of contacts. {_null(result)}"
+            "to its own states, since a restore may forget what the engine knows of contacts. "
+            f"{_null(result)}"
         ),
     ]
     if result.spikes:
