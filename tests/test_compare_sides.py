@@ -288,6 +288,20 @@ def test_renamed_joints_are_matched_by_place_and_by_a_map(files: Path) -> None:
         run_sides(asked("hold", *sides, names={"elbow": "Gelenk_3"}))
 
 
+def test_a_tool_frame_that_the_right_calls_otherwise(files: Path, cli: Cli) -> None:
+    need_engine("pybullet")
+    renamed = (files / "renamed.xml").read_text().replace("gripperframe", "tcp")
+    (files / "renamed.xml").write_text(renamed)
+    words = ("compare", "hold", "arm.xml", "renamed.xml@pybullet", "--seconds", "0.2", "--json")
+    found = json.loads(cli(*words, "--no-floor").stdout)
+    assert found["only"][1] == {"joint": [], "actuator": [], "site": ["tcp"]}
+    names = [each["name"] for each in found["comparison"]["agreements"]]
+    assert "gripperframe, position" not in names
+    mapped = json.loads(cli(*words, "--no-floor", "--map", "gripperframe=tcp").stdout)
+    tip = {each["name"]: each["max"] for each in mapped["comparison"]["agreements"]}
+    assert tip["gripperframe, position"] < 1e-9
+
+
 def test_what_cannot_be_matched_is_said_first(
     files: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

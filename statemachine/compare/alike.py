@@ -82,9 +82,8 @@ def with_bodies_of(trace: Trace, model: Model) -> Trace:
 def _renamed(ours: Sequence[str], theirs: Sequence[str], pairs: Pairs) -> tuple[str, ...]:
     """The names of the second, those of the first for what both have."""
     names = list(theirs)
-    taken = {ours[one] for one, _ in pairs if ours[one]}
     for k, name in enumerate(names):
-        if name in taken:
+        if name and name in ours:
             names[k] = f"{name} (right)"
     for one, two in pairs:
         names[two] = ours[one]
