@@ -7,7 +7,7 @@ from typing import Any
 
 from ..errors import BadInputError, EndedEarlyError
 from ..installed import PAIR
-from . import _compare_floor, _compare_html, _compare_models
+from . import _compare_floor, _compare_html, _compare_models, _compare_why
 from . import _compare_pictures as pictures
 from ._common import PROGRAM, add_json, add_menagerie, complain, pairs_of, show
 
@@ -54,12 +54,6 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="KIND=VALUE",
         help="another tolerance, such as joint=0.5deg, tip=2mm, energy=0.1J",
     )
-    parser.add_argument(
-        "--why", action="store_true", help="which difference explains how much of the gap"
-    )
-    parser.add_argument(
-        "--quantity", default=None, metavar="NAME", help="of --why: what the gap is measured in"
-    )
     group = parser.add_argument_group("two sides")
     group.add_argument(
         "--map",
@@ -78,6 +72,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--keyframe", default=None, metavar="NAME", help="where a FUNCTION starts, on both sides"
     )
+    _compare_why.add_options(parser)
     _compare_floor.add_options(parser)
     _compare_html.add_options(parser)
     pictures.add(parser)
@@ -195,6 +190,7 @@ def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
     _compare_html.check(options)
     _compare_floor.check(options)
+    _compare_why.check(options)
     pictures.complete(options)
     if options.models:
         if options.why or options.quantity:
@@ -208,22 +204,18 @@ def run(options: argparse.Namespace) -> int:
             f"compare what? An experiment ({', '.join(EXPERIMENTS)}), FILE.py:FUNCTION or traces: "
             f"{PROGRAM} compare hold"
         )
-    if options.quantity and not (options.why or options.html):
-        raise BadInputError("--quantity belongs to --why")
     if options.why and not options.html:
         return _run_why(options)
     return _run_compare(options)
 
 
 def _run_why(options: argparse.Namespace) -> int:
-    from ._compare_why import run as run_why
-
     if options.tolerance:
         raise BadInputError("--why takes no --tolerance: it explains the gap, whatever its size")
     if options.plot or options.film:
         raise BadInputError("--why runs many times: --plot and --film go without it")
     try:
-        return run_why(request_of(options), options.quantity, options.json)
+        return _compare_why.run(options, request_of(options))
     except EndedEarlyError as error:  # what there is until then, and no cause
         return _run_compare(options, f"No cause is named: {error}.")
 
