@@ -13,7 +13,7 @@ import numpy as np
 from ..interface import Array
 from . import _dense as dense
 from ._bullet_client import pb
-from ._bullet_law import Law, Solution
+from ._bullet_law import Law, Solution, in_force
 from ._bullet_world import Tree, World
 
 
@@ -120,11 +120,9 @@ class Motors:
     def __init__(self, world: World, tree: Tree, raw: mujoco.MjModel) -> None:
         self._world, self.tree = world, tree
         joints = raw.dof_jntid[tree.dofs].tolist()
-        off = raw.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
-        driven = [] if off else list(range(raw.nu))
         pairs = [
-            (joints.index(raw.actuator_trnid[a, 0]), a)
-            for a in driven
+            (joints.index(raw.actuator_trnid[a, 0]), int(raw.actuator_ctrladr[a]))
+            for a in np.flatnonzero(in_force(raw))
             if raw.actuator_trnid[a, 0] in joints
         ]
         self.contact = self.friction = self.nothing = np.zeros(len(tree.dofs))

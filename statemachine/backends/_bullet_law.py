@@ -114,14 +114,13 @@ class Law:
     def _take_actuators(self, raw: mujoco.MjModel, joints: Any, off: Mapping[str, bool]) -> Array:
         """Force = clip(gain·clip(ctrl) + b₀ + b₁·length + b₂·speed); length = gear·q."""
         driven = np.isin(raw.actuator_trnid[:, 0], joints) & (not off["actuation"])
-        for a in range(raw.nu):  # the groups that the model's file turns off
-            if raw.opt.disableactuator >> int(raw.actuator_group[a]) & 1:
-                driven[a] = False
-        self.ids = ids = np.flatnonzero(driven)
+        driven &= in_force(raw)
+        ids = np.flatnonzero(driven)
+        self.ids = raw.actuator_ctrladr[ids]  # another actuator may take several numbers of ctrl
         self._gear = np.zeros((len(joints), len(ids)))
         for column, a in enumerate(ids):
             row = int(np.flatnonzero(joints == raw.actuator_trnid[a, 0])[0])
-            self._gear[row, column] = raw.actuator_gear[a, 0]
+            self._gear[row, column] = raw.actuator_gear[raw.actuator_outadr[a], 0]
         affine = raw.actuator_biastype[ids] == int(mujoco.mjtBias.mjBIAS_AFFINE)
         bias = raw.actuator_biasprm[ids, :3] * affine[:, None]
         self._gain = raw.actuator_gainprm[ids, 0]
@@ -129,8 +128,8 @@ class Law:
         later = 0.0 if raw.opt.integrator in _EXPLICIT else self.timestep
         self._slope = -later * self._gear**2 * bias[:, 2]
         self._unsaturated = self._with_slope(np.ones(len(ids)))
-        clamped = raw.actuator_ctrllimited[ids].astype(bool) & (not off["clamp"])
-        self._ctrl_low, self._ctrl_high = _range(raw.actuator_ctrlrange[ids], clamped)
+        clamped = raw.actuator_ctrllimited[self.ids].astype(bool) & (not off["clamp"])
+        self._ctrl_low, self._ctrl_high = _range(raw.actuator_ctrlrange[self.ids], clamped)
         limited = raw.actuator_forcelimited[ids].astype(bool)
         self._low_force, self._high_force = _range(raw.actuator_forcerange[ids], limited)
         fenced = raw.jnt_actfrclimited[joints].astype(bool)
@@ -213,13 +212,19 @@ class Law:
             friction = moved
             solve = dense.dot(change, change) > self._steady
         if solve:
-            friction, limit = self._constrained(explicit, others, x, friction, hit)
+            friction, limit = self._constrained(explicit, others, q, speed, friction, hit)
             others = others + limit
         acceleration = dense.solved(implicit, others + friction)
         return Solution(q, v, speed, bias, mass, actuator, passive, friction, limit, acceleration)
 
     def _constrained(
-        self, factor: Array, others: Array, x: Array, friction: Array, hit: list[int]
+        self,
+        factor: Array,
+        others: Array,
+        q: Sequence[float],
+        speed: Array,
+        friction: Array,
+        hit: list[int],
     ) -> tuple[Array, Array]:
         """Friction and limit force, by pivoting between free and bounded rows.
 
@@ -229,10 +234,10 @@ class Law:
         n, rubs, rubbing = len(friction), self._rubs, len(self._rubs)
         at, rows = rubs, np.empty((5, rubbing + len(hit)))
         rows[:, :rubbing] = self._rub_rows
-        rows[2, :rubbing] *= x[n:-1][rubs]
+        rows[2, :rubbing] *= speed[rubs]
         if hit:
             at = np.array([*rubs, *hit])
-            rows[:, rubbing:] = np.array([self._stop(i, *x[[i, n + i]].tolist()) for i in hit]).T
+            rows[:, rubbing:] = np.array([self._stop(i, q[i], float(speed[i])) for i in hit]).T
         sign, soft, goal, least, most = rows
         matrix = dense.inverse_rows(factor, at)[:, at] * sign[:, None] * sign
         matrix.flat[:: len(at) + 1] += soft
@@ -267,6 +272,8 @@ def _pivoted(matrix: Array, right: Array, least: Array, most: Array, start: Arra
     for _ in range(_PIVOTS):
         if free.all():
             force = dense.solved(dense.factored(matrix.copy()), right)
+            if ((least <= force) & (force <= most)).all():
+                return force
         else:
             inside, held = free.nonzero()[0], (~free).nonzero()[0]
             rows = inside[:, None]
@@ -301,6 +308,13 @@ _FLAGS = {
     "refsafe": _OFF.mjDSBL_REFSAFE,
     "eulerdamp": _OFF.mjDSBL_EULERDAMP,
 }
+
+
+def in_force(raw: mujoco.MjModel) -> Any:
+    """(nactuator,) bool: which actuators the model's file does not turn off."""
+    groups = raw.actuator_group
+    off = (groups >= 0) & (groups < 31) & ((raw.opt.disableactuator >> (groups & 31)) & 1 > 0)
+    return ~off & (not raw.opt.disableflags & int(_OFF.mjDSBL_ACTUATION))
 
 
 def _range(ranges: Array, limited: Any) -> tuple[Array, Array]:

@@ -11,11 +11,14 @@ import numpy as np
 from ..errors import UnsupportedError
 from ..interface import Array, JointType
 from ._bullet_hulls import ELLIPSOID, HULLS, MARGIN, roughness
+from ._bullet_law import in_force
 from ._bullet_plan import MOST_PARTS, Plan
-from ._bullet_surfaces import NO_CONTACT, PLANE
+from ._bullet_surfaces import NO_CONTACT, PLANE, damping_ratios
 from ._bullet_urdf import axes, parts, tree
 
 _FREE, _BALL = int(JointType.FREE), int(JointType.BALL)
+# What MuJoCo's contacts have by default; and the part of a speed that is a bounce to tell of.
+_SOLREF, _SOLIMP, _BOUNCE = (0.02, 1.0), (0.9, 0.95, 0.001, 0.5, 2.0), 0.2
 _SOLIDS = [
     int(kind)
     for kind in (
@@ -108,7 +111,36 @@ def ignored(plan: Plan) -> list[str]:
         belts = np.sqrt((raw.geom_surfacevel[:, :3] ** 2).sum(axis=1)) * touching
         if belts.any():
             found.append(f"surfacevel has no effect ({_list(raw, 'geom', belts)})")
+        found += _bounces(plan)
     return found
+
+
+def _bounces(plan: Plan) -> list[str]:
+    """The contact that would spring back most: a damping ratio far below one is restitution."""
+    raw, pairs = plan.raw, plan.surfaces.meeting
+    if not pairs:
+        return []
+    ratio = np.clip(damping_ratios(raw, pairs), 0.0, 1 - 1e-9)
+    kept = np.exp(-np.pi * ratio / np.sqrt(1 - ratio**2))  # part of the speed, of a damped spring
+    most = int(kept.argmax())
+    if kept[most] < _BOUNCE:
+        return []
+    names = " and ".join(str(_name(raw, "geom", geom)) for geom in pairs[most])
+    return [
+        f"contacts do not bounce: solref has no effect ({names} would keep about "
+        f"{100 * kept[most]:.0f} % of their speed)"
+    ]
+
+
+def softness(plan: Plan) -> str:
+    """Geoms that touch and have a solref or solimp of their own, in words; "" without any."""
+    raw = plan.raw
+    touching = (raw.geom_contype | raw.geom_conaffinity).astype(bool)
+    own = (raw.geom_solref != _SOLREF).any(axis=1) | (raw.geom_solimp != _SOLIMP).any(axis=1)
+    geoms = np.flatnonzero(own & touching).tolist() if plan.surfaces.solids else []
+    named = [str(_name(raw, "geom", geom)) for geom in geoms]
+    rest = f", and {len(named) - 3} more" if len(named) > 3 else ""
+    return ", ".join(named[:3]) + rest
 
 
 def _hull_differences(plan: Plan) -> list[str]:
@@ -193,8 +225,13 @@ def _geoms(raw: mujoco.MjModel) -> Found:
 
 def _actuators(raw: mujoco.MjModel) -> Found:
     gain, bias = mujoco.mjtGain, mujoco.mjtBias
+    used = in_force(raw)
     for a in range(raw.nactuator):
         name, joint = _name(raw, "actuator", a), int(raw.actuator_trnid[a, 0])
+        if raw.actuator_armature[a] or raw.actuator_damping[a] or raw.actuator_dampingpoly[a].any():
+            yield "actuator armature or damping", f"actuator {name} has it: give it to the joint"
+        if not used[a]:
+            continue
         if raw.actuator_trntype[a] != int(mujoco.mjtTrn.mjTRN_JOINT):
             yield "actuator transmission", f"actuator {name} does not drive a joint"
         elif raw.jnt_type[joint] in (_FREE, _BALL):
@@ -206,9 +243,11 @@ def _actuators(raw: mujoco.MjModel) -> Found:
             yield "actuator dynamics", f"actuator {name} has a state of its own"
         affine = raw.actuator_biastype[a] in (int(bias.mjBIAS_NONE), int(bias.mjBIAS_AFFINE))
         if raw.actuator_gaintype[a] != int(gain.mjGAIN_FIXED) or not affine:
-            yield "actuator gain", f"that of actuator {name} is not constant"
-        if raw.actuator_armature[a] or raw.actuator_damping[a] or raw.actuator_dampingpoly[a].any():
-            yield "actuator armature or damping", f"actuator {name} has it: give it to the joint"
+            kind = gain(raw.actuator_gaintype[a]) if affine else bias(raw.actuator_biastype[a])
+            yield (
+                "actuator gain",
+                f"that of actuator {name} is not constant ({kind.name[7:].lower()})",
+            )
 
 
 def _name(raw: mujoco.MjModel, kind: str, number: int) -> Any:

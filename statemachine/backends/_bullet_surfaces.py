@@ -37,6 +37,7 @@ class Surfaces:
     Attributes:
         solids: All that can touch; planes first.
         pairs: Of two solids, by their places, whether they meet.
+        meeting: The geoms that do, two by two.
         slide, spin, roll: Each solid's friction.
         mixed: Pairs of bodies of whose geoms some meet and some do not.
         differences: Where friction is not the model's, in words.
@@ -47,6 +48,7 @@ class Surfaces:
         self.solids = [] if raw.opt.disableflags & NO_CONTACT else _solids(raw)
         several: list[str] = []
         self.pairs: dict[tuple[int, int], bool] = {}
+        self.meeting: list[tuple[int, int]] = []
         self.mixed: list[str] = []
         wanted = []  # friction (3,) of each pair that meets
         for (i, one), (j, two) in combinations(enumerate(self.solids), 2):
@@ -54,6 +56,7 @@ class Surfaces:
                 (a, b) for a in one.geoms for b in two.geoms if _masks_meet(raw, a, b)
             ] * _bodies_meet(raw, one.body, two.body)
             self.pairs[i, j] = bool(meeting)
+            self.meeting += meeting
             if meeting and len(meeting) < len(one.geoms) * len(two.geoms):
                 self.mixed.append(self._label(i, j))
             if meeting:
@@ -140,6 +143,21 @@ def _friction(raw: mujoco.MjModel, a: int, b: int) -> Array:
         leading = a if first > second else b
         friction, condim = np.array(raw.geom_friction[leading]), raw.geom_condim[leading]
     return friction * (int(condim) > np.array([1, 3, 4]))
+
+
+def damping_ratios(raw: mujoco.MjModel, pairs: list[tuple[int, int]]) -> Array:
+    """Of contacts of geoms (n, 2), by solref mixed as MuJoCo does [manual, Modeling, Contact]."""
+    a, b = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    tiny, weight = 1e-15, raw.geom_solmix
+    share = np.where(weight[a] + weight[b] < tiny, 0.5, weight[a] / (weight[a] + weight[b] + tiny))
+    higher = raw.geom_priority[a] - raw.geom_priority[b]
+    share = np.where(higher > 0, 1.0, np.where(higher < 0, 0.0, share))[:, None]
+    one, two = raw.geom_solref[a], raw.geom_solref[b]
+    both = ((one[:, :1] > 0) & (two[:, :1] > 0)) | (higher[:, None] != 0)
+    first, second = np.where(both, share * one + (1 - share) * two, np.minimum(one, two)).T
+    # Negated, they are stiffness and damping.
+    given = first <= 0
+    return np.where(given, -second / (2 * np.sqrt(np.maximum(-first, tiny))), second)
 
 
 def _masks_meet(raw: mujoco.MjModel, a: int, b: int) -> bool:

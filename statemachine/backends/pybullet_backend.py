@@ -31,7 +31,7 @@ from ..interface.options import checked_options
 from . import _bullet_urdf as urdf
 from ._bullet_driven import DrivenWorld
 from ._bullet_plan import Plan
-from ._bullet_scope import check, ignored
+from ._bullet_scope import check, ignored, softness
 from ._bullet_shared import Shared
 from ._bullet_world import ENGINE_TIMESTEP, World
 from ._hidden_data import HiddenData, HiddenModel
@@ -85,10 +85,13 @@ _AS_IT_COMES = {
 }
 
 
-def _capabilities(as_it_comes: bool, max_qvel: Array | None = None) -> Capabilities:
-    """The record of a Model; before there is one, without its bound."""
+def _capabilities(as_it_comes: bool, max_qvel: Array | None = None, soft: str = "") -> Capabilities:
+    """The record of a Model; before there is one, without its bound and its geoms' softness."""
     behaviours = {name: Behaviour("emulated", note) for name, note in _EMULATED.items()}
     behaviours |= {name: Behaviour("native", note) for name, note in _NATIVE.items()}
+    if soft:
+        note = f"{_NATIVE['contacts']}. A solref or solimp of their own have {soft}"
+        behaviours["contacts"] = Behaviour("native", note)
     behaviours["exact restore"] = Behaviour("unsupported", _RESTORE)
     options = tuple(name for name in OPTIONS if name != "integrator")
     if as_it_comes:
@@ -196,7 +199,7 @@ class PybulletModel(HiddenModel):
                 raw.body(b).name or f"body {b}": plan.described(b, shared.kind)
                 for b in (0, *urdf.roots(raw))
             },
-            capabilities=_capabilities(as_it_comes, bound),
+            capabilities=_capabilities(as_it_comes, bound, softness(plan)),
             max_qvel=bound,
             timestep=float(raw.opt.timestep) * substeps,
             substeps=substeps,

@@ -21,11 +21,11 @@ let row = found.start, playing = 0, touched = false, scene = null;
 const moment = (t) => `${t.toFixed(3)} s`;
 const minus = (text) => text.replaceAll('-', '\u2212');
 
-// Three significant digits, as in the tables.
+// Three significant digits, as in the tables; what is tiny or huge with its power of ten.
 const figure = (value) => {
   const a = Math.abs(value);
   if (a === 0) return '0';
-  if (a < 1e-3) return minus(value.toExponential(0));
+  if (a < 1e-3 || a >= 1e5) return minus(value.toExponential(0).replace('e+', 'e'));
   return minus(value.toFixed(Math.min(4, Math.max(0, 2 - Math.floor(Math.log10(a))))));
 };
 // What is a millionth of the tolerance is rounding.
