@@ -220,6 +220,13 @@ def test_one_file_on_two_engines(files: Path) -> None:
     assert as_it_comes.right.header.label.endswith("engine defaults")
 
 
+def test_timesteps_that_hardly_meet_are_refused_before_anything_runs(files: Path) -> None:
+    arm = str(files / "arm.xml")
+    sides = Side(arm), Side(arm, options={"timestep": 1 / 240})
+    with pytest.raises(TraceError, match=r"timestep=0\.002 behind the right"):
+        run_sides(asked("hold", *sides, seconds=0.1))
+
+
 def test_two_files_on_two_engines(files: Path) -> None:
     need_engine("pybullet")
     sides = Side(str(files / "arm.xml")), Side(str(files / "heavy.xml"), "pybullet")
@@ -242,7 +249,7 @@ def test_an_mjcf_against_its_own_urdf() -> None:
     names = {each.name for each in compare(run.left, run.right).agreements}
     assert {"shoulder_pan", "elbow_flex", "gripper", "energy"} <= names
     (line,) = run.unmatched
-    assert line.startswith("only so101.xml has actuator shoulder_pan")
+    assert line.startswith("only so101.xml has actuators shoulder_pan, ")
 
 
 def test_the_shortest_path_that_tells_two_files_apart(files: Path) -> None:
@@ -281,6 +288,20 @@ def test_renamed_joints_are_matched_by_place_and_by_a_map(files: Path) -> None:
         run_sides(asked("hold", *sides, names={"elbow": "Gelenk_3"}))
 
 
+def test_a_tool_frame_that_the_right_calls_otherwise(files: Path, cli: Cli) -> None:
+    need_engine("pybullet")
+    renamed = (files / "renamed.xml").read_text().replace("gripperframe", "tcp")
+    (files / "renamed.xml").write_text(renamed)
+    words = ("compare", "hold", "arm.xml", "renamed.xml@pybullet", "--seconds", "0.2", "--json")
+    found = json.loads(cli(*words, "--no-floor").stdout)
+    assert found["only"][1] == {"joint": [], "actuator": [], "site": ["tcp"]}
+    names = [each["name"] for each in found["comparison"]["agreements"]]
+    assert "gripperframe, position" not in names
+    mapped = json.loads(cli(*words, "--no-floor", "--map", "gripperframe=tcp").stdout)
+    tip = {each["name"]: each["max"] for each in mapped["comparison"]["agreements"]}
+    assert tip["gripperframe, position"] < 1e-9
+
+
 def test_what_cannot_be_matched_is_said_first(
     files: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -292,13 +313,16 @@ def test_what_cannot_be_matched_is_said_first(
     ).replace('qpos=".2 -.3"', 'qpos=".2 -.3 1 0 1 1 0 0 0"')
     (files / "more.xml").write_text(extra)
     run = run_sides(asked("hold", Side(str(files / "arm.xml")), Side(str(files / "more.xml"))))
-    assert run.unmatched == ("only more.xml has joint ball: not compared",)
+    assert run.unmatched[0] == "only more.xml has joint ball: not compared"
     found = compare(run.left, run.right)
     page = report.page(found, run.left, run.right, run=run)
     terminal.show(page)
     out = " ".join(capsys.readouterr().out.split())
     assert out.index("Only more.xml has joint ball") < out.index("position servo")
-    assert {each.max for each in found.agreements if each.name in ("shoulder", "elbow")} == {0.0}
+    names = {each.name for each in found.agreements}
+    assert {"shoulder", "elbow", "gripperframe, position"} <= names
+    assert "energy" not in names  # that of the ball is in it
+    assert {each.max for each in found.agreements} == {0.0}
 
 
 def test_robots_that_share_nothing_are_refused(files: Path) -> None:
@@ -491,7 +515,7 @@ def test_the_command_shows_both_loops(files: Path, cli: Cli) -> None:
     assert result["comparison"]["one"]["short"] == "arm.xml"
     same = cli("compare", "hold", "arm.xml", "arm.xml", "--seconds", "0.2")
     assert same.returncode == 0
-    assert "no command depends on the state" in " ".join(same.stdout.split())
+    assert "told the same at every moment" in " ".join(same.stdout.split())
 
 
 @pytest.mark.slow

@@ -57,44 +57,24 @@ def floor_of(
     one, two = traces
     if options.no_floor:
         return None
-    if request.is_traces or one.header.recorded:
+    if (request.is_traces and not request.sides) or one.header.recorded:
         if options.floor:
             raise BadInputError("--floor runs the left side again, and it is a recorded run")
         return None
     from ..compare import chaos_floor
     from ..compare.perturbed import parse_uncertainty
     from ..report.progress import progress
+    from ._compare_rerun import played_on, side_of
 
-    rerun = rerun or _rerun(request)
+    if request.is_traces:
+        rerun = played_on(request, 0, one)
     with progress("chaos floor") as told:
         return chaos_floor(
             comparison,
             one,
             two,
-            rerun,
+            rerun or side_of(request, 0),
             seed=request.seed,
             uncertain=parse_uncertainty(options.floor),
             progress=told,
         )
-
-
-def _rerun(request: Any) -> Any:
-    """How the first of two engines runs an experiment."""
-    from ..backends import load
-    from ..compare import rerun_of
-
-    asked = request.scenario()
-    model = load(
-        request.model or asked.model,
-        backend=request.backends[0],
-        defaults=request.defaults,
-        menagerie=request.menagerie,
-    )
-    return rerun_of(
-        asked,
-        model,
-        seconds=request.seconds,
-        seed=request.seed,
-        defaults=request.defaults,
-        options=request.options,
-    )

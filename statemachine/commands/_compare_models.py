@@ -40,7 +40,17 @@ def run(options: argparse.Namespace) -> int:
     given = [split(text) for text in options.models]
     if options.what:
         raise BadInputError(f"--models compares descriptions; {options.what[0]} is a run")
-    for name in ("model", "seconds", "timestep", "tolerance", "plot", "film", "every", "keyframe"):
+    for name in (
+        "model",
+        "seconds",
+        "timestep",
+        "tolerance",
+        "plot",
+        "film",
+        "every",
+        "keyframe",
+        "map",
+    ):
         if getattr(options, name) not in (None, []):
             raise BadInputError(f"--{name} is of a run, and --models runs nothing")
     if options.backends:

@@ -7,7 +7,13 @@ from typing import Any
 
 from ..errors import BadInputError, EndedEarlyError
 from ..installed import PAIR
-from . import _compare_floor, _compare_html, _compare_models, _compare_why
+from . import (
+    _compare_floor,
+    _compare_html,
+    _compare_models,
+    _compare_steps,
+    _compare_why,
+)
 from . import _compare_pictures as pictures
 from ._common import PROGRAM, add_json, add_menagerie, complain, pairs_of, show
 
@@ -74,6 +80,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     _compare_why.add_options(parser)
     _compare_floor.add_options(parser)
+    _compare_steps.add_options(parser)
     _compare_html.add_options(parser)
     pictures.add(parser)
     _compare_models.add_options(parser)
@@ -191,6 +198,7 @@ def run(options: argparse.Namespace) -> int:
     _compare_html.check(options)
     _compare_floor.check(options)
     _compare_why.check(options)
+    steps = _compare_steps.asked(options)
     pictures.complete(options)
     if options.models:
         if options.why or options.quantity:
@@ -204,6 +212,8 @@ def run(options: argparse.Namespace) -> int:
             f"compare what? An experiment ({', '.join(EXPERIMENTS)}), FILE.py:FUNCTION or traces: "
             f"{PROGRAM} compare hold"
         )
+    if steps:
+        return _compare_steps.run(options, request_of(options))
     if options.why and not options.html:
         return _run_why(options)
     return _run_compare(options)

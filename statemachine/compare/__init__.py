@@ -15,8 +15,10 @@ Two engines that agree prove nothing; neither side is the truth.
 from __future__ import annotations
 
 from .agreement import Agreement, Comparison, SideRun, compare
+from .convergence import QuantityLimit, TimestepConvergence, convergence
 from .floor import ChaosFloor, FloorBand, chaos_floor
 from .labels import Labels, labels_of
+from .one_step import StepComparison, one_step
 from .perturbed import Rerun, Uncertainty, perturbed_runs, rerun_of
 from .request import Request, split_words
 from .series import Series, default_tip, series
@@ -33,19 +35,24 @@ __all__ = [
     "Contact",
     "FloorBand",
     "Labels",
+    "QuantityLimit",
     "Request",
     "Rerun",
     "Series",
     "Side",
     "SideRun",
     "SidesRun",
+    "StepComparison",
+    "TimestepConvergence",
     "Touch",
     "Uncertainty",
     "Witness",
     "chaos_floor",
     "compare",
+    "convergence",
     "default_tip",
     "labels_of",
+    "one_step",
     "parse_sides",
     "perturbed_runs",
     "rerun_of",

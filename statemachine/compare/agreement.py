@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..comparison import QUANTITIES, SAME, common_moments, largest, same_pairs
+from ..comparison.text import on
 from ..errors import TraceError
 from ..interface import Array
 from ..scenarios.provenance import Provenance
@@ -223,7 +224,7 @@ def _touches(
             gap, at = until - float(seen or 0.0), float(seen or 0.0)
             later = touches[missing].get(pair)
             word = "never" if later is None or not later.any() else "later"
-            note = f"{word} on {labels_of(one.header, two.header).short[missing]}"
+            note = f"{word} {on(labels_of(one.header, two.header).short[missing])}"
             verdict: Verdict = "differs"
         else:
             gap, at = abs(first[0] - first[1]), min(first[0], first[1])

@@ -16,7 +16,8 @@ def told_alike(one: Trace, two: Trace, matched: Matched) -> tuple[Trace, Trace]:
     """Both runs with the names of the first; commands in its order where both have all of them.
 
     What a joint, body or site of the first is called, its counterpart is called too. One
-    without a counterpart whose name is taken is "NAME (right)".
+    without a counterpart whose name is taken is "NAME (right)". Where a joint has none, the
+    energies, which are of all that can move, are left out.
 
     Args:
         one: A run of the first Model.
@@ -31,7 +32,10 @@ def told_alike(one: Trace, two: Trace, matched: Matched) -> tuple[Trace, Trace]:
         "sites": _renamed(a.sites, b.sites, matched.sites),
         "actuators": _renamed(a.actuators, b.actuators, matched.actuators),
     }
-    columns = dict(two.columns)
+    ours, columns = dict(one.columns), dict(two.columns)
+    if any(only.get("joint") for only in matched.only):
+        for each in (ours, columns):
+            each.pop("energy", None)
     order = [there for _, there in matched.actuators]
     if len(order) == a.nu == b.nu:
         columns["ctrl"] = columns["ctrl"][:, order]
@@ -41,7 +45,7 @@ def told_alike(one: Trace, two: Trace, matched: Matched) -> tuple[Trace, Trace]:
             ("ctrlrange", b.ctrlrange),
         ):
             renamed[name] = tuple(values[there] for there in order)
-    first = Trace(replace(a, joints=joints, bodies=bodies), one.columns)
+    first = Trace(replace(a, joints=joints, bodies=bodies), ours)
     return first, Trace(replace(b, **renamed), columns)
 
 
@@ -78,9 +82,8 @@ def with_bodies_of(trace: Trace, model: Model) -> Trace:
 def _renamed(ours: Sequence[str], theirs: Sequence[str], pairs: Pairs) -> tuple[str, ...]:
     """The names of the second, those of the first for what both have."""
     names = list(theirs)
-    taken = {ours[one] for one, _ in pairs if ours[one]}
     for k, name in enumerate(names):
-        if name in taken:
+        if name and name in ours:
             names[k] = f"{name} (right)"
     for one, two in pairs:
         names[two] = ours[one]

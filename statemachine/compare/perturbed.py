@@ -128,6 +128,24 @@ def rerun_of(
     )
 
 
+def replayed(trace: Trace, model: Model) -> Rerun:
+    """A run that was made on a Model: its start and its commands, row by row."""
+    start, ctrl = float(trace.time[0]), trace.ctrl
+
+    def controller(time: float, data: Data) -> Array:
+        del data
+        return ctrl[min(round(time / trace.timestep), len(ctrl) - 1)]
+
+    return Rerun(
+        model,
+        lambda _model: controller,
+        float(trace.time[-1]) - start,
+        qpos=trace.qpos[0],
+        qvel=trace.qvel[0],
+        defaults="engine" if trace.header.defaults == "engine" else "model",
+    )
+
+
 def perturbed_runs(
     rerun: Rerun,
     *,

@@ -9,11 +9,12 @@ from typing import Any, Literal
 import numpy as np
 
 from ..backends import load
-from ..comparison.text import listed, milliseconds
+from ..comparison import common_moments
+from ..comparison.text import milliseconds
 from ..errors import BadInputError, StateMachineError, TraceError
 from ..interface import Array, Data, Model, make_data, reset
 from ..scenarios import Controller, Scenario
-from ..scenarios.runs import Progress, check_length, part_of, silent
+from ..scenarios.runs import Progress, check_length, part_of, silent, steps_in
 from ..traces import Trace, model_file, play, read
 from ..traces.recorder import layout_of
 from .alike import replace_layout, told_alike, translated
@@ -25,6 +26,14 @@ from .side import Side
 
 Loop = Literal["the same", "its own", "recorded"]
 _Start = tuple[Array, Array, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class _Clock:
+    """When the rows of a run will be."""
+
+    time: Array
+    timestep: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,12 +72,18 @@ class SidesRun:
         """What could not be matched, and what was matched by more than its name."""
         if self.matched is None:
             return ()
-        labels = labels_of(self.left.header, self.right.header).short
+        labels = labels_of(self.left.header, self.right.header).long
         lines = []
         for only, label in zip(self.matched.only, labels, strict=True):
-            told = [f"{kind} {name}" for kind, names in only.items() for name in names]
+            told = [
+                f"{kind}{'s' * (len(names) > 1)} {', '.join(names)}"
+                for kind, names in only.items()
+                if names
+            ]
             if told:
-                lines.append(f"only {label} has {listed(told)}: not compared")
+                lines.append(f"only {label} has {'; '.join(told)}: not compared")
+        if any(only.get("joint") for only in self.matched.only):
+            lines.append("the energy is not compared, for it is of all that can move")
         return (*lines, *self.matched.notes)
 
 
@@ -87,6 +102,9 @@ def run_sides(request: Request, progress: Progress = silent) -> SidesRun:
     models = [side.load(**given) for side in request.sides]
     reruns: tuple[Rerun, Rerun] | None = None
     matched = _matched(models[0], models[1], left, right, request)
+    seconds = float(trace.time[-1] - trace.time[0]) if trace else request.seconds
+    seconds = scenario.seconds if scenario and seconds is None else seconds or 0.0
+    _check_moments(models, seconds)
     if trace is not None:
         pair, said = _of_trace(trace, models, options, matched, request, progress)
         commands: Loop = "recorded"
@@ -122,6 +140,22 @@ def _matched(one: Model, two: Model, left: Side, right: Side, request: Request) 
             "one with --map LEFT=RIGHT"
         )
     return matched
+
+
+def _check_moments(models: list[Model], seconds: float) -> None:
+    """Raise TraceError, before anything runs, where the timesteps hardly ever meet."""
+    steps = [model.timestep for model in models]
+    one, two = (
+        _Clock(np.arange(0.0, steps_in(model, seconds) + 1) * model.timestep, model.timestep)
+        for model in models
+    )
+    try:
+        common_moments(one, two)
+    except TraceError as error:
+        raise TraceError(
+            f"{error}; of a side: timestep={steps[0]:.15g} behind the right, or "
+            f"timestep={steps[1]:.15g} behind the left"
+        ) from None
 
 
 def _of_scenario(

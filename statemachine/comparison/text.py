@@ -167,6 +167,11 @@ def few(words: Sequence[str], most: int = 3, between: str = ", ") -> str:
     return between.join(words[:most]) + more
 
 
+def on(label: str) -> str:
+    """Where something is seen: on an engine or a file, with an option."""
+    return f"{'with' if '=' in label else 'on'} {label}"
+
+
 def capital(text: str) -> str:
     """A text that begins with a capital."""
     return text[:1].upper() + text[1:]

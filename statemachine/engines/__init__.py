@@ -34,6 +34,7 @@ PARTS: dict[str, str] = {
     "differences": "all that two compiled models differ in, and what brings one to the other",
     "energy": "the energies of states, by which all engines are measured",
     "mutants": "where a seeded fault is put into its backend",
+    "one_step": "what it tells of one step from a given state, past the interface",
     "plain": "a file as its own users run it, to compare bits with",
     "watched": "what a student can do with the engine past the interface",
     "rendering": "pictures without a screen",

@@ -184,6 +184,37 @@ class EnergyPart(Protocol):
         ...
 
 
+class OneStepPart(Protocol):
+    """The part "one_step": what one step from a given state is compared by, past the interface.
+
+    Attributes:
+        PRIMES: What of the step before the engine takes, in words; "" for nothing.
+    """
+
+    PRIMES: str
+
+    def mass_matrix(self, model: Model, data: Data, qpos: Array) -> Array:
+        """The engine's mass matrix (nv, nv) at a pose, armature included; NaN if not told.
+
+        Args:
+            model: A Model on this engine.
+            data: A Data of it, after a step from `qpos` or a forward.
+            qpos: (nq,) where.
+        """
+        ...
+
+    def prime(self, model: Model, data: Data, before: Mapping[str, Array]) -> None:
+        """Let a Data, put to a state, know of the step before.
+
+        Args:
+            model: A Model on this engine.
+            data: A Data of it.
+            before: (nv,) arrays of that step by their names in the contract, those that the
+                other side tells: "qacc", "qfrc_contact", "qfrc_friction".
+        """
+        ...
+
+
 class PlainPart(Protocol):
     """The part "plain": a file as the engine's own users run it.
 

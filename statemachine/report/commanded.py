@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..comparison import largest
-from ..comparison.text import figure, quantity
+from ..comparison.text import figure, on, quantity
 from ..interface import Array, JointType
 from ..page import Block, Section, Table, Text
 from ..traces import Trace
@@ -87,5 +87,5 @@ def _misses(one: Trace, two: Trace, labels: tuple[str, str]) -> str:
         far = _ends(trace)
         most, worst = largest(far)
         name = trace.header.actuators[worst]
-        each.append(f"{name} on {label}, by {quantity(most, 'rad')}")
+        each.append(f"{name} {on(label)}, by {quantity(most, 'rad')}")
     return f" In the end farthest from that is {' and '.join(each)}."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..compare import Comparison, Contact, Touch
-from ..comparison.text import figure, quantity, short_time
+from ..comparison.text import capital, figure, on, quantity, short_time
 from ..page import Block, Section, Text
 from .finding import short_labels, window
 
@@ -24,12 +24,12 @@ def contact_words(comparison: Comparison, touches: Sequence[Touch]) -> list[Bloc
     found: list[Block] = []
     for side, other, label in zip(sides, reversed(sides), labels, strict=True):
         if not side:
-            body, _, on = _deepest(other).partition(" on ")
-            found.append(Text(f"On {label} {body} never touches {on} in this run."))
+            body, _, ground = _deepest(other).partition(" on ")
+            found.append(Text(f"{capital(on(label))} {body} never touches {ground} in this run."))
     ends = [_end(side, label) for side, label in zip(sides, labels, strict=True)]
     found.append(Text(f"Over {window(comparison)}, on average: {'; '.join(ends)}."))
     deep = [
-        f"{quantity(side[pair].deepest, 'm')} on {label} ({pair}, at "
+        f"{quantity(side[pair].deepest, 'm')} {on(label)} ({pair}, at "
         f"{short_time(side[pair].deepest_at)})"
         for side, label in zip(sides, labels, strict=True)
         if side and side[pair := _deepest(side)].deepest > 0
@@ -47,19 +47,19 @@ def _deepest(side: dict[str, Contact]) -> str:
 
 def _end(side: dict[str, Contact], label: str) -> str:
     if not side:
-        return f"on {label} nothing touches at all"
+        return f"{on(label)} nothing touches at all"
     pressing = sorted(
         (pair for pair, contact in side.items() if contact.force > 0),
         key=lambda pair: -side[pair].force,
     )
     if not pressing and not any(contact.ends for contact in side.values()):
         last = max(contact.last or 0.0 for contact in side.values())
-        return f"on {label} nothing touches after {short_time(last)}"
+        return f"{on(label)} nothing touches after {short_time(last)}"
     if not pressing:
-        return f"on {label} what touches presses with no force"
+        return f"{on(label)} what touches presses with no force"
     listed = [
         f"{'and ' if k else ''}{pair.replace(' on ', ' presses on ', 1)} with "
         f"{figure(side[pair].force)} N (with friction {figure(side[pair].total)} N)"
         for k, pair in enumerate(pressing[:_MOST])
     ]
-    return f"on {label} {' '.join(listed)}"
+    return f"{on(label)} {' '.join(listed)}"

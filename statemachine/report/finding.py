@@ -11,7 +11,7 @@ from ..compare import Agreement, Comparison, Series
 from ..compare.agreement import SETTLED
 from ..compare.why import Attribution
 from ..comparison import QUANTITIES
-from ..comparison.text import capital, quantity, short_time
+from ..comparison.text import capital, on, quantity, short_time
 from ..page import Block, Headline, Section, Text
 from .events import Event
 from .why_words import amount, causes
@@ -283,9 +283,9 @@ def in_words(
         touch = touch_at(comparison, events)
         if touch:
             labels = one.label, two.label
-            each = [f"at {short_time(e.time)} on {labels[e.side or 0]}" for e in touch]
+            each = [f"at {short_time(e.time)} {on(labels[e.side or 0])}" for e in touch]
             missing = [labels[k] for k in (0, 1) if k not in [e.side for e in touch]]
-            each += [f"never on {label}" for label in missing]
+            each += [f"never {on(label)}" for label in missing]
             text = f"The first touch of {touch[0].what} is {' and '.join(each)}."
             found.append(Section("", "", [Text(text)], detail=True))
     return found

@@ -16,9 +16,9 @@ _MEANS = (
 )
 _SAID = {
     "the same": (
-        "Both sides were told the same: no command depends on the state. So the open loop, which "
-        "says whether the machine itself differs, and the closed loop, which says what feedback "
-        "makes of it, have the same figures."
+        "Both sides were told the same at every moment, so the open loop, which says whether the "
+        "machine itself differs, and the closed loop, which says what feedback makes of it, are "
+        "one run."
     ),
     "recorded": (
         "Both sides were told the recorded commands, an open loop: the figures say whether the "
@@ -35,7 +35,11 @@ def unmatched(run: SidesRun | None) -> list[Block]:
 
 def told(run: SidesRun | None) -> list[Block]:
     """Whether the two sides were told the same, where that takes one sentence."""
-    return [Text(_SAID[run.commands])] if run and run.commands in _SAID else []
+    if run is None or run.commands not in _SAID:
+        return []
+    lacking = run.matched.only[0].get("actuator", ()) if run.matched else ()
+    deaf = " The right has no counterpart of all actuators, and was told what it can take."
+    return [Text(_SAID[run.commands] + deaf * bool(lacking))]
 
 
 def loops(comparison: Comparison, played: Comparison | None) -> list[Block]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ..compare import Agreement, Series
 from ..compare.series import NORMAL, normal_forces, total_forces
 from ..comparison import same_pairs
-from ..comparison.text import figure, quantity, reading, short_time
+from ..comparison.text import capital, figure, on, quantity, reading, short_time
 from ..interface import Array
 from ..page import Interactive
 from ..traces import Trace
@@ -106,8 +106,8 @@ def foot_of(curve: Series, one: Trace, two: Trace, labels: tuple[str, str]) -> s
             for of_one in (kind(one),)
         )
         each = [
-            f"On {label} it is at most {normal[k]} N; the whole force, friction added as vectors, "
-            f"is at most {total[k]} N."
+            f"{capital(on(label))} it is at most {normal[k]} N; the whole force, friction added as "
+            f"vectors, is at most {total[k]} N."
             for k, label in enumerate(labels)
         ]
         return f"Drawn is the sum of the normal forces. {' '.join(each)}"

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...compare import Agreement, Series
 from ...comparison import largest
-from ...comparison.text import figure, reading
+from ...comparison.text import figure, on, reading
 from ...interface import Array, Ints
 from ...page import Table
 from ..finding import name_of
@@ -148,8 +148,8 @@ def values_chart(
     low, high = float(every.min()), float(every.max())
     pad = 0.06 * (high - low) or max(abs(high) * 0.05, 1e-9)
     said = (
-        f"{name_of(one.name)} over time on both sides: at the end {ends[0]}{unit} on {labels[0]} "
-        f"and {ends[1]}{unit} on {labels[1]}."
+        f"{name_of(one.name)} over time on both sides: at the end {ends[0]}{unit} {on(labels[0])} "
+        f"and {ends[1]}{unit} {on(labels[1])}."
     )
     floor = low if one.kind == "force" else low - pad
     return _plot(np.array([0.0, until]), curves, (floor, high + pad), said, points=points)

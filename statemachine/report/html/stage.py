@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...compare import Series
-from ...comparison.text import figure, reading, short_time
+from ...comparison.text import figure, on, reading, short_time
 from ..over_time import BothRuns, QuantityChart
 from .between import own_series, shown_series
 from .budget import Budget
@@ -170,8 +170,8 @@ def _stage(runs: BothRuns, frames: Frames, start: int, still: Html, strongest: f
     return tag(
         "section",
         tag("h2", "Both runs, moment by moment", id="stage-heading"),
-        tag("p", kept(f"{runs.until:g} s on {labels[0]}, as a solid arm, and on {labels[1]}, as a "
-                      "ghost over it."), class_="says"),
+        tag("p", kept(f"{runs.until:g} s {on(labels[0])}, as a solid arm, and {on(labels[1])}, "
+                      "as a ghost over it."), class_="says"),
         tag("div", tag("div", canvas, transport, looks, class_="left"), _readout(runs),
             class_="pair"),
         tag("div", _lanes(runs, slider), class_="lanes"),

@@ -1,0 +1,256 @@
+"""The stages of one step, as two matched Models tell them: what is compared, and of what."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..comparison import ContactNames
+from ..engines import part
+from ..engines.parts import OneStepPart
+from ..errors import UnsupportedError
+from ..interface import Array, Data, Ints, JointType, Model
+from ..rotations import angle_between, matrix_from_quat
+from .matching import Matched
+
+KINEMATICS, MASS, FOUND, FORCE = "kinematics", "mass matrix", "contacts found", "contact force"
+AFTER = "acceleration"
+# In the order in which a step computes them; arrays of the contract are behind their stage.
+ARRAYS = {
+    "bias": ("qfrc_bias",),
+    "actuator": ("qfrc_actuator",),
+    "passive": ("qfrc_passive",),
+    FORCE: ("qfrc_contact",),
+    "other constraints": ("qfrc_friction", "qfrc_limit", "qfrc_equality"),
+}
+STAGES = (KINEMATICS, MASS, "bias", "actuator", "passive", FOUND, *list(ARRAYS)[3:], AFTER)
+_WORDS = {"qfrc_friction": "dry friction", "qfrc_limit": "limit", "qfrc_equality": "equality"}
+
+
+@dataclass(frozen=True, eq=False)
+class StageGroup:
+    """Numbers of one stage that have one unit.
+
+    Attributes:
+        stage: One of `STAGES`.
+        unit: Theirs.
+        names: What each is of: a joint, a body, a pair of joints.
+        size: Of an element: 1 for a number, 3 for a vector, 9 for a rotation.
+    """
+
+    stage: str
+    unit: str
+    names: tuple[str, ...]
+    size: int = 1
+
+    def apart(self, one: Array, two: Array) -> Array:
+        """How far apart the elements (k,) are; NaN where one of them is not told."""
+        if self.size == 9:
+            return angle_between(one.reshape(-1, 3, 3), two.reshape(-1, 3, 3))
+        return np.linalg.norm((one - two).reshape(-1, self.size), axis=1)
+
+    def largest(self, one: Array, two: Array) -> float:
+        """The largest of all elements; of places how far they reach, of rotations one radian."""
+        if self.size == 9:
+            return 1.0
+        both = np.concatenate([one, two]).reshape(-1, self.size)
+        if self.size == 3:
+            return float(np.linalg.norm(np.ptp(both, axis=0))) if len(both) else 0.0
+        return float(np.nanmax(np.abs(both), initial=0.0))
+
+
+Touching = dict[str, tuple[float, Array]]  # by pair: how deep [m], and the force (3,) [N]
+Reading = tuple[list[Array], Touching]
+
+
+class StageReader:
+    """Reads the same numbers, in the same order, from a Data of either Model.
+
+    Attributes:
+        groups: What is read.
+        dofs: For each Model the degrees of freedom that both have.
+    """
+
+    def __init__(self, matched: Matched) -> None:
+        self._matched = matched
+        self._models = matched.one, matched.two
+        self._parts: list[OneStepPart | None] = [part(m.backend, "one_step") for m in self._models]
+        one, two = self._models
+        self.dofs = (
+            _dofs(one, [a for a, _ in matched.joints]),
+            _dofs(two, [b for _, b in matched.joints]),
+        )
+        names, turns = _dof_names(one, [a for a, _ in matched.joints])
+        self._turns = turns
+        bodies = tuple(one.body_names[s.one] or f"body {s.one}" for s in matched.solids[1:])
+        sites = tuple(one.site_names[a] or f"site {a}" for a, _ in matched.sites)
+        self.groups: list[StageGroup] = [
+            StageGroup(KINEMATICS, "m", bodies + sites, 3),
+            StageGroup(KINEMATICS, "rad", bodies + sites, 9),
+        ]
+        upper = np.triu_indices(len(names))
+        self._mass_units: list[tuple[Ints, Ints]] = []
+        for both, unit in ((2, "kg·m²"), (1, "kg·m"), (0, "kg")):
+            chosen = turns[upper[0]].astype(int) + turns[upper[1]].astype(int) == both
+            rows, columns = upper[0][chosen], upper[1][chosen]
+            pairs = zip(rows.tolist(), columns.tolist(), strict=True)
+            labels = tuple(names[i] if i == j else f"{names[i]} and {names[j]}" for i, j in pairs)
+            self._mass_units.append((rows, columns))
+            self.groups.append(StageGroup(MASS, unit, labels))
+        for stage, arrays in ARRAYS.items():
+            self.groups += self._of_dofs(stage, names, ("N·m", "N"), arrays)
+        self.groups += self._of_dofs(AFTER, names, ("rad/s²", "m/s²"), ("",))
+        self._names = _contact_names(matched)
+
+    def _of_dofs(
+        self, stage: str, names: Sequence[str], units: tuple[str, str], arrays: Sequence[str]
+    ) -> list[StageGroup]:
+        labels = [
+            f"{name} ({_WORDS[array]})" if array in _WORDS else name
+            for array in arrays
+            for name in names
+        ]
+        turns = np.tile(self._turns, len(arrays))
+        return [
+            StageGroup(stage, unit, tuple(np.array(labels, dtype=object)[chosen]))
+            for unit, chosen in ((units[0], turns), (units[1], ~turns))
+        ]
+
+    def primes(self, side: int) -> str:
+        """What of the step before an engine takes; "" for nothing."""
+        own = self._parts[side]
+        return own.PRIMES if own else ""
+
+    def prime(self, side: int, data: Data, before: dict[str, Array]) -> None:
+        """Let a Data know of the step before; `before` are arrays of the other side."""
+        own, model = self._parts[side], self._models[side]
+        if not own or not own.PRIMES:
+            return
+        given = {}
+        for name, values in before.items():
+            given[name] = np.zeros(model.nv)
+            given[name][self.dofs[side]] = values[self.dofs[1 - side]]
+        own.prime(model, data, given)
+
+    def read(self, side: int, data: Data, qpos: Array) -> Reading:
+        """The numbers of all groups but the last, and the contacts.
+
+        Args:
+            side: 0 or 1.
+            data: Its derived arrays are of the state.
+            qpos: (nq,) of the state.
+        """
+        model, dofs = self._models[side], self.dofs[side]
+        where, turned = self._poses(side, data)
+        found: list[Array] = [where, turned]
+        own = self._parts[side]
+        mass = np.full((model.nv, model.nv), np.nan)
+        if own:
+            mass = own.mass_matrix(model, data, qpos)
+        mass = mass[np.ix_(dofs, dofs)]
+        found += [mass[rows, columns] for rows, columns in self._mass_units]
+        for arrays in ARRAYS.values():
+            values = np.concatenate([_told(data, name, model.nv)[dofs] for name in arrays])
+            turns = np.tile(self._turns, len(arrays))
+            found += [values[turns], values[~turns]]
+        return found, self._touching(side, data)
+
+    def whole(self, side: int, reading: Reading, rate: Array) -> list[Array]:
+        """The numbers of all groups; `rate` (nv,) is how the velocity changed, a second."""
+        own = rate[self.dofs[side]]
+        return [*reading[0], own[self._turns], own[~self._turns]]
+
+    def _poses(self, side: int, data: Data) -> tuple[Array, Array]:
+        """Origins and rotations of the left's frames, wherever the right's are in the solids."""
+        solids, sites = self._matched.solids[1:], self._matched.sites
+        xpos, xquat = data.xpos, data.xquat
+        spots, turns = [], []
+        for solid in solids:
+            body = (solid.one, solid.two)[side]
+            turn = matrix_from_quat(xquat[body])
+            spot = xpos[body]
+            if side:
+                spot, turn = spot + turn @ solid.align.pos, turn @ solid.align.mat
+            spots.append(spot)
+            turns.append(turn.ravel())
+        for pair in sites:
+            spots.append(data.site_xpos[pair[side]])
+            turns.append(data.site_xmat[pair[side]])
+        return np.array(spots).ravel(), np.array(turns).ravel()
+
+    def _touching(self, side: int, data: Data) -> Touching:
+        contacts, names = data.contacts, self._names[side]
+        found: Touching = {}
+        for k, geoms in enumerate(contacts.geom.tolist()):
+            depth, force = -float(contacts.dist[k]), contacts.frame[k].T @ contacts.force[k]
+            if depth < 0 and not force.any():
+                continue  # it is near, and does nothing
+            name, turned = names.name(geoms)
+            before, total = found.get(name, (-np.inf, np.zeros(3)))
+            found[name] = max(depth, before), total + (-force if turned else force)
+        return found
+
+
+class _PairNames:
+    """Names for contacts, and which way a force is counted: the same for both sides."""
+
+    def __init__(self, names: ContactNames, keys: Sequence[int], geoms: bool) -> None:
+        self._names, self._keys, self._geoms = names, keys, geoms
+
+    def name(self, pair: Sequence[int]) -> tuple[str, bool]:
+        """What a pair of geoms is called, and whether its force must be turned round."""
+        one, two = (self._keys[geom] for geom in pair)
+        say = self._names.geoms if self._geoms else self._names.pair
+        return say(one, two), one > two
+
+
+def _contact_names(matched: Matched) -> tuple[_PairNames, _PairNames]:
+    """By geoms, where both Models have the same; else by bodies, called as on the left."""
+    one, two = matched.one, matched.two
+    if one.geom_names == two.geom_names and np.array_equal(one.geom_bodyid, two.geom_bodyid):
+        names = ContactNames.of(one)
+        keys = range(one.ngeom)
+        return _PairNames(names, keys, True), _PairNames(names, keys, True)
+    counterpart = {b: a for a, b in matched.bodies}
+    # A body that only the right has comes after those of the left.
+    extra = [b for b in range(two.nbody) if b not in counterpart]
+    labels = [*one.body_names, *(two.body_names[b] or f"body {b} of the right" for b in extra)]
+    counterpart |= {b: one.nbody + k for k, b in enumerate(extra)}
+    parents = [*one.body_parentid.tolist(), *([0] * len(extra))]
+    geoms = ["world", *([""] * (len(labels) - 1))]
+    names = ContactNames(labels, geoms, range(len(labels)), parents)
+    right = [counterpart[int(body)] for body in two.geom_bodyid]
+    left = one.geom_bodyid.tolist()
+    return _PairNames(names, left, False), _PairNames(names, right, False)
+
+
+def _dofs(model: Model, joints: Sequence[int]) -> Ints:
+    """Degrees of freedom of some joints, in their order."""
+    found = [
+        int(model.jnt_dofadr[joint]) + k
+        for joint in joints
+        for k in range(JointType(int(model.jnt_type[joint])).nv)
+    ]
+    return np.array(found, dtype=np.int64)
+
+
+def _dof_names(model: Model, joints: Sequence[int]) -> tuple[list[str], Any]:
+    """A name for each degree of freedom of some joints, and whether it turns."""
+    names, turns = [], []
+    for joint in joints:
+        kind, name = JointType(int(model.jnt_type[joint])), model.joint_names[joint]
+        names += [name or f"joint {joint}"] * kind.nv
+        free = [False] * 3 + [True] * 3
+        turns += free if kind is JointType.FREE else [kind is not JointType.SLIDE] * kind.nv
+    return names, np.array(turns, dtype=bool)
+
+
+def _told(data: Data, name: str, size: int) -> Array:
+    """A derived array (nv,); NaN if the engine does not tell it."""
+    try:
+        return np.array(getattr(data, name))
+    except UnsupportedError:
+        return np.full(size, np.nan)

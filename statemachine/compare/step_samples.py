@@ -1,0 +1,305 @@
+"""What one step on each side was read from many states, and which stage of it differs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..interface import Array
+from .stages import (
+    AFTER,
+    FORCE,
+    FOUND,
+    KINEMATICS,
+    MASS,
+    STAGES,
+    Reading,
+    StageGroup,
+    StageReader,
+    Touching,
+)
+
+_STANDS_OUT = 10.0  # times the median
+_MOST_SPIKES = 5
+_LEAST = 1e-3  # of the largest: a size that is less is not usual
+_FORCES = ("bias", "actuator", "passive", FORCE, "other constraints")
+
+
+@dataclass(frozen=True)
+class StageGap:
+    """One stage of a step, over all moments.
+
+    Attributes:
+        stage: Its name.
+        told: Whether both engines tell it; reason: why not, or "".
+        unit: Of the figures.
+        scale: Its usual size on the two sides: the median of its largest entry over the moments
+            at which that is at least a thousandth of what it ever is.
+        tolerance: What does not count.
+        null: How far the left side, put back to its own states, gets from its own run.
+        worst: The largest difference; at: when [s from the start].
+        where: The joint, body or pair to look at then.
+        beyond: At how many moments it is beyond the tolerance and beyond the null.
+        first: The first of them [s]; None if there is none.
+    """
+
+    stage: str
+    told: bool
+    reason: str = ""
+    unit: str = ""
+    scale: float = 0.0
+    tolerance: float = 0.0
+    null: float = 0.0
+    worst: float = 0.0
+    at: float | None = None
+    where: str = ""
+    beyond: int = 0
+    first: float | None = None
+
+
+@dataclass(frozen=True)
+class StepSpike:
+    """A moment at which the accelerations of one step differ far more than they usually do.
+
+    Attributes:
+        at: When [s from the start].
+        size: The difference of accelerations [unit]; joint: whose.
+        stage: The first stage beyond its tolerance there; where: its joint, body or pair.
+    """
+
+    at: float
+    size: float
+    unit: str
+    joint: str
+    stage: str
+    where: str
+
+
+@dataclass(frozen=True, eq=False)
+class StageMeasure:
+    """What was read of one group, at n moments.
+
+    Attributes:
+        group: Its k elements.
+        apart: (n, k) how far the two sides are apart.
+        null: (n, k) how far the left side is from itself.
+        sizes: (n,) its largest entry on either side.
+        scale: Its usual size.
+        tolerance: What does not count.
+    """
+
+    group: StageGroup
+    apart: Array
+    null: Array
+    sizes: Array
+    scale: float = 0.0
+    tolerance: float = 0.0
+
+    @property
+    def beyond(self) -> NDArray[np.bool_]:
+        """(n, k) what is beyond the tolerance, and beyond the null."""
+        return self.apart > np.maximum(self.tolerance, self.null)
+
+
+class StepSamples:
+    """What was read at all moments."""
+
+    def __init__(self, reader: StageReader) -> None:
+        self._reader, self.failed = reader, 0
+        self.times: list[float] = []
+        # For each group and moment: differences, those of the null, and the largest entry.
+        self._apart: list[list[Array]] = [[] for _ in reader.groups]
+        self._null: list[list[Array]] = [[] for _ in reader.groups]
+        self._size: list[list[float]] = [[] for _ in reader.groups]
+        self._touch: list[tuple[dict[str, float], ...]] = []  # depth and force, each with its null
+        self._depth: list[float] = []
+        self._force: list[float] = []
+
+    def add(
+        self,
+        time: float,
+        running: tuple[Reading, Array],
+        left: tuple[Reading, Array],
+        right: tuple[Reading, Array],
+    ) -> None:
+        """One moment: the left side as it runs, put back to its State, and the right side."""
+        self.times.append(time)
+        rows = [self._reader.whole(k, *each) for k, each in ((0, running), (0, left), (1, right))]
+        for g, group in enumerate(self._reader.groups):
+            whole, back, other = (row[g] for row in rows)
+            self._null[g].append(group.apart(whole, back))
+            self._apart[g].append(group.apart(back, other))
+            self._size[g].append(group.largest(back, other))
+        (_, a), (_, b), (_, c) = running[0], left[0], right[0]
+        self._touch.append((_deep(b, c), _deep(a, b), _pushed(b, c), _pushed(a, b)))
+        self._depth.append(max((abs(d) for d, _ in (*b.values(), *c.values())), default=0.0))
+        pushes = (float(np.linalg.norm(f)) for _, f in (*b.values(), *c.values()))
+        self._force.append(max(pushes, default=0.0))
+
+    def measures(self, relative: float) -> list[StageMeasure]:
+        """What both sides tell, each group with its scale and tolerance."""
+        found = [
+            *self._of_groups(),
+            *self._of_pairs(FOUND, 0, "m", self._depth),
+            *self._of_pairs(FORCE, 2, "N", self._force),
+        ]
+        found = [replace(each, scale=_usual(each.sizes)) for each in found]
+        # What is nothing but rounding, as the contact force of a run in which nothing touches,
+        # is held against the other forces, and accelerations against what forces give.
+        pushed = {unit: _largest(found, _FORCES, unit) for unit in ("N·m", "N")}
+        masses = {unit: _largest(found, (MASS,), unit) for unit in ("kg·m²", "kg")}
+        least = {**pushed, "rad/s²": 0.0, "m/s²": 0.0}
+        for unit, force, mass in (("rad/s²", "N·m", "kg·m²"), ("m/s²", "N", "kg")):
+            if masses[mass]:
+                least[unit] = pushed[force] / masses[mass]
+        scaled = []
+        for each in found:
+            scale = each.scale
+            if each.group.stage in (*_FORCES, AFTER):
+                scale = max(scale, _LEAST * least[each.group.unit])
+            scaled.append(replace(each, scale=scale, tolerance=relative * scale))
+        return scaled
+
+    def _of_groups(self) -> Iterator[StageMeasure]:
+        for g, group in enumerate(self._reader.groups):
+            apart = np.array(self._apart[g])
+            if not group.names or not apart.size:
+                continue
+            told = np.isfinite(apart).all(axis=0)
+            if told.any():
+                names = tuple(np.array(group.names, dtype=object)[told])
+                null = np.nan_to_num(np.array(self._null[g])[:, told])
+                own = replace(group, names=names)
+                yield StageMeasure(own, apart[:, told], null, np.array(self._size[g]))
+
+    def _of_pairs(
+        self, stage: str, place: int, unit: str, sizes: list[float]
+    ) -> Iterator[StageMeasure]:
+        pairs = tuple(dict.fromkeys(p for t in self._touch for k in (0, 1) for p in t[place + k]))
+        if pairs:
+            apart, null = (
+                np.array([[t[place + k].get(p, 0.0) for p in pairs] for t in self._touch])
+                for k in (0, 1)
+            )
+            yield StageMeasure(StageGroup(stage, unit, pairs), apart, null, np.array(sizes))
+
+    def gaps(self, measures: Sequence[StageMeasure]) -> tuple[StageGap, ...]:
+        """Each stage, by that of its units that is farthest beyond its tolerance."""
+        found = []
+        for stage in STAGES:
+            own = [self._gap(each) for each in measures if each.group.stage == stage]
+            if not own:
+                touches = stage == FOUND
+                reason = "nothing touches" if touches else "an engine does not tell it"
+                own = [StageGap(stage, touches, reason)]
+            # Of the measures of one stage that of pairs comes last, and says more than joints do.
+            found.append(max(reversed(own), key=_how_far if stage != FORCE else _differs))
+        return tuple(found)
+
+    def _gap(self, each: StageMeasure) -> StageGap:
+        row, place = np.unravel_index(int(np.argmax(each.apart)), each.apart.shape)
+        worst, hits = float(each.apart[row, place]), each.beyond.any(axis=1)
+        return StageGap(
+            stage=each.group.stage,
+            told=True,
+            unit=each.group.unit,
+            scale=each.scale,
+            tolerance=each.tolerance,
+            null=float(each.null.max()),
+            worst=worst,
+            at=self.times[int(row)] if worst else None,
+            where=_culprit(each, int(row)) if worst else "",
+            beyond=int(hits.sum()),
+            first=self.times[int(np.argmax(hits))] if hits.any() else None,
+        )
+
+    def spikes(self, measures: Sequence[StageMeasure]) -> tuple[StepSpike, ...]:
+        """The moments at which the accelerations stand out."""
+        firsts = self._firsts(measures)
+        found: list[StepSpike] = []
+        for each in measures:
+            if each.group.stage != AFTER:
+                continue
+            most = each.apart.max(axis=1)
+            stands = each.beyond.any(axis=1) & (most > _STANDS_OUT * np.median(most))
+            padded = np.concatenate([[-np.inf], most, [-np.inf]])
+            stands &= (most >= padded[:-2]) & (most > padded[2:])  # no flank of another
+            for row in np.flatnonzero(stands).tolist():
+                joint = each.group.names[int(np.argmax(each.apart[row]))]
+                spike = StepSpike(
+                    self.times[row], float(most[row]), each.group.unit, joint, *firsts[row]
+                )
+                found.append(spike)
+        return tuple(sorted(found, key=lambda spike: -spike.size)[:_MOST_SPIKES])
+
+    def _firsts(self, measures: Sequence[StageMeasure]) -> list[tuple[str, str]]:
+        """For each moment the first stage beyond its tolerance, and its worst element."""
+        found = [(AFTER, "")] * len(self.times)
+        for each in sorted(measures, key=lambda m: -STAGES.index(m.group.stage)):
+            for row in np.flatnonzero(each.beyond.any(axis=1)).tolist():
+                found[row] = each.group.stage, _culprit(each, row)
+        return found
+
+
+def _culprit(each: StageMeasure, row: int) -> str:
+    """What to look at in a moment: the element that differs most, or where that comes from.
+
+    A body that is elsewhere takes along all that hangs on it, so that the first one counts; a
+    mass shows in the entries of every joint that carries it, so that the last of these counts.
+    """
+    names, hits = each.group.names, np.flatnonzero(each.beyond[row])
+    if each.group.stage == MASS:
+        hits = np.array([k for k in hits.tolist() if " and " not in names[k]], dtype=np.int64)
+    if len(hits) and each.group.stage in (KINEMATICS, MASS):
+        return names[int(hits[0] if each.group.stage == KINEMATICS else hits[-1])]
+    return names[int(np.argmax(each.apart[row]))]
+
+
+def _usual(sizes: Array) -> float:
+    """The median of sizes (n,), of those that are no thousandth of the largest."""
+    acting = sizes[sizes > _LEAST * sizes.max(initial=0.0)]
+    return float(np.median(acting)) if len(acting) else 0.0
+
+
+def _largest(measures: Sequence[StageMeasure], stages: Sequence[str], unit: str) -> float:
+    """The largest scale of some stages in a unit."""
+    scales = (m.scale for m in measures if m.group.stage in stages and m.group.unit == unit)
+    return max(scales, default=0.0)
+
+
+def _differs(gap: StageGap) -> tuple[bool, bool]:
+    """Whether it differs, and whether at all."""
+    return gap.beyond > 0, gap.worst > 0
+
+
+def _how_far(gap: StageGap) -> tuple[bool, float]:
+    """By what the units of one stage are ranked."""
+    if not gap.worst:
+        return gap.beyond > 0, 0.0
+    return gap.beyond > 0, gap.worst / gap.tolerance if gap.tolerance else np.inf
+
+
+def _deep(one: Touching, two: Touching) -> dict[str, float]:
+    """How far apart the depths of each pair are [m]; of one that only one side finds, its depth."""
+    found = {}
+    for pair in dict.fromkeys([*one, *two]):
+        depths = [side[pair][0] if pair in side else 0.0 for side in (one, two)]
+        found[pair] = abs(depths[0] - depths[1])
+    return found
+
+
+def _pushed(one: Touching, two: Touching) -> dict[str, float]:
+    """How far apart the forces of each pair are [N], as vectors."""
+    nothing = np.zeros(3)
+    return {
+        pair: float(
+            np.linalg.norm(
+                (one[pair][1] if pair in one else nothing)
+                - (two[pair][1] if pair in two else nothing)
+            )
+        )
+        for pair in dict.fromkeys([*one, *two])
+    }

@@ -1,0 +1,146 @@
+"""Finer timesteps: what is discretisation vanishes with them, and what is a difference stays."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import statemachine as sm
+from statemachine.compare import TimestepConvergence, convergence
+from statemachine.errors import EndedEarlyError
+from statemachine.report.convergence import page
+from statemachine.traces import Trace, record
+
+from .conftest import Cli, need_engine
+
+FALL = """<mujoco><option timestep="0.01" integrator="{integrator}">{flag}</option>
+  <worldbody><body pos="0 0 {height}"><joint name="swing" axis="0 1 0" damping="0.02"/>
+    <geom type="capsule" size="0.02" fromto="0 0 0 0.4 0 0" mass="{mass}" {touch}/></body>
+    <geom name="floor" type="plane" size="5 5 1"/></worldbody></mujoco>"""
+
+
+def found_of(folder: Path, *changes: dict[str, str], seconds: float = 1.0) -> TimestepConvergence:
+    usual = {"integrator": "implicitfast", "flag": "", "mass": "0.1", "height": "0.3"}
+    usual["touch"] = 'contype="0" conaffinity="0"'
+    models = []
+    for k, change in enumerate(changes):
+        file = folder / f"{k}.xml"
+        file.write_text(FALL.format(**{**usual, **change}))
+        models.append(sm.load(file))
+
+    def run(finer: int) -> tuple[Trace, Trace]:
+        one, two = (record(model.replace(substeps=finer), None, seconds) for model in models)
+        return one, two
+
+    return convergence(run)
+
+
+def headline(found: TimestepConvergence) -> str:
+    told = page(found, "fall").headline
+    assert told is not None
+    return told.text
+
+
+def test_explicit_against_implicit_damping_is_discretisation(tmp_path: Path) -> None:
+    explicit = {"integrator": "Euler", "flag": '<flag eulerdamp="disable"/>'}
+    found = found_of(tmp_path, {}, explicit)
+    (joint,) = [each for each in found.whole if each.kind == "joint"]
+    assert joint.verdict == "discretisation"
+    assert joint.gaps[0] > 1e-3
+    assert [joint.gaps[k] / joint.gaps[k + 1] for k in (0, 1)] == pytest.approx([2, 2], rel=0.1)
+    # Each side has as far to go, or more.
+    assert joint.left[0] + joint.right[0] > joint.gaps[0] - joint.gaps[2]
+    assert found.vanishes
+    assert page(found, "fall").holds
+    assert "it is discretisation" in headline(found)
+
+
+def test_another_order_of_integration_is_discretisation(tmp_path: Path) -> None:
+    found = found_of(tmp_path, {"integrator": "RK4"}, {"integrator": "Euler"})
+    assert {each.verdict for each in found.whole} == {"discretisation"}
+
+
+def test_a_changed_mass_stays(tmp_path: Path) -> None:
+    found = found_of(tmp_path, {}, {"mass": "0.11"})
+    assert {each.verdict for each in found.whole if each.kind == "joint"} == {"stays"}
+    assert not found.vanishes
+    shown = page(found, "fall")
+    assert not shown.holds
+    assert "does not vanish with the timestep" in headline(found)
+
+
+def test_what_is_both_is_so_in_part(tmp_path: Path) -> None:
+    explicit = {"integrator": "Euler", "flag": '<flag eulerdamp="disable"/>', "mass": "0.101"}
+    found = found_of(tmp_path, {}, explicit, seconds=0.3)
+    (joint,) = [each for each in found.whole if each.kind == "joint"]
+    assert joint.verdict == "in part"
+    assert 0.1 * joint.gaps[0] < joint.limit < 0.9 * joint.gaps[0]
+
+
+def test_one_side_twice_has_no_gap(tmp_path: Path) -> None:
+    found = found_of(tmp_path, {}, {})
+    assert {each.verdict for each in found.whole} == {"rounding"}
+    assert found.before == found.whole
+    assert "no gap" in headline(found)
+
+
+def test_a_touch_parts_what_can_be_said(tmp_path: Path) -> None:
+    touching = {"touch": ""}
+    found = found_of(tmp_path, touching, {**touching, "mass": "0.1"}, seconds=0.5)
+    assert found.touch is not None
+    assert 0.1 < found.touch < 0.4
+    texts = [getattr(block, "text", "") for block in page(found, "fall").blocks]
+    assert any("contact law depends on its own timestep" in text for text in texts)
+
+
+def test_a_run_that_ends_early_is_no_limit(tmp_path: Path) -> None:
+    file = tmp_path / "ends.xml"
+    file.write_text(FALL.format(integrator="Euler", flag="", mass="0.1", height="1", touch=""))
+    model = sm.load(file)
+
+    def run(finer: int) -> tuple[Trace, Trace]:
+        trace = record(model.replace(substeps=finer), None, 0.1)
+        object.__setattr__(trace.header, "ended", "it left every bound")
+        return trace, trace
+
+    with pytest.raises(EndedEarlyError, match="it left every bound"):
+        convergence(run)
+
+
+def test_the_command_line_answers_both_questions(cli: Cli) -> None:
+    need_engine("pybullet")
+    asked = ("compare", "fall", "--seconds", "0.3")
+    done = cli(*asked, "--converge")
+    assert done.returncode == 0
+    assert "There is no gap beyond rounding, whatever the timestep" in " ".join(done.stdout.split())
+    told = json.loads(cli(*asked, "--converge", "--json").stdout)
+    assert told["vanishes"]
+    assert {"name", "gaps", "limit", "verdict"} <= told["whole"][0].keys()
+    done = cli(*asked, "--one-step")
+    assert done.returncode == 0
+    assert "both sides take the same step" in done.stdout
+    # Two sides of one engine; the change is named.
+    heavy = cli("compare", "waves", "so101", "so101", "damping=1", "--seconds", "0.2", "--one-step")
+    assert heavy.returncode == 1
+    assert "part in the stage “passive”" in " ".join(heavy.stdout.split())
+    told = json.loads(cli(*asked, "--one-step", "--json").stdout)
+    assert told["first"] is None
+    assert [stage["stage"] for stage in told["stages"]][:2] == ["kinematics", "mass matrix"]
+
+
+def test_options_that_do_not_go_together_are_refused(cli: Cli, tmp_path: Path) -> None:
+    for words in (
+        ("--one-step", "--converge"),
+        ("--converge", "--why"),
+        ("--one-step", "--floor", "1mm"),
+    ):
+        done = cli("compare", "hold", *words)
+        assert done.returncode == 2
+        assert "goes without" in done.stderr
+    file = str(tmp_path / "a.npz")
+    cli("trace", "record", "droop", "--seconds", "0.1", "-o", file)
+    done = cli("compare", file, file, "--one-step")
+    assert done.returncode == 2
+    assert "runs both sides" in done.stderr

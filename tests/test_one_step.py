@@ -1,0 +1,165 @@
+"""One step from the same state: the stage at which two sides part, and the joint or pair."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import statemachine as sm
+from statemachine.compare import StepComparison, one_step, rerun_of
+from statemachine.compare.one_step import RELATIVE
+from statemachine.compare.perturbed import Rerun
+from statemachine.compare.stages import STAGES
+from statemachine.errors import BadInputError
+from statemachine.scenarios import scenario
+
+from .conftest import need_engine
+
+# Two links on a stand, driven, damped, with a ball that falls beside them.
+ROBOT = """<mujoco><option timestep="0.005" integrator="implicitfast"/><worldbody>
+  <geom name="floor" type="plane" size="5 5 1"/>
+  <body name="upper" pos="0 0 1"><joint name="shoulder" axis="0 1 0" damping="0.1"/>
+    <geom name="upper" type="capsule" size="0.03" fromto="0 0 0 0.3 0 0" contype="0"/>
+    <body name="lower" pos="0.3 0 0"><joint name="elbow" axis="0 1 0" damping="0.1"
+        frictionloss="0.01"/>
+      <geom name="lower" type="capsule" size="0.02" fromto="0 0 0 0.3 0 0" contype="0"/>
+      <site name="tip" pos="0.3 0 0"/></body></body>
+  <body name="ball" pos="1 0 0.2"><freejoint name="ball"/><geom name="ball" size="0.05"/></body>
+</worldbody><actuator><position name="shoulder" joint="shoulder" kp="20"/>
+<position name="elbow" joint="elbow" kp="10"/></actuator></mujoco>"""
+CHANGES = {
+    "kinematics": ('pos="0.3 0 0"><joint', 'pos="0.303 0 0"><joint', "lower"),
+    "mass matrix": ('size="0.02"', 'size="0.02" mass="0.5"', "elbow"),
+    "actuator": ('kp="10"', 'kp="11"', "elbow"),
+    "passive": ('name="shoulder" axis="0 1 0" damping="0.1"',
+                'name="shoulder" axis="0 1 0" damping="0.2"', "shoulder"),
+    "contacts found": ('size="0.05"', 'size="0.05" margin="0.01"', "ball on floor"),
+    "contact force": ('name="floor" type="plane"', 'name="floor" type="plane" solref="0.05 1"',
+                      "ball on floor"),
+    "other constraints": ('frictionloss="0.01"', 'frictionloss="0.02"', "elbow (dry friction)"),
+    "acceleration": ('integrator="implicitfast"/>',
+        'integrator="Euler"><flag eulerdamp="disable"/></option>', ""),
+}  # fmt: skip
+
+
+def model_of(folder: Path, text: str, name: str) -> sm.Model:
+    file = folder / f"{name}.xml"
+    file.write_text(text)
+    return sm.load(file)
+
+
+def rerun(model: sm.Model, seconds: float = 0.5) -> Rerun:
+    return Rerun(model, lambda _: lambda _time, _data: (0.6, -0.9), seconds)
+
+
+def first(found: StepComparison) -> str:
+    return found.first.stage if found.first else ""
+
+
+def test_identical_sides_give_exactly_zero_in_every_stage(tmp_path: Path) -> None:
+    one, two = (model_of(tmp_path, ROBOT, name) for name in ("one", "two"))
+    found = one_step(rerun(one), two)
+    assert [gap.stage for gap in found.stages] == list(STAGES)
+    assert {gap.worst for gap in found.stages} == {0.0}
+    assert {gap.null for gap in found.stages} == {0.0}
+    assert found.first is None
+    assert not found.spikes
+    assert all(gap.told for gap in found.stages)
+
+
+@pytest.mark.parametrize("stage", CHANGES)
+def test_a_change_shows_at_its_own_stage_first(stage: str, tmp_path: Path) -> None:
+    old, new, where = CHANGES[stage]
+    assert ROBOT.count(old) >= 1
+    one = model_of(tmp_path, ROBOT, "one")
+    two = model_of(tmp_path, ROBOT.replace(old, new, 1), "two")
+    found = one_step(rerun(one), two)
+    assert first(found) == stage
+    assert found.first is not None
+    assert where in found.first.where
+
+
+def test_a_contact_shows_from_the_moment_at_which_it_begins(tmp_path: Path) -> None:
+    old, new, _ = CHANGES["contact force"]
+    one = model_of(tmp_path, ROBOT, "one")
+    found = one_step(rerun(one), model_of(tmp_path, ROBOT.replace(old, new), "two"))
+    assert found.first is not None
+    # The ball falls 0.15 m.
+    assert found.first.first == pytest.approx((2 * 0.15 / 9.81) ** 0.5, abs=0.01)
+    assert found.spikes
+    assert found.spikes[0].stage == "contact force"
+    assert found.spikes[0].where == "ball on floor"
+
+
+def test_joints_in_another_order_are_matched(tmp_path: Path) -> None:
+    ball = ROBOT[ROBOT.index('  <body name="ball"') : ROBOT.index("</worldbody>")]
+    other = ROBOT.replace(ball, "").replace('<body name="upper"', f'{ball}<body name="upper"', 1)
+    one, two = model_of(tmp_path, ROBOT, "one"), model_of(tmp_path, other, "two")
+    assert one.joint_names != two.joint_names
+    assert one_step(rerun(one), two).first is None
+
+
+def test_what_does_not_count_is_relative_to_the_scale(tmp_path: Path) -> None:
+    one = model_of(tmp_path, ROBOT, "one")
+    two = model_of(tmp_path, ROBOT.replace('kp="10"', 'kp="10.0001"'), "two")
+    assert first(one_step(rerun(one), two)) == "actuator"
+    assert first(one_step(rerun(one), two, relative=1e-3)) == ""
+    assert RELATIVE == 1e-6
+
+
+def test_moments_are_spread_over_the_run(tmp_path: Path) -> None:
+    one = model_of(tmp_path, ROBOT, "one")
+    found = one_step(rerun(one), one, moments=20)
+    assert (found.moments, found.every) == (20, 5)
+    assert found.until == pytest.approx(0.475)
+    with pytest.raises(BadInputError, match="at least one moment"):
+        one_step(rerun(one), one, moments=0)
+
+
+def test_models_without_a_common_joint_are_refused(tmp_path: Path) -> None:
+    one = model_of(tmp_path, ROBOT, "one")
+    with pytest.raises(BadInputError, match="no joint in common"):
+        one_step(rerun(one), model_of(tmp_path, "<mujoco/>", "none"))
+
+
+@pytest.mark.parametrize("order", [("mujoco", "pybullet"), ("pybullet", "mujoco")])
+def test_the_engines_are_alike_until_something_touches(order: tuple[str, str]) -> None:
+    need_engine("pybullet")
+    hold = scenario("hold")
+    one, two = (sm.load(hold.model, backend=name) for name in order)
+    found = one_step(rerun_of(hold, one, seconds=0.5), two)
+    assert first(found) == "contacts found"
+    assert found.first is not None
+    assert found.first.first == pytest.approx(0.27, abs=0.011)
+    assert "gripper on floor" in found.first.where
+    # Before, all is rounding, mass matrices that each engine computes itself included.
+    began = found.first.first or 0.0
+    assert all((gap.first or 1.0) >= began for gap in found.stages)
+    assert {gap.stage for gap in found.stages if gap.told} == set(STAGES)
+    assert any("by construction" in note for note in found.notes)
+
+
+def test_the_null_shows_what_a_restore_forgets() -> None:
+    """PyBullet's memory of contacts cannot be read: put back, it does not go on as it did."""
+    need_engine("pybullet")
+    box = scenario("box")
+    side = rerun_of(box, sm.load(box.model, backend="pybullet"), seconds=0.3)
+    found = {gap.stage: gap for gap in one_step(side, side.model, moments=20).stages}
+    assert found["contact force"].null > 1e-3
+    assert found["kinematics"].null == 0
+    assert not any(gap.beyond for gap in found.values())
+
+
+def test_an_engine_that_does_not_tell_a_stage_is_not_guessed_at() -> None:
+    need_engine("pybullet")
+    fall = scenario("fall")
+    one = rerun_of(fall, sm.load(fall.model), seconds=0.2)
+    fresh = sm.load(fall.model, backend="pybullet", defaults="engine")
+    two = rerun_of(fall, fresh, seconds=0.2).model
+    found = {gap.stage: gap for gap in one_step(one, two, moments=10).stages}
+    assert not found["passive"].told
+    assert found["passive"].reason
+    # It has no rotors, which the model's motors have.
+    assert found["mass matrix"].beyond == 10
+    assert found["kinematics"].beyond == 0
