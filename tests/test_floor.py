@@ -197,3 +197,11 @@ def test_a_trace_of_a_file_has_no_left_side_to_run_again(cli: Cli, tmp_path: Pat
     refused = cli("compare", file, file, "--floor", "1mm")
     assert refused.returncode == 2
     assert "recorded run" in refused.stderr
+
+
+def test_a_trace_that_is_played_on_two_sides_has_a_floor(cli: Cli, tmp_path: Path) -> None:
+    file = str(tmp_path / "a.npz")
+    cli("trace", "record", "droop", "--seconds", "0.2", "-o", file)
+    done = cli("compare", file, "so101/scene", "so101/scene", "damping=0.7")
+    assert "The chaos floor" in done.stdout
+    assert "1e-12" in done.stdout

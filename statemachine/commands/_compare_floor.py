@@ -57,15 +57,17 @@ def floor_of(
     one, two = traces
     if options.no_floor:
         return None
-    if request.is_traces or one.header.recorded:
+    if (request.is_traces and not request.sides) or one.header.recorded:
         if options.floor:
             raise BadInputError("--floor runs the left side again, and it is a recorded run")
         return None
     from ..compare import chaos_floor
     from ..compare.perturbed import parse_uncertainty
     from ..report.progress import progress
-    from ._compare_rerun import side_of
+    from ._compare_rerun import played_on, side_of
 
+    if request.is_traces:
+        rerun = played_on(request, 0, one)
     with progress("chaos floor") as told:
         return chaos_floor(
             comparison,

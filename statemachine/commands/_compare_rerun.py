@@ -18,16 +18,19 @@ def both_of(request: Any) -> tuple[Any, Any]:
     if not request.sides:
         return side_of(request, 0), side_of(request, 1)
     from ..compare import run_sides
-    from ..compare.perturbed import replayed
 
     run = run_sides(request)
     if run.reruns:
         return run.reruns
-    found = []
-    for side, trace in zip(request.sides, (run.left, run.right), strict=True):
-        options = trace.header.options
-        found.append(replace(replayed(trace, side.load(**options)), options=dict(options)))
-    return found[0], found[1]
+    return played_on(request, 0, run.left), played_on(request, 1, run.right)
+
+
+def played_on(request: Any, place: int, trace: Any) -> Any:
+    """How a recorded run was played on one of two sides, as a `compare.Rerun`."""
+    from ..compare.perturbed import replayed
+
+    options = dict(trace.header.options)
+    return replace(replayed(trace, request.sides[place].load(**options)), options=options)
 
 
 def side_of(request: Any, place: int) -> Any:
