@@ -81,14 +81,9 @@ def _controller(model: sm.Model, _seed: int) -> Callable[[float, sm.Data], list[
     return controller
 
 
-class Swing(Scenario):
-    """Two commands to the servos; it is what it is on every model."""
-
-    def on(self, model: sm.Model) -> Scenario:
-        return self
-
-
-SWING = Swing("swing", "The servos are told two poses.", "", 1.0, _controller, lambda _model: "")
+SWING = Scenario(
+    "swing", "The servos are told two poses.", "", 1.0, _controller, lambda _model: "", own=True
+)
 
 
 def write(folder: Path, name: str, text: str) -> Path:
@@ -223,7 +218,7 @@ SERVO = """
       <joint name="slider" type="slide" axis="0 0 1"/>
       <inertial mass="{mass}" pos="0 0 0" diaginertia="0.01 0.01 0.01"/>
       <body name="load" pos="0 0 0.1">
-        <joint name="bend" axis="0 1 0" stiffness="1e5" damping="50"/>
+        <joint name="bend" axis="0 1 0" stiffness="20" damping="2"/>
         <inertial mass="{load}" pos="0 0 0" diaginertia="0.01 0.01 0.01"/>
       </body>
     </body>

@@ -19,8 +19,9 @@ HOME = replace(SWING, keyframe="home")
 STILL = replace(SWING, controller=lambda _model, _seed: lambda _time, _data: [0.0])
 
 
-def shares(found: Explanation) -> dict[str, float | None]:
-    return {each.name: each.share for each in found.shares}
+def shares(found: Explanation) -> dict[str, float]:
+    """The part of each cause; of one without any it is no number."""
+    return {e.name: float("nan") if e.share is None else e.share for e in found.shares}
 
 
 @pytest.mark.parametrize("name", ALONE)
@@ -38,6 +39,7 @@ def test_one_cause_is_found_and_explains_all(name, tmp_path):
     assert told[case.cause] >= 0.95, told
     assert all(abs(share) <= 0.02 for cause, share in told.items() if cause != case.cause), told
     assert set(told) <= {case.cause, idle.cause, "extra actuator of more"}
+    assert found.brought is not None
     assert found.brought <= 1e-9 * found.gap + 1e-12
     assert found.is_explained
     assert found.located == 0
@@ -231,7 +233,7 @@ def test_a_finer_list_has_every_difference(tmp_path):
     right = ARM.replace('damping="0.1"', 'damping="0.11"').replace('kp="20"', 'kp="21"')
     found = explained(tmp_path, ARM, right, scenario=HOME, finer=True)
     assert {"damping of shoulder", "damping of elbow", "gains of shoulder"} <= set(shares(found))
-    assert sum(share or 0.0 for share in shares(found).values()) == pytest.approx(1.0, abs=0.02)
+    assert sum(shares(found).values()) == pytest.approx(1.0, abs=0.02)
 
 
 def test_every_array_of_a_compiled_model_is_compared_or_has_no_effect():

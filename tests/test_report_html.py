@@ -336,7 +336,8 @@ def attribution_of(made: Made, quantity: str = "joints", **more: Any) -> Attribu
         "experiment": "hold", "says": "", "seconds": 2.0, "one": "mujoco", "two": "pybullet",
         "names": ("mujoco", "pybullet"), "quantity": quantity, "unit": "rad",
         "first": {quantity: gap}, "alone": alone, "ladder": ladder, "left": 1e-8 * g,
-        "negligible": 1e-9, "extent": 1.0, "touch": None, "moments": 401, "between": False,
+        "negligible": 1e-9, "floor": 0.0, "extent": 1.0, "touch": None, "moments": 401,
+        "between": False,
         "order": ("First.", "Then."), "runs": 9,
         "provenance": (one.header.provenance, two.header.provenance),
     }  # fmt: skip

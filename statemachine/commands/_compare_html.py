@@ -69,15 +69,16 @@ def write(
     from ..report import compare as pages
     from ..report.html import report, write_report
 
-    attribution, why_not = None, ""
+    found, why_not = None, ""
     if not (options.no_why or comparison.ended):
-        attribution, why_not = _why(request, traces, options.quantity)
+        found, why_not = _why(options, request, traces)
     page = pages.page(
         comparison,
         *traces,
         said=said,
         witness=witness,
-        attribution=attribution,
+        attribution=None if request.sides else found,
+        explanation=found if request.sides else None,
         why_not=why_not,
         models=_models(request, traces),
         command=_typed(options, request),
@@ -90,8 +91,8 @@ def write(
     print(f"wrote {target} ({len(text.encode()) / 1e6:.2f} MB)", file=sys.stderr)
 
 
-def _why(request: Any, traces: tuple[Any, Any], quantity: str | None) -> tuple[Any, str]:
-    """The attribution, or why there is none."""
+def _why(options: argparse.Namespace, request: Any, traces: tuple[Any, Any]) -> tuple[Any, str]:
+    """The attribution, or the explanation of two sides; or why there is none."""
     if request.is_traces:
         return None, (
             "What causes it was not looked for: traces were compared, and causes are found by "
@@ -103,11 +104,13 @@ def _why(request: Any, traces: tuple[Any, Any], quantity: str | None) -> tuple[A
             "by running both again."
         )
     from ..report.progress import progress
-    from ._compare_why import explain
+    from ._compare_why import explain, of_sides, uncertain_of
 
     try:
         with progress("why") as told:
-            return explain(request, quantity, told), ""
+            if request.sides:
+                return of_sides(options, request, told), ""
+            return explain(request, options.quantity, told, uncertain_of(options)), ""
     except StateMachineError as error:
         return None, f"What causes it could not be found: {error}."
 

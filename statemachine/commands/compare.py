@@ -7,7 +7,13 @@ from typing import Any
 
 from ..errors import BadInputError, EndedEarlyError
 from ..installed import PAIR
-from . import _compare_floor, _compare_html, _compare_models, _compare_steps
+from . import (
+    _compare_floor,
+    _compare_html,
+    _compare_models,
+    _compare_steps,
+    _compare_why,
+)
 from . import _compare_pictures as pictures
 from ._common import PROGRAM, add_json, add_menagerie, complain, pairs_of, show
 
@@ -54,12 +60,6 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="KIND=VALUE",
         help="another tolerance, such as joint=0.5deg, tip=2mm, energy=0.1J",
     )
-    parser.add_argument(
-        "--why", action="store_true", help="which difference explains how much of the gap"
-    )
-    parser.add_argument(
-        "--quantity", default=None, metavar="NAME", help="of --why: what the gap is measured in"
-    )
     group = parser.add_argument_group("two sides")
     group.add_argument(
         "--map",
@@ -78,6 +78,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--keyframe", default=None, metavar="NAME", help="where a FUNCTION starts, on both sides"
     )
+    _compare_why.add_options(parser)
     _compare_floor.add_options(parser)
     _compare_steps.add_options(parser)
     _compare_html.add_options(parser)
@@ -196,6 +197,7 @@ def run(options: argparse.Namespace) -> int:
     """Compare, and show."""
     _compare_html.check(options)
     _compare_floor.check(options)
+    _compare_why.check(options)
     steps = _compare_steps.asked(options)
     pictures.complete(options)
     if options.models:
@@ -210,8 +212,6 @@ def run(options: argparse.Namespace) -> int:
             f"compare what? An experiment ({', '.join(EXPERIMENTS)}), FILE.py:FUNCTION or traces: "
             f"{PROGRAM} compare hold"
         )
-    if options.quantity and not (options.why or options.html):
-        raise BadInputError("--quantity belongs to --why")
     if steps:
         return _compare_steps.run(options, request_of(options))
     if options.why and not options.html:
@@ -220,14 +220,12 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _run_why(options: argparse.Namespace) -> int:
-    from ._compare_why import run as run_why
-
     if options.tolerance:
         raise BadInputError("--why takes no --tolerance: it explains the gap, whatever its size")
     if options.plot or options.film:
         raise BadInputError("--why runs many times: --plot and --film go without it")
     try:
-        return run_why(request_of(options), options.quantity, options.json)
+        return _compare_why.run(options, request_of(options))
     except EndedEarlyError as error:  # what there is until then, and no cause
         return _run_compare(options, f"No cause is named: {error}.")
 

@@ -17,13 +17,13 @@ from ..compare import (
     series,
     touches,
 )
-from ..compare.why import Attribution
+from ..compare.why import Attribution, Explanation
 from ..comparison import QUANTITIES
 from ..comparison.text import NONE, milliseconds, quantity, sentence
 from ..page import Block, Code, Items, Page, Section, Table, TableCell, Text, Verdict
 from ..traces import Trace
 from ..witness import SAME_READING
-from . import why
+from . import explain, why
 from .commanded import commanded
 from .contacts import contact_words
 from .events import Event, events_of, events_table
@@ -56,6 +56,7 @@ def page(
     said: Sequence[str] = (),
     witness: Witness | None = None,
     attribution: Attribution | None = None,
+    explanation: Explanation | None = None,
     why_not: str = "",
     models: Page | None = None,
     command: str = "",
@@ -73,6 +74,7 @@ def page(
         said: What stood in for a run, line by line.
         witness: What a third party says of both sides' fingertips, if asked.
         attribution: How much each factor explains, if that was asked.
+        explanation: What two sides differ in, and what each of it explains, if that was asked.
         why_not: Why there is none, as a sentence.
         models: The differences between what the engines make of the model, if asked.
         command: What makes the page again.
@@ -101,6 +103,9 @@ def page(
         blocks.append(
             Section("why", "What causes it", [*_rerun(attribution), *why.causes(attribution)])
         )
+    elif explanation is not None:
+        found = [*explain.causes(explanation), *explain.three_of(explanation)]
+        blocks.append(Section("why", "What causes it", found))
     elif why_not:
         blocks.append(Section("why", "What causes it", [Text(why_not)]))
     blocks.append(Section("curves", "How far apart, over time", _sorted(both.charts), detail=True))

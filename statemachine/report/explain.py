@@ -10,7 +10,7 @@ from ..compare.why import CauseShare, Explanation
 from ..comparison.text import NONE, capital, percent, quantity, short_time, significant
 from ..page import Block, Items, Page, Section, Table, TableCell, Text, Verdict
 from . import why
-from .why_words import THREE, three
+from .why_words import SMALL, THREE, inside, noisy, three
 
 _SHOWN = 12  # rows; the rest is folded away
 _WIDE = 15  # characters of a value
@@ -38,18 +38,33 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
         f"left: {result.one}; right: {result.two}; {result.seconds:g} s, {result.runs} runs "
         f"compared at {result.moments} moments"
     )
-    blocks: list[Block] = [Text(line) for line in (*said, *_unmatched(result), result.says) if line]
-    blocks.append(Text(_gap_sentence(result)))
+    first = [Text(line) for line in (*said, *_unmatched(result), result.says) if line]
+    name = f"{result.experiment}: why the right is not the left"
+    return Page(name, origin, [*first, *causes(result), *_verdict(result)])
+
+
+def causes(result: Explanation) -> list[Block]:
+    """How far apart the sides are, and how much of it each difference explains."""
+    blocks: list[Block] = [Text(_gap_sentence(result))]
     if result.is_rounding:
-        negligible = quantity(result.negligible, result.unit)
-        blocks.append(Text(f"What is below {negligible} is taken for rounding."))
+        blocks.append(Text(_nothing(result)))
+    elif result.floor > SMALL * result.gap:
+        floor = quantity(result.floor, result.unit)
+        blocks.append(Text(noisy(floor, result.floor / result.gap)))
     blocks += _table(result)
     if result.engines is not None:
         left = quantity(result.engines.gap, result.unit)
         text = f"The left file on both engines: {left} is between the engines themselves"
-        blocks.append(Section("engines", text, why.causes(result.engines), detail=True))
-    blocks += _verdict(result)
-    return Page(f"{result.experiment}: why the right is not the left", origin, blocks)
+        blocks.append(Section("engines", text, why.causes(result.engines)))
+    return blocks
+
+
+def three_of(result: Explanation) -> list[Block]:
+    """The three parts of the gap, and what they mean; nothing where there is none to explain."""
+    if result.is_rounding:
+        return []
+    text = three(result.explained, result.located, result.unexplained)
+    return [Text(f"{text}."), Text(THREE, small=True)]
 
 
 def _unmatched(result: Explanation) -> list[str]:
@@ -81,6 +96,14 @@ def _gap_sentence(result: Explanation) -> str:
         if name != result.quantity
     ]
     return text + (f" Elsewhere: {', '.join(others)}." if others else "")
+
+
+def _nothing(result: Explanation) -> str:
+    """Why there is no gap to explain."""
+    if result.gap <= result.negligible:
+        return f"What is below {quantity(result.negligible, result.unit)} is taken for rounding."
+    known = np.isfinite(result.floor)
+    return inside(quantity(result.floor, result.unit) if known else "without a bound")
 
 
 def _table(result: Explanation) -> list[Block]:
@@ -173,6 +196,8 @@ def _verdict(result: Explanation) -> list[Block]:
     if result.is_rounding:
         refused = any(each.share is None for each in result.shares)
         text = "the two sides move alike" + (", though they differ" if result.shares else "")
+        if result.gap > result.negligible:
+            text = "the gap is inside the chaos floor: there is nothing to explain"
         return [Verdict(text, not refused)]
     blocks: list[Block] = []
     if not result.is_explained:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from ..compare.why import UNEXPLAINED, Attribution, FactorTrial
 from ..comparison.text import NONE, capital, listed, percent, quantity, short_time
 from ..page import Block, Items, Page, Section, Table, TableCell, Text, Verdict
 from .why_words import (
+    SMALL,
     THREE,
     amount,
     astray,
     conclusion,
+    inside,
     moves,
+    noisy,
     shown,
     three,
     title,
@@ -50,9 +54,14 @@ def page(result: Attribution, said: Sequence[str] = ()) -> Page:
 def causes(result: Attribution) -> list[Block]:
     """How much of the gap each factor takes away, all on top of each other and alone."""
     blocks: list[Block] = [Text(_gap_sentence(result))]
+    if not result.alone and result.gap > result.negligible:
+        known = math.isfinite(result.floor)
+        return [*blocks, Text(inside(amount(result, result.floor) if known else "without a bound"))]
     if not result.alone:
         told = f"What is below {amount(result, result.negligible)} is taken for rounding: "
         return [*blocks, Text(f"{told}there is nothing to explain.")]
+    if result.floor > SMALL * result.gap:
+        blocks.append(Text(noisy(amount(result, result.floor), result.floor / result.gap)))
     blocks.append(_ladder(result))
     starred = any(moves(trial) for trial in result.ladder)
     if starred:

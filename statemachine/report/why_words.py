@@ -15,6 +15,7 @@ _OTHERWISE = 0.05  # of the gap: a part that changes by more with the order is g
 _AT_TOUCH = ("contact", "limits", "surfaces")  # what does nothing before something is met
 
 
+SMALL = 0.01  # of the gap: a chaos floor below that is not spoken of
 THREE = (
     "Explained: it goes where settings are brought to the same. Located: it goes only where "
     "something is left out on both sides, which says where it comes from, and not why. "
@@ -28,6 +29,20 @@ def three(explained: float, located: float, unexplained: float) -> str:
         f"{percent(explained)} of the gap is explained, {percent(located)} is located, "
         f"{percent(unexplained)} is unexplained"
     )
+
+
+def inside(floor: str) -> str:
+    """What is said of a gap that is inside the chaos floor."""
+    return (
+        f"The same side is as far from itself, {floor}, when its start and its commands are "
+        "changed by no more than is known of them (the chaos floor): nothing can be concluded "
+        "from a gap that is no larger."
+    )
+
+
+def noisy(floor: str, part: float) -> str:
+    """What is said of a chaos floor that is a part of the gap."""
+    return f"The chaos floor is {floor}, {percent(part)} of the gap: smaller parts say nothing."
 
 
 def amount(result: Attribution, value: float | None) -> str:

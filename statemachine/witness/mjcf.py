@@ -162,8 +162,8 @@ class PlainMjcf:
                 self._attach(child, target, body, around, sites)
             elif isinstance(child.tag, str) and child.tag not in _WITHOUT_PLACES:
                 raise ModelError(
-                    f"{around.source.path.name} uses <{child.tag}>, which Pinocchio does not read, and "
-                    "which is not written out for it"
+                    f"{around.source.path.name} uses <{child.tag}>, which Pinocchio does not read, "
+                    "and which is not written out for it"
                 )
 
     def _attach(
@@ -230,8 +230,8 @@ class PlainMjcf:
         compiler = around.source.compiler
         if free and (element.get("align") == "true" or compiler.aligned):
             raise ModelError(
-                f"{around.source.path.name} aligns a free body with its inertia, which its text does not "
-                "tell the place of"
+                f"{around.source.path.name} aligns a free body with its inertia, which its text "
+                "does not tell the place of"
             )
         ref = float(numbers(given.get("ref", "0"), 1)[0]) if kind in ("hinge", "slide") else 0.0
         self._done["ref"] += bool(ref)

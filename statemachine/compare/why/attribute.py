@@ -10,6 +10,7 @@ from ...errors import EndedEarlyError, unknown_name
 from ...interface import Model
 from ...scenarios import Scenario
 from ...scenarios.runs import Progress, silent
+from ..perturbed import EXACT, Uncertainty
 from .factors import FACTORS, OFF_ORDER, PARITY_ORDER, Factor
 from .gap import Deviation
 from .results import Attribution, FactorTrial, Way
@@ -42,6 +43,7 @@ def attribute(
     seconds: float | None = None,
     seed: int = 0,
     quantity: str | None = None,
+    uncertain: Uncertainty | None = EXACT,
     progress: Progress = silent,
 ) -> Attribution:
     """Run an experiment on two sides, again and again, with ever less between them.
@@ -55,6 +57,7 @@ def attribute(
         seconds: Simulated time; None for the scenario's own.
         seed: Of what the scenario draws.
         quantity: What the gap is measured in; None for the joints, or for what is in the hand.
+        uncertain: What is not known of the start, for the chaos floor; None for no floor.
         progress: Told the fraction that is done.
 
     Raises:
@@ -76,7 +79,8 @@ def attribute(
         raise EndedEarlyError(
             f"as they come, a side does not reach the end: {runs.ended}", ended=runs.ended
         )
-    nothing = first[runs.quantity].worst <= _ROUNDING[names[runs.quantity]]
+    floor = 0.0 if uncertain is None else runs.floor(uncertain)[runs.quantity].worst
+    nothing = first[runs.quantity].worst <= max(_ROUNDING[names[runs.quantity]], floor)
     ladder, parity = ((), ({}, {})) if nothing else _ladder(runs)
     alone = () if nothing else _alone(runs, *parity)
     steps = [trial.worst for trial in ladder if trial.explains is not None]
@@ -95,6 +99,7 @@ def attribute(
         ladder=ladder,
         left=next((worst for worst in reversed(steps) if worst is not None), runs.first),
         negligible=_ROUNDING[names[runs.quantity]],
+        floor=floor,
         extent=runs.extent({}),
         touch=runs.touch,
         moments=len(runs.ruler.time),

@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from ...backends import load
-from ...errors import BadInputError, StateMachineError, unknown_name
+from ...errors import EndedEarlyError, StateMachineError, unknown_name
 from ...interface import Model
 from ...scenarios import Scenario
 from ...scenarios.provenance import Provenance, provenance
 from ...scenarios.runs import Progress, part_of, silent
 from ..matching import match_models
+from ..perturbed import EXACT, Uncertainty
 from .attribute import attribute
 from .causes import Cause, causes, differences_of
 from .gap import Deviation
@@ -73,6 +74,8 @@ class Explanation:
             where the rest comes from, not why.
         unexplained: The part that stays.
         negligible: Gaps below this are taken for rounding, in `unit`.
+        floor: The chaos floor, in `unit`: how far the left side is from itself, started and
+            commanded anew with rounding, and with what is not known of the start.
         impossible: Sets of causes that could not be run.
         unmatched: What only one side has: joints, actuators, by side.
         notes: What a reader should know, in sentences.
@@ -99,6 +102,7 @@ class Explanation:
     located: float
     unexplained: float
     negligible: float
+    floor: float
     impossible: tuple[tuple[str, ...], ...]
     unmatched: tuple[Mapping[str, tuple[str, ...]], Mapping[str, tuple[str, ...]]]
     notes: tuple[str, ...]
@@ -109,8 +113,8 @@ class Explanation:
 
     @property
     def is_rounding(self) -> bool:
-        """Whether there is no gap to explain."""
-        return self.gap <= self.negligible
+        """Whether there is no gap to explain: it is rounding, or inside the chaos floor."""
+        return self.gap <= max(self.negligible, self.floor)
 
     @property
     def is_explained(self) -> bool:
@@ -131,6 +135,7 @@ def explain(
     finer: bool = False,
     budget: int = 200,
     labels: tuple[str, str] | None = None,
+    uncertain: Uncertainty | None = EXACT,
     progress: Progress = silent,
 ) -> Explanation:
     """Bring what two sides differ in to the same, one by one, and run both again.
@@ -147,10 +152,12 @@ def explain(
         finer: Every difference by itself, however many there are.
         budget: How many sets of causes may be run, as far as orders are drawn.
         labels: What the sides are called.
+        uncertain: What is not known of the start, for the chaos floor; None for no floor.
         progress: Told the fraction that is done.
 
     Raises:
-        BadInputError: A side does not reach the end, or nothing can be measured.
+        EndedEarlyError: As they come, a side does not reach the end.
+        BadInputError: Nothing can be measured.
         UnknownNameError: There is no such quantity, or name.
     """
     began, scenario = time.perf_counter(), scenario.on(one)
@@ -173,7 +180,9 @@ def explain(
     quantity = quantity or trials.ruler.held(trials.traces[0], frozenset())
     first = trials.gaps(())
     if not first:
-        raise BadInputError(f"as they come, a side does not reach the end: {trials.ended}")
+        raise EndedEarlyError(
+            f"as they come, a side does not reach the end: {trials.ended}", ended=trials.ended
+        )
     gap = _figure(first[quantity], measure)
     world = not any(_is_as_it_comes(model) for model in models)
     differences = (*differences_of(models[0], models[1], matched, world), *trials.of_the_run())
@@ -185,8 +194,10 @@ def explain(
         gaps = trials.gaps(brought)
         return _figure(gaps[quantity], measure) if gaps else None
 
-    negligible = _ROUNDING[units[quantity]]
-    nothing = gap <= negligible
+    negligible, floor = _ROUNDING[units[quantity]], 0.0
+    if uncertain is not None:
+        floor = _figure(trials.floor(uncertain)[quantity], measure)
+    nothing = gap <= max(negligible, floor)
     known.expected = 3 * len(able) + 2
     found = shapley([] if nothing else able, value, gap or 1.0, budget=budget, seed=seed)
     brought = gap if nothing else value(frozenset(able))
@@ -217,6 +228,7 @@ def explain(
         located=parts[1],
         unexplained=parts[2],
         negligible=negligible,
+        floor=floor,
         impossible=found.impossible,
         unmatched=matched.only,
         notes=matched.notes,

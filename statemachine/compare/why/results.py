@@ -79,6 +79,8 @@ class Attribution:
         ladder: All of them, each added to those before; what is left telescopes to `left`.
         left: What stays unexplained, in `unit`.
         negligible: Gaps below this are taken for rounding, in `unit`.
+        floor: The chaos floor, in `unit`: how far one is from itself, started and commanded anew
+            with rounding, and with what is not known of the start.
         extent: How far one moves from where it starts, in `unit`.
         touch: The first contact of the robot; None without one, or with one from the start.
         moments: How many moments the runs are compared at; between: whether rows had to be
@@ -100,6 +102,7 @@ class Attribution:
     ladder: tuple[FactorTrial, ...]
     left: float
     negligible: float
+    floor: float
     extent: float
     touch: FirstTouch | None
     moments: int

@@ -11,6 +11,7 @@ from ...scenarios.provenance import provenance
 from ...scenarios.robot import moved_by_actuators, touching
 from ...scenarios.runs import Progress
 from ...traces import Trace, record
+from ..perturbed import Rerun, Uncertainty, perturbed_runs
 from .factors import FACTORS
 from .gap import Curves, Deviation, Ruler
 from .results import FirstTouch
@@ -60,6 +61,19 @@ class Runs:
         if watch is not None:
             controller = watch.around(controller)
         return record(model, controller, self.seconds, keyframe=scenario.keyframe, derive=False)
+
+    def floor(self, uncertain: Uncertainty) -> dict[str, Deviation]:
+        """The chaos floor of each quantity: a gap that is no larger says nothing."""
+        first, scenario = self._curves[0, ()], self._scenario
+        assert first is not None  # it has gaps
+        rerun = Rerun(
+            self.one.build({}),
+            lambda model: scenario.controller(model, self._seed),
+            self.seconds,
+            scenario.keyframe,
+        )
+        runs = perturbed_runs(rerun, seed=self._seed, uncertain=uncertain, derive=False)
+        return self.ruler.floor(first, runs)
 
     def done(self) -> None:
         """Say that all is done."""

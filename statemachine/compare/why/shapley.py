@@ -154,13 +154,13 @@ def _drawn(
     found: dict[str, list[float]] = {cause: [] for cause in active}
     start, failed = game.evaluated, 0
     while failed < 10:
-        order = [active[k] for k in random.permutation(len(active))]
-        both = [_along(game, way) for way in (order, list(reversed(order)))]
-        if both[0] is None or both[1] is None:
+        order = [active[int(k)] for k in random.permutation(len(active))]
+        there, back = _along(game, order), _along(game, order[::-1])
+        if there is None or back is None:
             failed += 1
         else:
             for cause in active:
-                found[cause].append((both[0][cause] + both[1][cause]) / 2)
+                found[cause].append((there[cause] + back[cause]) / 2)
         pairs = len(found[active[0]])
         if pairs >= 4:
             errors = [np.std(means, ddof=1) / math.sqrt(pairs) for means in found.values()]

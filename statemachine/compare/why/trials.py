@@ -10,19 +10,19 @@ import numpy as np
 
 from ...backends import load
 from ...engines.parts import ModelDifference
-from ...errors import BadInputError, DivergedError, EngineError, ModelError, UnsupportedError
+from ...errors import DivergedError, EngineError, ModelError, UnsupportedError
 from ...installed import DEFAULT
 from ...interface import Array, Data, Model, make_data, reset
-from ...scenarios import SCENARIOS, Controller, Scenario
+from ...scenarios import Controller, Scenario
 from ...traces import Trace, record
 from ..matching import Matched
+from ..perturbed import Rerun, Uncertainty, perturbed_runs
 from .causes import Cause, built
 from .gap import Curves, Deviation, Ruler
 
 Measure = Literal["worst", "end", "rms"]
-START, COMMANDS, ORDER = "start", "commands", "order of ctrl"
+START, ORDER = "start", "order of ctrl"
 _SAME = 1e-12
-_ASKED = 64  # moments at which commands are compared
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +60,8 @@ class Trials:
     ) -> None:
         self._models, self._matched = (one, two), matched
         self.seconds, self.seed, self._ran = seconds, seed, ran
-        self._scenarios = scenario, _elsewhere(scenario, two)
-        # Of a function of the user's each side gets its own answer; what an experiment commands
-        # depends on the time alone.
-        self.feedback = scenario.name not in SCENARIOS
-        self._starts = tuple(
-            _start(m, s) for m, s in zip(self._models, self._scenarios, strict=True)
-        )
+        self._scenario = scenario
+        self._starts = _starts(one, two, matched, scenario.keyframe)
         self.count, self.ended = 0, ""
         self._runs: dict[tuple[int, frozenset[str]], Curves | None] = {}
         self._reasons: dict[tuple[int, frozenset[str]], str] = {}
@@ -87,17 +82,11 @@ class Trials:
         if off > _SAME:
             values = (("farthest coordinate", 0.0, off),)
             found.append(ModelDifference(START, "run", "", values))
-        if self.feedback:
-            places = [b for _, b in self._matched.actuators]
-            if places != sorted(places):
-                names = [self._names(k) for k in (0, 1)]
-                values = (("order", names[0], names[1]),)
-                found.append(ModelDifference(ORDER, "run", "", values))
-        else:
-            commands = self._commands_apart()
-            if commands > _SAME:
-                values = (("farthest command", 0.0, commands),)
-                found.append(ModelDifference(COMMANDS, "run", "", values))
+        places = [b for _, b in self._matched.actuators]
+        if self._scenario.own and places != sorted(places):
+            names = [self._names(k) for k in (0, 1)]
+            values = (("order", names[0], names[1]),)
+            found.append(ModelDifference(ORDER, "run", "", values))
         return tuple(found)
 
     def _names(self, side: int) -> str:
@@ -167,15 +156,15 @@ class Trials:
         )
 
     def _controller(self, side: int, model: Model, brought: frozenset[str]) -> Controller:
-        # An experiment's commands are those of the side as it comes, whatever is edited.
-        own = self._scenarios[side].controller(
-            model if self.feedback else self._models[side], self.seed
-        )
-        if COMMANDS in brought:
-            return self._lefts(self._scenarios[0].controller(self._models[0], self.seed))
-        if ORDER in brought:
-            return self._ordered(own)
-        return own
+        """A function of the user's answers each side; what an experiment commands is the left's.
+
+        It is that of the left as it comes, whatever is edited.
+        """
+        if self._scenario.own:
+            own = self._scenario.controller(model, self.seed)
+            return self._ordered(own) if ORDER in brought else own
+        told = self._scenario.controller(self._models[0], self.seed)
+        return told if side == 0 else self._lefts(told)
 
     def _lefts(self, own: Controller) -> Controller:
         """The commands of the first side, to the second."""
@@ -200,19 +189,18 @@ class Trials:
 
         return controller
 
-    def _commands_apart(self) -> float:
-        """The largest difference between what the two sides are commanded, at some moments."""
-        own = [
-            scenario.controller(model, self.seed)
-            for scenario, model in zip(self._scenarios, self._models, strict=True)
-        ]
-        first, most = self._lefts(own[0]), 0.0
-        with make_data(self._models[1]) as data:
-            for time in np.linspace(0.0, self.seconds, _ASKED):
-                wanted = own[1](float(time), data)
-                theirs = self._starts[1].ctrl if wanted is None else np.asarray(wanted)
-                most = max(most, _apart(first(float(time), data), theirs))
-        return most
+    def floor(self, uncertain: Uncertainty) -> dict[str, Deviation]:
+        """The chaos floor of each quantity: a gap that is no larger says nothing."""
+        start, first = self._starts[0], self._runs[0, frozenset()]
+        assert first is not None  # it has gaps
+        rerun = Rerun(
+            self._models[0],
+            lambda model: self._scenario.controller(model, self.seed),
+            self.seconds,
+            start.keyframe,
+        )
+        runs = perturbed_runs(rerun, seed=self.seed, uncertain=uncertain, derive=False)
+        return self.ruler.floor(first, runs)
 
     def _curves(self, side: int, model: Model, trace: Trace) -> Curves | None:
         return self.ruler.curves(trace, self._posed(model), side)
@@ -230,21 +218,19 @@ def _apart(one: Array, two: Array) -> float:
     return float(np.abs(np.asarray(one) - np.asarray(two)).max(initial=0.0))
 
 
-def _elsewhere(scenario: Scenario, two: Model) -> Scenario:
-    """A scenario as it is on the second Model; where it makes no sense there, as on the first."""
-    known = SCENARIOS.get(scenario.name)
-    if known is None:
-        return scenario
-    try:
-        return known.on(two)
-    except BadInputError:
-        return scenario
+def _starts(
+    one: Model, two: Model, matched: Matched, keyframe: str | None
+) -> tuple[SideStart, SideStart]:
+    """Where both start; the second, if it has no such keyframe, where the first does."""
+    left = _start(one, keyframe)
+    if keyframe is None or keyframe in [frame.name for frame in two.keyframes]:
+        return left, _start(two, keyframe)
+    right = _start(two, None)
+    qpos, qvel = matched.qpos(left.qpos, right.qpos), matched.qvel(left.qvel, right.qvel)
+    return left, SideStart(None, qpos, qvel, matched.ctrl(left.ctrl, right.ctrl))
 
 
-def _start(model: Model, scenario: Scenario) -> SideStart:
-    key = scenario.keyframe
-    if key is not None and key not in [frame.name for frame in model.keyframes]:
-        key = None
+def _start(model: Model, keyframe: str | None) -> SideStart:
     with make_data(model) as data:
-        reset(model, data, key)
-        return SideStart(key, data.qpos.copy(), data.qvel.copy(), data.ctrl.copy())
+        reset(model, data, keyframe)
+        return SideStart(keyframe, data.qpos.copy(), data.qvel.copy(), data.ctrl.copy())

@@ -163,13 +163,7 @@ class Elements:
                 values = (("drives", _words(ours), _words(theirs)),)
                 why = "it drives another thing, or in another way"
                 yield ModelDifference("transmission", "actuator", name, values, refused=why)
-            laws = [
-                tuple(
-                    int(getattr(raw, f"actuator_{field}")[k])
-                    for field in ("dyntype", "actnum", "ctrlspec")
-                )
-                for raw, k in ((one, a), (two, b))
-            ]
+            laws = _law(one, a), _law(two, b)
             if laws[0] != laws[1]:
                 values = (("dyntype", laws[0][0], laws[1][0]),)
                 why = "its own state has another size"
@@ -314,6 +308,13 @@ def _entry(raw: Any, name: str, index: int) -> Any:
     if flag is not None and not getattr(raw, flag)[index]:
         return np.array([-np.inf, np.inf])
     return value
+
+
+def _law(raw: Any, k: int) -> tuple[int, ...]:
+    """How an actuator's own state moves, how long it is, and which numbers of ctrl it takes."""
+    number = int(raw.actuator_ctrlnum[k])
+    spec = int(raw.actuator_ctrlspec[k]) if number > 1 else 0  # of one it follows from the gains
+    return int(raw.actuator_dyntype[k]), int(raw.actuator_actnum[k]), number, spec
 
 
 def _still_actuator(raw: Any, k: int) -> tuple[Edit, ...]:
