@@ -34,8 +34,6 @@ def check(options: argparse.Namespace) -> None:
         raise BadInputError("--floor and --no-floor exclude each other")
     if options.floor and options.models:
         raise BadInputError("--floor is of a run, and --models runs nothing")
-    if options.floor and options.why and not options.html:
-        raise BadInputError("--floor goes without --why: it is of the comparison itself")
     parse_uncertainty(options.floor)
 
 

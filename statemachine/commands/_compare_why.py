@@ -140,8 +140,6 @@ def explain(request: Any, quantity: str | None, progress: Any, uncertain: Any) -
     from ..compare.why import attribute
     from ..scenarios import scenario
 
-    if request.sides:
-        raise BadInputError("--why does not take two sides yet: compare them without it")
     asked = scenario(request.what[0])
     asked = replace(asked, options={**asked.options, **request.options})
     models = [
