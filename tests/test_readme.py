@@ -146,7 +146,7 @@ def test_python_block(tmp_path: Path) -> None:
 
 # Of each guide with code: what its code prints.
 PRINTS = {
-    "docs/comparing.md": ("False same ()",),
+    "docs/comparing.md": ("False the same ()",),
     "docs/it_works_there.md": ("[('gravity', 1.0)]",),
     "docs/freshness.md": ("Derived values of scene_box on mujoco", "1 of 1 reads were stale"),
     "docs/interface.md": ("no joint named 'elbow'; known: ", "0.001\n", "options of replace: "),

@@ -112,7 +112,7 @@ def _table(result: Explanation) -> list[Block]:
     refused = [each for each in result.shares if each.share is None]
     blocks: list[Block] = []
     if not result.shares:
-        return [Text("The two sides have the same settings in everything that is compared.")]
+        return [Text("The files, options and starts of the two sides are the same.")]
     rows = [_row(result, each) for each in able]
     if rows:
         gap = quantity(result.gap, result.unit)
