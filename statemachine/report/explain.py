@@ -36,7 +36,7 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
     """
     origin = (
         f"left: {result.one}; right: {result.two}; {result.seconds:g} s, {result.runs} runs "
-        f"compared at {result.moments} moments"
+        f"in {short_time(result.took)} compared at {result.moments} moments"
     )
     first = [Text(line) for line in (*said, *_unmatched(result), result.says) if line]
     name = f"{result.experiment}: why the right is not the left"
@@ -108,8 +108,8 @@ def _nothing(result: Explanation) -> str:
 
 def _table(result: Explanation) -> list[Block]:
     """The differences, the largest share first; those without an effect folded away."""
-    able = [each for each in result.shares if each.share is not None]
-    refused = [each for each in result.shares if each.share is None]
+    able = [each for each in result.shares if not each.note]
+    refused = [each for each in result.shares if each.note]
     blocks: list[Block] = []
     if not result.shares:
         return [Text("The files, options and starts of the two sides are the same.")]
@@ -171,7 +171,10 @@ def _sides(figure: tuple[str, object, object], unit: str) -> tuple[str, str]:
             return "here", f"{quantity(float(np.linalg.norm(a - b)), unit)} off"
         angle = float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
         return "this way", f"{quantity(angle, 'rad')} off"
-    return _value(one, unit), _value(two, unit)
+    left, right = _value(one, unit), _value(two, unit)
+    if left == right and isinstance(one, float) and isinstance(two, float):
+        return f"{one:.12g}", f"{two:.12g}"
+    return left, right
 
 
 def _value(value: object, unit: str) -> str:
@@ -194,7 +197,7 @@ def _number(value: object, unit: str) -> str:
 
 def _verdict(result: Explanation) -> list[Block]:
     if result.is_rounding:
-        refused = any(each.share is None for each in result.shares)
+        refused = any(each.note for each in result.shares)
         text = "the two sides move alike" + (", though they differ" if result.shares else "")
         if result.gap > result.negligible:
             text = "the gap is inside the chaos floor: there is nothing to explain"
@@ -208,7 +211,7 @@ def _verdict(result: Explanation) -> list[Block]:
 
 def _next(result: Explanation) -> str:
     """What to look at where something stays."""
-    refused = [each.name for each in result.shares if each.share is None]
+    refused = [each.name for each in result.shares if each.note]
     if refused:
         return (
             f"What stays may come from what cannot be brought to the same: {', '.join(refused[:4])}"
