@@ -20,6 +20,7 @@ _FREE, _BALL = 0, 1
 _PLANE, _HFIELD, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(8)  # mjtGeom
 _SIZES = {_SPHERE: 1, _CAPSULE: 2, _ELLIPSOID: 3, _CYLINDER: 2, _BOX: 3}
 _ROUND = (_CAPSULE, _CYLINDER)
+_WRAPPED = (4, 5)  # mjtWrap: a sphere, a cylinder
 _VERTEX = 1e-6  # [m]: vertices are single precision
 
 
@@ -27,8 +28,8 @@ class Places:
     """Rigid parts, joints, geoms and sites of two models, in the frames of the second.
 
     Attributes:
-        geoms: Pairs of ids of geoms that can touch.
-        only: For each model its geoms that can touch and have no counterpart.
+        geoms: Pairs of ids of geoms that act on the motion.
+        only: For each model those that have no counterpart.
     """
 
     def __init__(self, one: Any, two: Any, pairs: Counterparts) -> None:
@@ -37,7 +38,7 @@ class Places:
         self._by_one = {pair.one: pair for pair in pairs.solids}
         self.geoms: tuple[tuple[int, int], ...] = tuple(sorted(self._match_geoms()))
         self.only = tuple(
-            [g for g in _touching(raw) if g not in {pair[k] for pair in self.geoms}]
+            [g for g in _acting(raw) if g not in {pair[k] for pair in self.geoms}]
             for k, raw in enumerate((one, two))
         )
 
@@ -45,7 +46,8 @@ class Places:
         """What they differ in."""
         for pair in self._pairs.solids:
             if pair.one and pair.two:
-                yield from self._inertial(pair)
+                if self._one.body_mocapid[pair.one] < 0:  # what no force moves has no weight
+                    yield from self._inertial(pair)
                 yield from self._hangs(pair)
         for pair in self.geoms:
             yield from self._shape(*pair)
@@ -271,8 +273,8 @@ class Places:
     def _match_geoms(self) -> Iterator[tuple[int, int]]:
         """By name, then by likeness, within each rigid part."""
         for pair in self._pairs.solids:
-            ours = [g for g in _touching(self._one) if self._head(0, g) == pair.one]
-            theirs = [g for g in _touching(self._two) if self._head(1, g) == pair.two]
+            ours = [g for g in _acting(self._one) if self._head(0, g) == pair.one]
+            theirs = [g for g in _acting(self._two) if self._head(1, g) == pair.two]
             names = {self._two.geom(g).name: g for g in theirs if self._two.geom(g).name}
             for g in list(ours):
                 other = names.get(self._one.geom(g).name)
@@ -353,6 +355,11 @@ class Places:
             values = (("vertices", len(ours), len(theirs)),)
             yield ModelDifference("shape", "geom", name, values, refused="it is another mesh")
             return
+        hulls = _hull(self._one, a), _hull(self._two, b)
+        if all(each is not None for each in hulls) and not same(*hulls):
+            values = (("corners of its hull", int(hulls[0][0]), int(hulls[1][0])),)
+            why = "it has another convex hull"
+            yield ModelDifference("hull", "geom", name, values, refused=why)
         if np.abs(ours - theirs).max() <= _VERTEX:
             return
         meshes = [int(raw.geom_dataid[g]) for raw, g in ((self._one, a), (self._two, b))]
@@ -370,6 +377,7 @@ class Places:
             for g in self.only[side]:
                 kind = _kind(int(raw.geom_type[g]))
                 edits: tuple[Edit, ...] = (("geom_contype", (g,), 0), ("geom_conaffinity", (g,), 0))
+                edits += (("geom_fluid", (g,), np.zeros(raw.geom_fluid.shape[1])),)
                 edits += tuple(
                     ("pair_margin", (k,), -1e3)
                     for k in range(raw.npair)
@@ -408,11 +416,18 @@ class Places:
         yield ModelDifference("place", "site", name, tuple(values), "m", edits)
 
 
-def _touching(raw: Any) -> list[int]:
-    """Geoms that can touch: by their masks, or in a pair of their own."""
-    paired = {*raw.pair_geom1.tolist(), *raw.pair_geom2.tolist()}
-    masks = (raw.geom_contype != 0) | (raw.geom_conaffinity != 0)
-    return [g for g in range(raw.ngeom) if masks[g] or g in paired]
+def touches(raw: Any) -> Any:
+    """Which geoms (ngeom,) can touch: by their masks, or in a pair of their own."""
+    found = (raw.geom_contype != 0) | (raw.geom_conaffinity != 0)
+    found[raw.pair_geom1] = found[raw.pair_geom2] = True
+    return found
+
+
+def _acting(raw: Any) -> list[int]:
+    """Geoms that can touch, that a tendon wraps, or that a medium flows around by their shape."""
+    found = touches(raw) | (raw.geom_fluid[:, 0] > 0)
+    found[raw.wrap_objid[np.isin(raw.wrap_type, _WRAPPED)]] = True
+    return np.flatnonzero(found).tolist()
 
 
 def _off(kind: int, one: Placement, two: Placement) -> bool:
@@ -445,6 +460,15 @@ def _copied(raw: Any, field: str, index: int) -> Any:
 def _own_vertices(raw: Any, mesh: int) -> Array:
     start = int(raw.mesh_vertadr[mesh])
     return np.asarray(raw.mesh_vert[start : start + int(raw.mesh_vertnum[mesh])], dtype=float)
+
+
+def _hull(raw: Any, geom: int) -> Any:
+    """What the compiler made of the convex hull of a mesh geom; None without one."""
+    start = int(raw.mesh_graphadr[raw.geom_dataid[geom]])
+    if start < 0:
+        return None
+    corners, faces = raw.mesh_graph[start : start + 2].tolist()
+    return raw.mesh_graph[start : start + 2 + 3 * corners + 6 * faces]
 
 
 def _same_hfield(one: Any, two: Any, a: int, b: int) -> bool:
@@ -498,4 +522,4 @@ def name_of(raw: Any, kind: str, index: int) -> str:
     return f"{kind} {index}" + (f" on {on}" if on else "")
 
 
-__all__ = ["Places", "name_of"]
+__all__ = ["Places", "name_of", "touches"]
