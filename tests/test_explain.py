@@ -369,6 +369,7 @@ _CORE = '<body name="core"'
 _MOTOR = '<motor name="shoulder"'
 _OFF = ("<option", '<option actuatorgroupdisable="1"')
 HOME_LEAVE = replace(HOME, controller=lambda _model, _seed: lambda _time, _data: None)
+STAY = replace(HOME_LEAVE, keyframe=None)
 EASILY_MISSED = {
     "wrapped shape": ([], [('pos="0 0 -0.05" c', 'pos="0.01 0 -0.05" c')], "place of pulley"),
     "rest, only nonlinear": (
@@ -433,6 +434,18 @@ def test_what_is_easily_missed(name, tmp_path):
 def test_a_mocap_body_and_a_cord_are_no_difference(change, tmp_path):
     found = explained(tmp_path, LED, _with(LED, change), scenario=HOME_LEAVE)
     assert not found.shares
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_another_zero_of_several_joints_or_of_one_that_an_equality_holds(held, tmp_path):
+    more = '<joint name="twist" axis="1 0 0" damping="0.1"/><site name="low"'
+    keep = '<equality><joint joint1="shoulder" joint2="elbow"/>'
+    left = _with(LED, [("<equality>", keep)] if held else [('<site name="low"', more)])
+    right = _with(left, [('name="elbow" axis', 'name="elbow" ref="0.2" axis')])
+    found = explained(tmp_path, left, right, scenario=STAY)
+    assert set(shares(found)) == {"zero of lower", "start"}
+    assert found.brought is not None
+    assert found.brought <= 1e-9 * found.gap
 
 
 def test_what_sleeps_from_the_start(tmp_path):

@@ -164,7 +164,10 @@ class Elements:
 
     def _drives(self) -> Iterator[ModelDifference]:
         one, two = self._one, self._two
-        yield from self._rows("actuator", fields.ACTUATOR, self._actuators)
+        for a, b in self._actuators:
+            alike = _law(one, a)[1:] == _law(two, b)[1:]
+            rows = [row for row in fields.ACTUATOR if alike or row.when != "actuator_dyntype"]
+            yield from self._rows("actuator", rows, [(a, b)])
         if one.opt.disableactuator or two.opt.disableactuator:
             yield from self._rows("actuator", fields.GROUP, self._actuators)
         for a, b in self._actuators:

@@ -232,11 +232,16 @@ class Places:
         refs = [(_ref(one, a), _ref(two, b)) for a, b in joints]
         ours, theirs = self._solids[0].hangs(pair.one), self._solids[1].hangs(pair.two)
         alike = all(same(a, b) for a, b in refs)
-        if not alike and len(joints) > 1:
+        kept = any(_is_kept(one, a) or _is_kept(two, b) for a, b in joints)
+        if not alike and (len(joints) > 1 or kept):  # an equality counts from the reference, too
             values = (("ref", tuple(a for a, _ in refs), tuple(b for _, b in refs)),)
-            why = "several joints of one body have other zeros"
-            yield ModelDifference("zero", "body", name, values, refused=why)
-            return
+            zeros: tuple[Edit, ...] = tuple(
+                ("qpos0", (int(two.jnt_qposadr[b]),), ref)
+                for (_, b), (ref, other) in zip(joints, refs, strict=True)
+                if not same(ref, other)
+            )
+            yield ModelDifference("zero", "body", name, values, "", zeros)
+            alike = True
         wanted = parent.align @ ours @ pair.align.inverse
         if not alike:  # the same zero, another reference: turn back by ours, on by theirs
             (a, _), (ref, other) = joints[0], refs[0]
@@ -484,6 +489,12 @@ def _ref(raw: Any, joint: int) -> float:
     """The position of a joint in which the body lies as its frame says; 0 of a ball."""
     scalar = int(raw.jnt_type[joint]) in (SLIDE, HINGE)
     return float(raw.qpos0[raw.jnt_qposadr[joint]]) if scalar else 0.0
+
+
+def _is_kept(raw: Any, joint: int) -> bool:
+    """Whether an equality of joints holds a joint."""
+    of_joints = raw.eq_type == int(require("mujoco").mjtEq.mjEQ_JOINT)
+    return bool((of_joints & ((raw.eq_obj1id == joint) | (raw.eq_obj2id == joint))).any())
 
 
 def _motion(kind: int, axis: Array, anchor: Array, amount: float) -> Placement:
