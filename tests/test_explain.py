@@ -370,6 +370,7 @@ _MOTOR = '<motor name="shoulder"'
 _OFF = ("<option", '<option actuatorgroupdisable="1"')
 HOME_LEAVE = replace(HOME, controller=lambda _model, _seed: lambda _time, _data: None)
 STAY = replace(HOME_LEAVE, keyframe=None)
+BALL_SPRING = ('stiffness="0.1"', 'stiffness="0.3"')
 EASILY_MISSED = {
     "wrapped shape": ([], [('pos="0 0 -0.05" c', 'pos="0.01 0 -0.05" c')], "place of pulley"),
     "rest, only nonlinear": (
@@ -446,6 +447,18 @@ def test_another_zero_of_several_joints_or_of_one_that_an_equality_holds(held, t
     assert set(shares(found)) == {"zero of lower", "start"}
     assert found.brought is not None
     assert found.brought <= 1e-9 * found.gap
+
+
+@pytest.mark.parametrize(("old", "new"), [('stiffness="40"', 'stiffness="50"'), BALL_SPRING])
+def test_what_the_hinges_do_not_show_is_no_agreement(old, new, tmp_path):
+    ball = '<body pos="1 0 1"><joint name="hip" type="ball" stiffness="0.1"/>'
+    ball += '<geom type="capsule" size="0.02" fromto="0 0 0 0.1 0 -0.2" mass="0.3"/></body>'
+    left = _with(ARM, [('<body name="weight"', f'{ball}<body name="weight"')])
+    left = left.replace('0 0.2 1 0 0 0  0"', '0 0.2 1 0 0 0  1 0 0 0  0"')
+    found = explained(tmp_path, left, _with(left, [(old, new)]), scenario=HOME)
+    assert not found.is_rounding
+    assert len(found.shares) == 1
+    assert found.brought == 0
 
 
 def test_what_sleeps_from_the_start(tmp_path):
