@@ -251,6 +251,10 @@ def test_every_array_of_a_compiled_model_is_compared_or_has_no_effect():
     assert set(fields.IDLE_FLAGS) <= flags
 
 
+# Compared only where something else of the file makes them act; they have tests of their own.
+ACTS_WITH_AN_OPTION = ("body_gravcomp", "actuator_group", "tree_sleep_policy")
+
+
 @pytest.mark.parametrize("model", ["so101/scene_box"])
 def test_each_figure_of_a_model_is_found_and_brought_over(model):
     """One entry of each array is changed: the list has it, and the edits undo it."""
@@ -266,7 +270,7 @@ def test_each_figure_of_a_model_is_found_and_brought_over(model):
         places = np.arange(len(array))
         if name.startswith("geom"):
             places = np.flatnonzero(raw.geom_contype | raw.geom_conaffinity)
-        if not len(places) or row.when or name == "body_gravcomp":
+        if not len(places) or row.when or name in ACTS_WITH_AN_OPTION:
             continue
         place = int(random.choice(places))
         old = np.array(array[place])
@@ -314,3 +318,171 @@ def test_a_set_that_cannot_be_run_is_told():
     assert found.impossible == (("a",),)
     assert found.alone["a"] is None
     assert found.share["a"] is None
+
+
+# A mocap body that leads a floating one, a tendon around a shape that touches nothing, a fixed
+# body, an actuator with a state of its own; what is changed on the right, the cause, the quantity.
+LED = """
+<mujoco>
+  <compiler angle="radian"/>
+  <option timestep="0.002" integrator="implicitfast"/>
+  <worldbody>
+    <body name="post" pos="0 0 1"><site name="high" pos="0.05 0 0"/></body>
+    <body name="upper" pos="0 0 0.7">
+      <inertial mass="0.5" pos="0 0 -0.1" diaginertia="0.003 0.003 0.001"/>
+      <joint name="shoulder" axis="0 1 0" damping="0.3" stiffness="0 1" springref="0.1"/>
+      <geom name="pulley" size="0.03" pos="0 0 -0.05" contype="0" conaffinity="0" mass="0"/>
+      <site name="side" pos="0.04 0 -0.05"/>
+      <body name="core" pos="0 0 -0.05">
+        <inertial mass="0.2" pos="0 0 0" diaginertia="0.001 0.001 0.001"/>
+      </body>
+      <body name="lower" pos="0 0 -0.2">
+        <inertial mass="0.3" pos="0 0 -0.1" diaginertia="0.002 0.002 0.0005"/>
+        <joint name="elbow" axis="0 1 0" damping="0.05"/>
+        <site name="low" pos="0.03 0 -0.1"/>
+      </body>
+    </body>
+    <body name="leader" mocap="true" pos="0.4 0 0.5"/>
+    <body name="led" pos="0.4 0 0.5">
+      <freejoint name="led"/>
+      <inertial mass="0.2" pos="0 0 0" diaginertia="0.001 0.001 0.001"/>
+    </body>
+  </worldbody>
+  <equality><weld name="leash" body1="leader" body2="led"/></equality>
+  <tendon>
+    <spatial name="cord" stiffness="0 20" damping="1" springlength="0.2">
+      <site site="high"/><geom geom="pulley" sidesite="side"/><site site="low"/>
+    </spatial>
+  </tendon>
+  <actuator>
+    <motor name="shoulder" joint="shoulder" group="1"/>
+    <general name="elbow" joint="elbow" dyntype="integrator" gainprm="2" biastype="affine"
+             biasprm="0 -2 -0.1"/>
+  </actuator>
+  <keyframe>
+    <key name="home" qpos="0.2 0.1 0.4 0 0.5 1 0 0 0" act="0.1" ctrl="0.1 0.2" mpos="0.4 0 0.5"/>
+  </keyframe>
+</mujoco>
+"""
+_WEIGHT = '<body name="core" gravcomp="1"'
+_CORE = '<body name="core"'
+_MOTOR = '<motor name="shoulder"'
+_OFF = ("<option", '<option actuatorgroupdisable="1"')
+HOME_LEAVE = replace(HOME, controller=lambda _model, _seed: lambda _time, _data: None)
+STAY = replace(HOME_LEAVE, keyframe=None)
+BALL_SPRING = ('stiffness="0.1"', 'stiffness="0.3"')
+EASILY_MISSED = {
+    "wrapped shape": ([], [('pos="0 0 -0.05" c', 'pos="0.01 0 -0.05" c')], "place of pulley"),
+    "rest, only nonlinear": (
+        [],
+        [('springref="0.1"', 'springref="0.4"')],
+        "rest of the spring of shoulder",
+    ),
+    "slack, only nonlinear": (
+        [],
+        [('springlength="0.2"', 'springlength="0.3"')],
+        "slack length of cord",
+    ),
+    "weight off a fixed body": ([], [(_CORE, _WEIGHT)], "weight taken off of core"),
+    "less weight off it": (
+        [(_CORE, _WEIGHT)],
+        [('gravcomp="1"', 'gravcomp="0.5"')],
+        "weight taken off of core",
+    ),
+    "group that is off": ([_OFF], [('group="1"', 'group="0"')], "group of shoulder"),
+    "delay on the left": (
+        [(_MOTOR, f'{_MOTOR} delay="0.01" nsample="10"')],
+        [(' delay="0.01" nsample="10"', "")],
+        "delay of shoulder",
+    ),
+    "flow around a shape": (
+        [("<option", '<option density="1.2" viscosity="0.1"')],
+        [('name="pulley"', 'name="pulley" fluidshape="ellipsoid"')],
+        "shape of pulley",
+    ),
+    "ctrl of the keyframe": ([], [('ctrl="0.1', 'ctrl="0.5')], "ctrl of the start"),
+    "act of the keyframe": ([], [('act="0.1"', 'act="0.4"')], "activations of the start"),
+    "mocap of the keyframe": (
+        [],
+        [('mpos="0.4', 'mpos="0.5')],
+        "mocap places of the start",
+        "led",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", EASILY_MISSED)
+def test_what_is_easily_missed(name, tmp_path):
+    both, other, cause, *quantity = EASILY_MISSED[name]
+    left = _with(LED, both)
+    found = explained(
+        tmp_path, left, _with(left, other), scenario=HOME_LEAVE, quantity=(*quantity, None)[0]
+    )
+    assert found.gap > 100 * found.negligible
+    assert list(shares(found)) == [cause]
+    assert found.brought is not None
+    assert found.brought <= 1e-9 * found.gap
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        [],
+        [(_CORE, '<site name="first"/>' + _CORE)],
+        [('name="side"', 'name="side" rgba="1 0 0 1"')],
+    ],
+)
+def test_a_mocap_body_and_a_cord_are_no_difference(change, tmp_path):
+    found = explained(tmp_path, LED, _with(LED, change), scenario=HOME_LEAVE)
+    assert not found.shares
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_another_zero_of_several_joints_or_of_one_that_an_equality_holds(held, tmp_path):
+    more = '<joint name="twist" axis="1 0 0" damping="0.1"/><site name="low"'
+    keep = '<equality><joint joint1="shoulder" joint2="elbow"/>'
+    left = _with(LED, [("<equality>", keep)] if held else [('<site name="low"', more)])
+    right = _with(left, [('name="elbow" axis', 'name="elbow" ref="0.2" axis')])
+    found = explained(tmp_path, left, right, scenario=STAY)
+    assert set(shares(found)) == {"zero of lower", "start"}
+    assert found.brought is not None
+    assert found.brought <= 1e-9 * found.gap
+
+
+@pytest.mark.parametrize(("old", "new"), [('stiffness="40"', 'stiffness="50"'), BALL_SPRING])
+def test_what_the_hinges_do_not_show_is_no_agreement(old, new, tmp_path):
+    ball = '<body pos="1 0 1"><joint name="hip" type="ball" stiffness="0.1"/>'
+    ball += '<geom type="capsule" size="0.02" fromto="0 0 0 0.1 0 -0.2" mass="0.3"/></body>'
+    left = _with(ARM, [('<body name="weight"', f'{ball}<body name="weight"')])
+    left = left.replace('0 0.2 1 0 0 0  0"', '0 0.2 1 0 0 0  1 0 0 0  0"')
+    found = explained(tmp_path, left, _with(left, [(old, new)]), scenario=HOME)
+    assert not found.is_rounding
+    assert len(found.shares) == 1
+    assert found.brought == 0
+
+
+def test_what_sleeps_from_the_start(tmp_path):
+    left = _with(ARM, [('implicitfast"/>', 'implicitfast"><flag sleep="enable"/></option>')])
+    right = _with(left, [('<body name="ball"', '<body name="ball" sleep="init"')])
+    found = explained(tmp_path, left, right, scenario=HOME, quantity="ball")
+    assert found.gap > 0.01
+    assert list(shares(found)) == ["sleep policy of ball"]
+    assert found.brought == 0
+
+
+def test_what_is_fixed_elsewhere_does_not_move_the_world(tmp_path):
+    """A floating body falls onto a table that was moved: the table moved, not the robot."""
+    top = '<geom name="top" type="box" size=".03 .03 .05"/>'
+    table = f'<body name="table" pos="0.6 0 0.05">{top}</body>'
+    left = ARM.replace('<body name="ball"', f'{table}<body name="ball"')
+    right = left.replace('pos="0.6 0 0.05"', 'pos="0.64 0 0.05"')
+    found = explained(tmp_path, left, right, scenario=HOME, quantity="ball")
+    assert set(shares(found)) == {"place of top"}
+    assert found.brought == 0
+
+
+def _with(text: str, changes: list[tuple[str, str]]) -> str:
+    for old, new in changes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return text

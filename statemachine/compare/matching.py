@@ -5,7 +5,7 @@ By name, then by structure: `description.match` says how, and `names` overrules 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..description.match import Matching, Pair, match, renamed
-from ..description.records import Robot
+from ..description.records import HERE, Robot
 from ..description.tree import GroupTree
 from ..engines import needed_part
 from ..engines.parts import BodyPair, CompilerPart
@@ -100,11 +100,11 @@ def match_models(one: Model, two: Model, names: Mapping[str, str] | None = None)
     trees[0] = GroupTree(
         renamed(trees[0].robot, {a: b for a, b in given.items() if a not in drives})
     )
-    found = match(trees[0], trees[1])
+    found = match(trees[0], trees[1], one_world=all(tree.robot.rooted for tree in trees))
     joints = _joints(found, trees)
     # A body with several joints is several parts of a description, of which the last has its mass.
     by_body = {solid.one: solid for solid in (_solid(p, trees, one, two) for p in found.pairs)}
-    solids = tuple(by_body.values())
+    solids = (*by_body.values(), *_led(one, two, given))
     sites = _by_name(one.site_names, two.site_names, given)
     actuators = _actuators(one, two, joints, given)
     only = tuple(
@@ -183,6 +183,22 @@ def _body_of(link: str, tree: GroupTree, model: Model) -> int:
     ends = np.cumsum(counts)
     body = int(np.searchsorted(ends, place, side="right"))
     return body
+
+
+def _led(one: Model, two: Model, given: Mapping[str, str]) -> Iterator[BodyPair]:
+    """The mocap bodies: no joint moves them, but they are no part of the world; by name."""
+    ours, theirs = (
+        [int(body) for body in np.flatnonzero(model.compiled.body_mocapid >= 0)]
+        for model in (one, two)
+    )
+    names = {two.body_names[b]: b for b in theirs}
+    for place, a in enumerate(ours):
+        name = one.body_names[a]
+        b = names.get(given.get(name, name)) if name else None
+        if not name and place < len(theirs) and not two.body_names[theirs[place]]:
+            b = theirs[place]
+        if b is not None:
+            yield BodyPair(a, b, HERE, False)
 
 
 def _by_name(ours: Sequence[str], theirs: Sequence[str], given: Mapping[str, str]) -> Pairs:

@@ -82,8 +82,15 @@ def renamed(robot: Robot, names: Mapping[str, str]) -> Robot:
     return replace(robot, links=links, frames=frames, actuators=drives)
 
 
-def match(one: GroupTree, two: GroupTree) -> Matching:
-    """Pairs of rigid groups."""
+def match(one: GroupTree, two: GroupTree, *, one_world: bool = False) -> Matching:
+    """Pairs of rigid groups.
+
+    Args:
+        one: A description.
+        two: Another.
+        one_world: Whether two worlds are laid on each other as they are, and not so that what is
+            fixed to them coincides: gravity, and what floats, is told in the frame of the world.
+    """
     pairs: dict[int, Pair] = {}
     taken: set[int] = set()
     names = _fixed_frames(one, two)
@@ -91,7 +98,8 @@ def match(one: GroupTree, two: GroupTree) -> Matching:
     def add(a: Group, b: Group, by: str, moved: bool = False) -> None:
         above = pairs.get(a.parent)
         if by == "root" or above is None or moved:
-            align = _of_root(one, two, a, b, names) if by == "root" else HERE
+            told = one_world and a.number == b.number == 0
+            align = _of_root(one, two, a, b, names) if by == "root" and not told else HERE
         else:
             align = _of_child(one, two, a, b, names, above.align)
         pairs[a.number] = Pair(a, b, align, by, moved)

@@ -83,7 +83,7 @@ def _unmatched(result: Explanation) -> list[str]:
 def _gap_sentence(result: Explanation) -> str:
     gap = result.first[result.quantity]
     what = f"the {result.quantity}"
-    if result.quantity in ("joints", "slides"):
+    if result.quantity in ("joints", "slides", "ball joints"):
         what = f"the worst {result.quantity.removesuffix('s')}"
     text = (
         f"As they come, {what} is up to {quantity(gap.worst, gap.unit)} apart, at "

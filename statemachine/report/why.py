@@ -116,7 +116,7 @@ def _step(result: Attribution, trial: FactorTrial) -> str:
 
 
 def _what(result: Attribution) -> str:
-    if result.quantity in ("joints", "slides"):
+    if result.quantity in ("joints", "slides", "ball joints"):
         return f"the worst {result.quantity.removesuffix('s')}"
     return f"the {result.quantity}"
 

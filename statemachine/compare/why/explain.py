@@ -177,12 +177,16 @@ def explain(
     units = trials.ruler.units
     if quantity is not None and quantity not in units:
         raise unknown_name("quantity", quantity, units)
-    quantity = quantity or trials.ruler.held(trials.traces[0], frozenset())
+    asked, quantity = quantity, quantity or trials.ruler.held(trials.traces[0], frozenset())
     first = trials.gaps(())
     if not first:
         raise EndedEarlyError(
             f"as they come, a side does not reach the end: {trials.ended}", ended=trials.ended
         )
+    if asked is None and first[quantity].worst <= _ROUNDING[units[quantity]]:
+        # The joints may agree while something else does not.
+        more = (name for name, each in first.items() if each.worst > _ROUNDING[units[name]])
+        quantity = next(more, quantity)
     gap = _figure(first[quantity], measure)
     world = not any(_is_as_it_comes(model) for model in models)
     differences = (*differences_of(models[0], models[1], matched, world), *trials.of_the_run())

@@ -13,6 +13,8 @@ from ...interface import Array, Ints, JointType, Model, forward, make_data, usua
 from ...traces import Trace
 from ..matching import Matched
 
+BALLS = "ball joints"
+
 
 @dataclass(frozen=True)
 class Deviation:
@@ -49,12 +51,14 @@ class _Measured:
 
     Attributes:
         hinges, slides: Addresses in qpos.
+        balls: Those of quaternions, four for each ball joint.
         free: Bodies that float.
         tip: The site that is measured; None without one.
     """
 
     hinges: Ints
     slides: Ints
+    balls: Ints
     free: Ints
     tip: int | None
 
@@ -82,6 +86,7 @@ class _Measured:
         return cls(
             hinges=places[kinds == int(JointType.HINGE)],
             slides=places[kinds == int(JointType.SLIDE)],
+            balls=(places[kinds == int(JointType.BALL)][:, None] + np.arange(4)).ravel(),
             free=model.jnt_bodyid[joints[kinds == int(JointType.FREE)]],
             tip=tip,
         )
@@ -126,6 +131,8 @@ class Ruler:
             self.units["joints"] = "rad"
         if len(measured.slides):
             self.units["slides"] = "m"
+        if len(measured.balls):
+            self.units[BALLS] = "rad"
         if measured.tip is not None:
             self.units[self._tip_name] = "m"
         for body in measured.free:
@@ -164,6 +171,8 @@ class Ruler:
             found["joints"] = qpos[:, measured.hinges]
         if len(measured.slides):
             found["slides"] = qpos[:, measured.slides]
+        if len(measured.balls):
+            found[BALLS] = qpos[:, measured.balls]
         if measured.tip is None and not len(measured.free):
             return Curves(found)
         try:
@@ -204,6 +213,10 @@ class Ruler:
 
     def distances(self, quantity: str, one: Curves, two: Curves) -> Array:
         """(n,) how far apart: the worst joint, or the length of the way between."""
+        if quantity == BALLS:
+            a, b = (curves.of[BALLS].reshape(len(self.time), -1, 4) for curves in (one, two))
+            chord = np.minimum(*(np.linalg.norm(a + sign * b, axis=2) for sign in (-1, 1)))
+            return 4 * np.arcsin(np.minimum(chord / 2, 1.0)).max(axis=1)
         apart = one.of[quantity] - two.of[quantity]
         if quantity in ("joints", "slides"):
             return np.abs(apart).max(axis=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -82,12 +82,56 @@ class Trials:
         if off > _SAME:
             values = (("farthest coordinate", 0.0, off),)
             found.append(ModelDifference(START, "run", "", values))
+        found += self._keyframe()
         places = [b for _, b in self._matched.actuators]
         if self._scenario.own and places != sorted(places):
             names = [self._names(k) for k in (0, 1)]
             values = (("order", names[0], names[1]),)
             found.append(ModelDifference(ORDER, "run", "", values))
         return tuple(found)
+
+    def _keyframe(self) -> Iterator[ModelDifference]:
+        """What else the keyframe sets that both start from: ctrl, act, the mocap bodies."""
+        name, (one, two) = self._starts[0].keyframe, (model.compiled for model in self._models)
+        if name is None or self._starts[1].keyframe is None:
+            return
+        keys = [[frame.name for frame in model.keyframes].index(name) for model in self._models]
+        owner = [np.repeat(np.arange(raw.nactuator), raw.actuator_ctrlnum) for raw in (one, two)]
+        commands, states = [], []
+        for a, b in self._matched.actuators:
+            commands.append((a, b))
+            here, there = int(owner[0][a]), int(owner[1][b])
+            number = int(one.actuator_actnum[here])
+            if number == two.actuator_actnum[there]:
+                start = int(one.actuator_actadr[here]), int(two.actuator_actadr[there])
+                states += [(start[0] + k, start[1] + k) for k in range(number)]
+        led = [
+            (int(one.body_mocapid[pair.one]), int(two.body_mocapid[pair.two]))
+            for pair in self._matched.solids
+            if one.body_mocapid[pair.one] >= 0
+        ]
+        for subject, field, pairs in (
+            ("ctrl", "key_ctrl", commands),
+            ("activations", "key_act", sorted(set(states))),
+            (
+                "mocap places",
+                "key_mpos",
+                [(3 * a + k, 3 * b + k) for a, b in led for k in range(3)],
+            ),
+            (
+                "mocap turns",
+                "key_mquat",
+                [(4 * a + k, 4 * b + k) for a, b in led for k in range(4)],
+            ),
+        ):
+            ours, theirs = getattr(one, field)[keys[0]], getattr(two, field)[keys[1]]
+            off = [(a, b) for a, b in pairs if abs(ours[a] - theirs[b]) > _SAME]
+            if off:
+                values = (
+                    (subject, tuple(ours[a] for a, _ in off), tuple(theirs[b] for _, b in off)),
+                )
+                edits = tuple((field, (keys[1], b), float(ours[a])) for a, b in off)
+                yield ModelDifference(f"{subject} of the start", "run", "", values, "", edits)
 
     def _names(self, side: int) -> str:
         model = self._models[side]

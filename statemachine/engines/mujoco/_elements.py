@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from ...installed import require
 from ..parts import Counterparts, Edit, ModelDifference
 from . import _fields as fields
 from ._figures import differing, plain, same
-from ._places import name_of
+from ._places import name_of, touches
 from ._solid import HINGE, SLIDE, Solids
 
 Pairs = Sequence[tuple[int, int]]
@@ -53,7 +54,10 @@ class Elements:
         """What they differ in."""
         yield from self._bodies()
         yield from self._joints()
-        yield from self._rows("geom", fields.GEOM, self._geoms)
+        # Of a geom that only a tendon wraps, or a medium flows around, the shape is all that acts.
+        touching = [*map(touches, (self._one, self._two))]
+        meeting = [(a, b) for a, b in self._geoms if touching[0][a] or touching[1][b]]
+        yield from self._rows("geom", fields.GEOM, meeting)
         yield from self._drives()
         yield from self._tendons()
         yield from self._equalities()
@@ -74,8 +78,9 @@ class Elements:
         self, kind: str, row: fields.FieldRow, a: int, b: int, where: str
     ) -> ModelDifference | None:
         one, two = self._one, self._two
-        if row.when and not (
-            np.any(getattr(one, row.when)[a]) or np.any(getattr(two, row.when)[b])
+        if row.when and not any(
+            np.any(getattr(one, name)[a]) or np.any(getattr(two, name)[b])
+            for name in row.when.split()
         ):
             return None
         values = differing(
@@ -91,19 +96,26 @@ class Elements:
     def _bodies(self) -> Iterator[ModelDifference]:
         """The weight that is taken off bodies; of a model without any, nothing is kept."""
         one, two = self._one, self._two
-        for pair in self._pairs.solids:
-            ours = float(one.body_gravcomp[pair.one])
-            theirs = float(two.body_gravcomp[pair.two])
+        if _sleeps(one) or _sleeps(two):
+            trees = {
+                (int(one.body_treeid[p.one]), int(two.body_treeid[p.two])): p.one
+                for p in reversed(self._pairs.solids)
+            }
+            for (a, b), body in sorted(trees.items()):
+                if a >= 0 and b >= 0:
+                    yield from self._rows("body", fields.TREE, [(a, b)], name_of(one, "body", body))
+        for a, b in sorted(self._ids["body"].items()):
+            ours, theirs = float(one.body_gravcomp[a]), float(two.body_gravcomp[b])
             if same(ours, theirs):
                 continue
             values = (("gravcomp", ours, theirs),)
             edits: tuple[Edit, ...] = ()
             back: tuple[Edit, ...] = ()
             if two.ngravcomp:
-                edits = (("body_gravcomp", (pair.two,), ours),)
+                edits = (("body_gravcomp", (b,), ours),)
             else:  # the engine looks only where the file had some
-                back = (("body_gravcomp", (pair.one,), theirs),)
-            name = name_of(one, "body", pair.one)
+                back = (("body_gravcomp", (a,), theirs),)
+            name = name_of(one, "body", a)
             yield ModelDifference("weight taken off", "body", name, values, "", edits, back)
 
     def _joints(self) -> Iterator[ModelDifference]:
@@ -128,7 +140,8 @@ class Elements:
     def _slack(self, a: int, b: int, name: str) -> Iterator[ModelDifference]:
         """Where the spring of a joint is slack."""
         one, two = self._one, self._two
-        if not (one.jnt_stiffness[a] or two.jnt_stiffness[b]):
+        stiff = ("jnt_stiffness", "jnt_stiffnesspoly")
+        if not any(getattr(one, n)[a].any() or getattr(two, n)[b].any() for n in stiff):
             return
         here, there = int(one.jnt_qposadr[a]), int(two.jnt_qposadr[b])
         number = {0: 7, 1: 4}.get(int(one.jnt_type[a]), 1)
@@ -151,7 +164,14 @@ class Elements:
 
     def _drives(self) -> Iterator[ModelDifference]:
         one, two = self._one, self._two
-        yield from self._rows("actuator", fields.ACTUATOR, self._actuators)
+        for a, b in self._actuators:
+            alike = _law(one, a)[1:] == _law(two, b)[1:]
+            rows = [row for row in fields.ACTUATOR if alike or row.when != "actuator_dyntype"]
+            yield from self._rows("actuator", rows, [(a, b)])
+        if one.opt.disableactuator or two.opt.disableactuator:
+            yield from self._rows("actuator", fields.GROUP, self._actuators)
+        for a, b in self._actuators:
+            yield from self._delay(a, b)
         for a, b in self._pairs.actuators:
             number = int(np.searchsorted(np.cumsum(one.actuator_ctrlnum), a, side="right"))
             name = name_of(one, "actuator", number)
@@ -176,6 +196,16 @@ class Elements:
             matched = {pair[side] for pair in self._actuators}
             for k in set(range(raw.nactuator)) - matched:
                 yield _switched_off(side, raw, "actuator", k, _still_actuator(raw, k))
+
+    def _delay(self, a: int, b: int) -> Iterator[ModelDifference]:
+        """A delay needs a memory of commands: without one it is taken away from the other."""
+        one, two = self._one, self._two
+        for found in self._rows("actuator", fields.DELAY, [(a, b)]):
+            if two.actuator_history[b, 0] or not one.actuator_history[a, 0]:
+                yield found
+                continue
+            back: tuple[Edit, ...] = (("actuator_delay", (a,), float(two.actuator_delay[b])),)
+            yield replace(found, edits=(), edits_one=back)
 
     def _drive(self, raw: Any, actuator: int, ours: bool) -> tuple[Any, ...]:
         """What an actuator acts on, in ids of the second model."""
@@ -214,12 +244,12 @@ class Elements:
         found = []
         for k in range(start, start + number):
             kind, thing = int(raw.wrap_type[k]), int(raw.wrap_objid[k])
-            target = _NO_WRAP.get(kind)
-            if ours and target in ("joint", "site"):
+            target, number = _NO_WRAP.get(kind), round(float(raw.wrap_prm[k]), 9)
+            if ours and target:
                 thing = self._ids[target].get(thing, -1)
-            elif target == "geom":  # geoms that a tendon wraps often cannot touch
-                thing = -1
-            found.append((kind, thing, round(float(raw.wrap_prm[k]), 9)))
+            if ours and target == "geom" and number >= 0:  # the site on whose side it passes
+                number = self._ids["site"].get(int(number), -2)
+            found.append((kind, thing, number))
         return found
 
     def _equalities(self) -> Iterator[ModelDifference]:
@@ -299,6 +329,10 @@ def _bodies(solids: tuple[Solids, Solids], pairs: Counterparts) -> Iterator[tupl
                 ours.remove(a)
                 theirs.remove(b)
         yield from zip(ours, theirs, strict=False)
+
+
+def _sleeps(raw: Any) -> bool:
+    return bool(raw.opt.enableflags & int(require("mujoco").mjtEnableBit.mjENBL_SLEEP))
 
 
 def _entry(raw: Any, name: str, index: int) -> Any:

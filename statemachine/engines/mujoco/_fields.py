@@ -22,7 +22,7 @@ class FieldRow:
         subject: What it is called.
         fields: Arrays of the compiled model.
         unit: Of the first field.
-        when: An array that must not be zero, on either side, for the rest to have an effect.
+        when: Arrays of which one must not be zero, on either side, for the rest to have an effect.
     """
 
     subject: str
@@ -74,11 +74,12 @@ ACTUATOR = (
     FieldRow("force range", ("actuator_forcelimited", "actuator_forcerange"), "N·m"),
     FieldRow("dynamics", ("actuator_dynprm", "actuator_actearly"), when="actuator_dyntype"),
     FieldRow("range of its activation", ("actuator_actlimited", "actuator_actrange")),
-    FieldRow("delay", ("actuator_delay",), "s"),
     FieldRow("rotor", ("actuator_armature",)),
     FieldRow("damping", ("actuator_damping", "actuator_dampingpoly")),
     FieldRow("length range", ("actuator_lengthrange",), when="actuator_gaintype"),
 )
+DELAY = (FieldRow("delay", ("actuator_delay",), "s"),)
+GROUP = (FieldRow("group", ("actuator_group",)),)
 CONTROL = (FieldRow("range of ctrl", ("actuator_ctrllimited", "actuator_ctrlrange")),)
 TENDON = (
     FieldRow("range", ("tendon_limited", "tendon_range"), "m"),
@@ -86,7 +87,12 @@ TENDON = (
         "stop", ("tendon_solref_lim", "tendon_solimp_lim", "tendon_margin"), when="tendon_limited"
     ),
     FieldRow("spring", ("tendon_stiffness", "tendon_stiffnesspoly", "tendon_springyield")),
-    FieldRow("slack length", ("tendon_lengthspring",), "m", when="tendon_stiffness"),
+    FieldRow(
+        "slack length",
+        ("tendon_lengthspring",),
+        "m",
+        when="tendon_stiffness tendon_stiffnesspoly",
+    ),
     FieldRow("damping", ("tendon_damping", "tendon_dampingpoly")),
     FieldRow("dry friction", ("tendon_frictionloss",)),
     FieldRow(
@@ -108,6 +114,7 @@ PAIR = (
     FieldRow("margin", ("pair_margin", "pair_gap")),
     FieldRow("adhesion", ("pair_adhesion",)),
 )
+TREE = (FieldRow("sleep policy", ("tree_sleep_policy",)),)
 BODY = (FieldRow("weight taken off", ("body_gravcomp",)),)
 
 # What is compared with regard to frames, shapes and owners, element by element.
@@ -186,7 +193,7 @@ IDLE = {
     "mesh_facenormal": "it shows the scene",
     "mesh_facetexcoord": "it shows the scene",
     "flex_texcoord*": "it shows the scene",
-    "*_group": "it groups elements for the viewer; of actuators, disableactuator is compared",
+    "*_group": "it groups elements for the viewer",
     "*_user": "a user's own data, which the engine does not read",
     "numeric_*": "a user's own data, which the engine does not read",
     "text_*": "a user's own data, which the engine does not read",
@@ -218,7 +225,20 @@ DERIVED = _words(
     "plugin_statenum"
 )
 
-ROWS = (*JOINT, *DOF, *GEOM, *ACTUATOR, *CONTROL, *TENDON, *EQUALITY, *PAIR, *BODY)
+ROWS = (
+    *JOINT,
+    *DOF,
+    *GEOM,
+    *ACTUATOR,
+    *DELAY,
+    *GROUP,
+    *CONTROL,
+    *TENDON,
+    *EQUALITY,
+    *PAIR,
+    *BODY,
+    *TREE,
+)
 
 
 def known(name: str) -> str:

@@ -20,6 +20,7 @@ _FREE, _BALL = 0, 1
 _PLANE, _HFIELD, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(8)  # mjtGeom
 _SIZES = {_SPHERE: 1, _CAPSULE: 2, _ELLIPSOID: 3, _CYLINDER: 2, _BOX: 3}
 _ROUND = (_CAPSULE, _CYLINDER)
+_WRAPPED = (4, 5)  # mjtWrap: a sphere, a cylinder
 _VERTEX = 1e-6  # [m]: vertices are single precision
 
 
@@ -27,8 +28,8 @@ class Places:
     """Rigid parts, joints, geoms and sites of two models, in the frames of the second.
 
     Attributes:
-        geoms: Pairs of ids of geoms that can touch.
-        only: For each model its geoms that can touch and have no counterpart.
+        geoms: Pairs of ids of geoms that act on the motion.
+        only: For each model those that have no counterpart.
     """
 
     def __init__(self, one: Any, two: Any, pairs: Counterparts) -> None:
@@ -37,7 +38,7 @@ class Places:
         self._by_one = {pair.one: pair for pair in pairs.solids}
         self.geoms: tuple[tuple[int, int], ...] = tuple(sorted(self._match_geoms()))
         self.only = tuple(
-            [g for g in _touching(raw) if g not in {pair[k] for pair in self.geoms}]
+            [g for g in _acting(raw) if g not in {pair[k] for pair in self.geoms}]
             for k, raw in enumerate((one, two))
         )
 
@@ -45,7 +46,8 @@ class Places:
         """What they differ in."""
         for pair in self._pairs.solids:
             if pair.one and pair.two:
-                yield from self._inertial(pair)
+                if self._one.body_mocapid[pair.one] < 0:  # what no force moves has no weight
+                    yield from self._inertial(pair)
                 yield from self._hangs(pair)
         for pair in self.geoms:
             yield from self._shape(*pair)
@@ -230,11 +232,16 @@ class Places:
         refs = [(_ref(one, a), _ref(two, b)) for a, b in joints]
         ours, theirs = self._solids[0].hangs(pair.one), self._solids[1].hangs(pair.two)
         alike = all(same(a, b) for a, b in refs)
-        if not alike and len(joints) > 1:
+        kept = any(_is_kept(one, a) or _is_kept(two, b) for a, b in joints)
+        if not alike and (len(joints) > 1 or kept):  # an equality counts from the reference, too
             values = (("ref", tuple(a for a, _ in refs), tuple(b for _, b in refs)),)
-            why = "several joints of one body have other zeros"
-            yield ModelDifference("zero", "body", name, values, refused=why)
-            return
+            zeros: tuple[Edit, ...] = tuple(
+                ("qpos0", (int(two.jnt_qposadr[b]),), ref)
+                for (_, b), (ref, other) in zip(joints, refs, strict=True)
+                if not same(ref, other)
+            )
+            yield ModelDifference("zero", "body", name, values, "", zeros)
+            alike = True
         wanted = parent.align @ ours @ pair.align.inverse
         if not alike:  # the same zero, another reference: turn back by ours, on by theirs
             (a, _), (ref, other) = joints[0], refs[0]
@@ -271,8 +278,8 @@ class Places:
     def _match_geoms(self) -> Iterator[tuple[int, int]]:
         """By name, then by likeness, within each rigid part."""
         for pair in self._pairs.solids:
-            ours = [g for g in _touching(self._one) if self._head(0, g) == pair.one]
-            theirs = [g for g in _touching(self._two) if self._head(1, g) == pair.two]
+            ours = [g for g in _acting(self._one) if self._head(0, g) == pair.one]
+            theirs = [g for g in _acting(self._two) if self._head(1, g) == pair.two]
             names = {self._two.geom(g).name: g for g in theirs if self._two.geom(g).name}
             for g in list(ours):
                 other = names.get(self._one.geom(g).name)
@@ -353,6 +360,11 @@ class Places:
             values = (("vertices", len(ours), len(theirs)),)
             yield ModelDifference("shape", "geom", name, values, refused="it is another mesh")
             return
+        hulls = _hull(self._one, a), _hull(self._two, b)
+        if all(each is not None for each in hulls) and not same(*hulls):
+            values = (("corners of its hull", int(hulls[0][0]), int(hulls[1][0])),)
+            why = "it has another convex hull"
+            yield ModelDifference("hull", "geom", name, values, refused=why)
         if np.abs(ours - theirs).max() <= _VERTEX:
             return
         meshes = [int(raw.geom_dataid[g]) for raw, g in ((self._one, a), (self._two, b))]
@@ -370,6 +382,7 @@ class Places:
             for g in self.only[side]:
                 kind = _kind(int(raw.geom_type[g]))
                 edits: tuple[Edit, ...] = (("geom_contype", (g,), 0), ("geom_conaffinity", (g,), 0))
+                edits += (("geom_fluid", (g,), np.zeros(raw.geom_fluid.shape[1])),)
                 edits += tuple(
                     ("pair_margin", (k,), -1e3)
                     for k in range(raw.npair)
@@ -408,11 +421,18 @@ class Places:
         yield ModelDifference("place", "site", name, tuple(values), "m", edits)
 
 
-def _touching(raw: Any) -> list[int]:
-    """Geoms that can touch: by their masks, or in a pair of their own."""
-    paired = {*raw.pair_geom1.tolist(), *raw.pair_geom2.tolist()}
-    masks = (raw.geom_contype != 0) | (raw.geom_conaffinity != 0)
-    return [g for g in range(raw.ngeom) if masks[g] or g in paired]
+def touches(raw: Any) -> Any:
+    """Which geoms (ngeom,) can touch: by their masks, or in a pair of their own."""
+    found = (raw.geom_contype != 0) | (raw.geom_conaffinity != 0)
+    found[raw.pair_geom1] = found[raw.pair_geom2] = True
+    return found
+
+
+def _acting(raw: Any) -> list[int]:
+    """Geoms that can touch, that a tendon wraps, or that a medium flows around by their shape."""
+    found = touches(raw) | (raw.geom_fluid[:, 0] > 0)
+    found[raw.wrap_objid[np.isin(raw.wrap_type, _WRAPPED)]] = True
+    return np.flatnonzero(found).tolist()
 
 
 def _off(kind: int, one: Placement, two: Placement) -> bool:
@@ -447,6 +467,15 @@ def _own_vertices(raw: Any, mesh: int) -> Array:
     return np.asarray(raw.mesh_vert[start : start + int(raw.mesh_vertnum[mesh])], dtype=float)
 
 
+def _hull(raw: Any, geom: int) -> Any:
+    """What the compiler made of the convex hull of a mesh geom; None without one."""
+    start = int(raw.mesh_graphadr[raw.geom_dataid[geom]])
+    if start < 0:
+        return None
+    corners, faces = raw.mesh_graph[start : start + 2].tolist()
+    return raw.mesh_graph[start : start + 2 + 3 * corners + 6 * faces]
+
+
 def _same_hfield(one: Any, two: Any, a: int, b: int) -> bool:
     parts = []
     for raw, geom in ((one, a), (two, b)):
@@ -460,6 +489,12 @@ def _ref(raw: Any, joint: int) -> float:
     """The position of a joint in which the body lies as its frame says; 0 of a ball."""
     scalar = int(raw.jnt_type[joint]) in (SLIDE, HINGE)
     return float(raw.qpos0[raw.jnt_qposadr[joint]]) if scalar else 0.0
+
+
+def _is_kept(raw: Any, joint: int) -> bool:
+    """Whether an equality of joints holds a joint."""
+    of_joints = raw.eq_type == int(require("mujoco").mjtEq.mjEQ_JOINT)
+    return bool((of_joints & ((raw.eq_obj1id == joint) | (raw.eq_obj2id == joint))).any())
 
 
 def _motion(kind: int, axis: Array, anchor: Array, amount: float) -> Placement:
@@ -498,4 +533,4 @@ def name_of(raw: Any, kind: str, index: int) -> str:
     return f"{kind} {index}" + (f" on {on}" if on else "")
 
 
-__all__ = ["Places", "name_of"]
+__all__ = ["Places", "name_of", "touches"]
