@@ -36,7 +36,7 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
     """
     origin = (
         f"left: {result.one}; right: {result.two}; {result.seconds:g} s, {result.runs} runs "
-        f"in {short_time(result.took)} compared at {result.moments} moments"
+        f"in {short_time(result.took)}, compared at {result.moments} moments"
     )
     first = [Text(line) for line in (*said, *_unmatched(result), result.says) if line]
     name = f"{result.experiment}: why the right is not the left"
@@ -117,6 +117,7 @@ def _table(result: Explanation) -> list[Block]:
     if rows:
         gap = quantity(result.gap, result.unit)
         title = f"What differs, and its part of the {gap} ({_MEASURES[result.measure]})"
+        title = "What differs" if result.is_rounding else title
         heads = ("what", "left", "right", "explains", "alone", "last")
         words = frozenset({0, 1, 2})
         blocks.append(Table(heads, rows[:_SHOWN], title, words=words))
@@ -198,7 +199,7 @@ def _number(value: object, unit: str) -> str:
 def _verdict(result: Explanation) -> list[Block]:
     if result.is_rounding:
         refused = any(each.note for each in result.shares)
-        text = "the two sides move alike" + (", though they differ" if result.shares else "")
+        text = "the two sides move alike" + (", although they differ" if result.shares else "")
         if result.gap > result.negligible:
             text = "the gap is inside the chaos floor: there is nothing to explain"
         return [Verdict(text, not refused)]

@@ -73,7 +73,7 @@ def causes(result: Attribution) -> tuple[str, ...]:
     found = []
     touch = result.touch
     contact = next((t for t in worth if t.factor == "contact" and t.way == "off"), None)
-    if contact is not None and touch is not None and touch.before < _PROOF * result.gap:
+    if contact is not None and touch and touch.time and touch.before < _PROOF * result.gap:
         what = touch.what.split("; ", maxsplit=1)[0]
         verb = "are" if result.quantity in ("joints", "slides") else "is"
         found.append(
@@ -151,7 +151,7 @@ def conclusion(result: Attribution) -> list[str]:
             "they compute contact."
         )
         touch = result.touch
-        if touch is not None and touch.before < _PROOF * result.gap:
+        if touch and touch.time and touch.before < _PROOF * result.gap:
             acting = [t.factor for t in result.alone if t.way in ("off", "one side")]
             named = [FACTORS[name].title for name in acting if name not in _AT_TOUCH]
             what = touch.what.split("; ", maxsplit=1)[0]
@@ -160,7 +160,7 @@ def conclusion(result: Attribution) -> list[str]:
                 f"{short_time(touch.time)}, the two are only {amount(result, touch.before)} apart, "
                 f"though {listed(named)} act from the start."
             )
-        elif touch is None and not settings:
+        elif touch and not touch.time and not settings:
             found.append("Something touches from the start, so no moment shows the rest alone.")
     if abs(result.unexplained) > UNEXPLAINED:
         found.append(

@@ -83,11 +83,17 @@ def moved_by_actuators(model: Model) -> frozenset[int]:
     return carried_by(model, (int(model.jnt_bodyid[joint]) for joint in joints))
 
 
-def touching(model: Model, contacts: Contacts, bodies: frozenset[int]) -> tuple[str, ...]:
-    """What of `bodies` touches what else, as "gripper on floor (fixed_tip)", each once."""
-    pairs = contacts.geom.tolist()
-    inside = [[int(model.geom_bodyid[geom]) in bodies for geom in pair] for pair in pairs]
-    found = [pair for pair, (one, two) in zip(pairs, inside, strict=True) if one != two]
+def touching(
+    model: Model, contacts: Contacts, bodies: frozenset[int] | None = None
+) -> tuple[str, ...]:
+    """What of `bodies` touches what else, as "gripper on floor (fixed_tip)", each once.
+
+    Without `bodies`, whatever touches.
+    """
+    found = contacts.geom.tolist()
+    if bodies is not None:
+        owners = [[int(model.geom_bodyid[geom]) in bodies for geom in pair] for pair in found]
+        found = [pair for pair, (one, two) in zip(found, owners, strict=True) if one != two]
     names = ContactNames.of(model) if found else None
     return tuple(dict.fromkeys(names.geoms(*pair) for pair in found)) if names else ()
 

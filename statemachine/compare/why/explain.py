@@ -147,7 +147,7 @@ def explain(
         seconds: Simulated time; None for the scenario's own.
         seed: Of what the scenario draws, and of the orders that are drawn.
         names: Joints, bodies, sites and actuators of `one` that go by other names in `two`.
-        quantity: What the gap is measured in; None for the joints, or what is in the hand.
+        quantity: What the gap is measured in; None for the first that differs.
         measure: Which figure of it.
         finer: Every difference by itself, however many there are.
         budget: How many sets of causes may be run, as far as orders are drawn.
@@ -235,7 +235,7 @@ def explain(
         floor=floor,
         impossible=found.impossible,
         unmatched=matched.only,
-        notes=matched.notes,
+        notes=(*matched.notes, *trials.notes()),
         moments=len(trials.ruler.time),
         runs=trials.count + (engines.runs if engines else 0),
         took=time.perf_counter() - began,

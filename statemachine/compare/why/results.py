@@ -51,10 +51,10 @@ class FactorTrial:
 
 @dataclass(frozen=True)
 class FirstTouch:
-    """The first contact of the robot, and how far apart the runs were until then.
+    """The first contact of anything, and how far apart the runs were until then.
 
     Attributes:
-        time: Since the start [s].
+        time: Since the start [s]; 0 if something touches from the start.
         what: What touched what.
         before: The gap of the runs as they come, at the moments until then.
         moments: How many these are.
@@ -82,7 +82,7 @@ class Attribution:
         floor: The chaos floor, in `unit`: how far one is from itself, started and commanded anew
             with rounding, and with what is not known of the start.
         extent: How far one moves from where it starts, in `unit`.
-        touch: The first contact of the robot; None without one, or with one from the start.
+        touch: The first contact; None without one.
         moments: How many moments the runs are compared at; between: whether rows had to be
             interpolated there.
         order: How the ladder was ordered, and why.

@@ -127,21 +127,23 @@ class Runs:
 
     @property
     def touch(self) -> FirstTouch | None:
-        """The first contact, where there was none from the start."""
+        """The first contact; at time 0 if there is one from the start."""
         found = [watch for watch in self._watches if watch.time is not None]
         one, two = self._curves[0, ()], self._curves[1, ()]
-        if not found or any(watch.time == 0 for watch in found) or not (one and two):
+        if not found or not (one and two):
             return None
         soonest = min(found, key=lambda watch: watch.time or 0.0)
         assert soonest.time is not None
         # A contact found at a moment acts from that moment on: the moment itself is before it.
         before = self.ruler.time <= soonest.time + 1e-9
+        if soonest.time == 0:  # no moment shows the rest alone
+            return FirstTouch(0.0, soonest.what, 0.0, 0)
         far = self.ruler.distances(self.quantity, one, two)[before]
         return FirstTouch(soonest.time, soonest.what, float(far.max()), int(before.sum()))
 
 
 class _Watch:
-    """When the robot first touches something, seen from the controller of a run."""
+    """When anything first touches, seen from the controller of a run."""
 
     def __init__(self, model: Model) -> None:
         self._model = model
@@ -159,7 +161,7 @@ class _Watch:
             if not began:
                 began.append(time)
             elif self.time is None:
-                found = touching(self._model, data.contacts, robot)
+                found = touching(self._model, data.contacts)
                 if found:  # of the state that the last step began with
                     self.time, self.what = last[0] - began[0], "; ".join(found)
                     if self.time == 0:

@@ -133,6 +133,16 @@ class Trials:
                 edits = tuple((field, (keys[1], b), float(ours[a])) for a, b in off)
                 yield ModelDifference(f"{subject} of the start", "run", "", values, "", edits)
 
+    def notes(self) -> tuple[str, ...]:
+        """What a function of the user's may stumble over."""
+        places = [int(self._models[1].jnt_qposadr[b]) for _, b in self._matched.joints]
+        if not self._scenario.own or places == sorted(places):
+            return ()
+        return (
+            "the right has its joints in another order: a function that reads qpos or qvel by "
+            "number meets others there (model.joint_id, jnt_qposadr and jnt_dofadr tell which)",
+        )
+
     def _names(self, side: int) -> str:
         model = self._models[side]
         return ", ".join(name or str(k) for k, name in enumerate(model.actuator_names))

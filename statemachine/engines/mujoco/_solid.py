@@ -7,10 +7,13 @@ from typing import Any
 import numpy as np
 
 from ...description.records import HERE, Inertial, Placement
+from ...installed import require
 from ...interface import Array
 from ...rotations import matrix_from_quat
+from ..parts import BodyPair, Counterparts
 
 SLIDE, HINGE = 2, 3  # mjtJoint
+NEAR = 1e-10  # [m], and of entries of matrices: less is rounding
 
 
 class Solids:
@@ -104,3 +107,32 @@ def placed(pos: Array, quat: Array) -> Placement:
 def apart(one: Placement, two: Placement) -> tuple[float, float]:
     """How far two poses are from each other: [m], and the largest entry of the matrices."""
     return one.distance(two), float(np.abs(one.mat - two.mat).max())
+
+
+def quat_of(mat: Array) -> Array:
+    """The quaternion (4,), wxyz, of a rotation matrix."""
+    quat = np.empty(4)
+    require("mujoco").mju_mat2Quat(quat, np.ascontiguousarray(mat).reshape(9))
+    return quat
+
+
+def name_of(raw: Any, kind: str, index: int) -> str:
+    """The name of an element; without one, its kind, number and owner."""
+    name = getattr(raw, {"equality": "eq"}.get(kind, kind))(index).name
+    if name:
+        return name
+    owner = {"geom": "geom_bodyid", "site": "site_bodyid", "joint": "jnt_bodyid"}.get(kind)
+    on = raw.body(int(getattr(raw, owner)[index])).name if owner else ""
+    return f"{kind} {index}" + (f" on {on}" if on else "")
+
+
+class SolidPairs:
+    """What of two compiled models is compared in the frames of their rigid parts."""
+
+    def __init__(self, one: Any, two: Any, pairs: Counterparts) -> None:
+        self._one, self._two, self._pairs = one, two, pairs
+        self._solids = Solids(one), Solids(two)
+        self._by_one = {pair.one: pair for pair in pairs.solids}
+
+    def _pair_of(self, body: int) -> BodyPair | None:
+        return self._by_one.get(self._solids[0].head(body))

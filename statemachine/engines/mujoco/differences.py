@@ -17,9 +17,13 @@ import numpy as np
 from ...installed import require
 from ..parts import Counterparts, Edit, ModelDifference
 from . import _fields as fields
+from ._contact_pairs import ContactPairs
+from ._drives import Drives
 from ._elements import Elements
 from ._figures import plain, same
+from ._geoms import Geoms
 from ._places import Places
+from ._weights import Weights
 
 __all__ = ["differences", "edited"]
 
@@ -46,9 +50,17 @@ def differences(
         pairs: What of one is what of the other.
         world: Whether gravity and the timestep are compared, too.
     """
-    places = Places(one, two, pairs)
-    elements = Elements(one, two, pairs, places.geoms)
-    return (*_options(one, two, world), *places.found(), *elements.found(), *_whole(one, two))
+    geoms = Geoms(one, two, pairs)
+    return (
+        *_options(one, two, world),
+        *Weights(one, two, pairs).found(),
+        *Places(one, two, pairs).found(),
+        *geoms.found(),
+        *Elements(one, two, pairs, geoms.geoms).found(),
+        *Drives(one, two, pairs, geoms.geoms).found(),
+        *ContactPairs(one, two, pairs, geoms.geoms).found(),
+        *_whole(one, two),
+    )
 
 
 def edited(raw: Any, edits: Iterable[Edit]) -> Any:
@@ -126,6 +138,8 @@ def _options(one: Any, two: Any, world: bool) -> list[ModelDifference]:
     for subject, names in fields.OPTIONS.items():
         if not world and subject in ("gravity", "timestep"):
             continue
+        if subject == "contact override" and not (_overrides(one) or _overrides(two)):
+            continue
         values, edits = [], list[Edit]()
         for name in names:
             a, b = getattr(one.opt, name), getattr(two.opt, name)
@@ -142,6 +156,10 @@ def _options(one: Any, two: Any, world: bool) -> list[ModelDifference]:
         edits = (("stat.meaninertia", (), value),)
         found.append(ModelDifference("scale of the solver", "option", "", values, edits=edits))
     return found + _flags(one, two)
+
+
+def _overrides(raw: Any) -> bool:
+    return bool(raw.opt.enableflags & int(require("mujoco").mjtEnableBit.mjENBL_OVERRIDE))
 
 
 def _flags(one: Any, two: Any) -> list[ModelDifference]:
@@ -167,8 +185,8 @@ def _switch(on: bool) -> str:
 def _whole(one: Any, two: Any) -> list[ModelDifference]:
     """What is compared as a whole and brought to nothing: deformable bodies, plugins."""
     found = []
-    for subject, pattern in (("deformable bodies", "flex_"), ("plugins", "plugin"), ("", "")):
-        names = [name for name in dir(one) if pattern and name.startswith(pattern)]
+    for subject, pattern in (("deformable bodies", "flex_"), ("plugins", "plugin")):
+        names = [name for name in dir(one) if name.startswith(pattern)]
         names = [name for name in names if fields.known(name) == "whole"]
         differing = [n for n in names if not same(getattr(one, n), getattr(two, n))]
         if differing:
