@@ -26,10 +26,10 @@ def models_dir() -> Path:
 
 
 def model_names() -> list[str]:
-    """Names of the models that come with the library: the arm first, then scenes."""
+    """Names of the models that come with the library: the arm and its scenes first."""
     root = models_dir()
     names = [path.relative_to(root).with_suffix("").as_posix() for path in root.glob("*/*.xml")]
-    return sorted(names, key=lambda name: (len(name), name))
+    return sorted(names, key=lambda name: (not name.startswith("so101/"), len(name), name))
 
 
 def resolve(name: str | os.PathLike[str], menagerie: str | os.PathLike[str] | None = None) -> Path:

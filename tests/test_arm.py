@@ -18,7 +18,8 @@ JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_ro
 
 
 def test_models_that_come_with_the_library() -> None:
-    assert model_names() == ["so101/scene", "so101/so101", "so101/scene_box"]
+    arm = ["so101/scene", "so101/so101", "so101/scene_box"]
+    assert model_names() == [*arm, "balancer/here", "balancer/there"]
 
 
 def test_every_parser_can_read_the_arm() -> None:

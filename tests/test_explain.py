@@ -486,3 +486,31 @@ def _with(text: str, changes: list[tuple[str, str]]) -> str:
         assert text.count(old) == 1, old
         text = text.replace(old, new)
     return text
+
+
+def test_the_coefficient_of_a_fixed_tendon_is_brought_over(tmp_path):
+    tendon = (
+        '<tendon><fixed name="band" stiffness="5" springlength="0.1">'
+        '<joint joint="elbow" coef="{}"/></fixed></tendon><actuator>'
+    )
+    left, right = (ARM.replace("<actuator>", tendon.format(coef)) for coef in (1, 1.5))
+    found = explained(tmp_path, left, right, scenario=HOME)
+    assert shares(found) == {"coefficients of band": pytest.approx(1.0)}
+    assert found.brought == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_site_with_another_name_is_found_by_its_place(tmp_path):
+    drive = '<general name="push" site="tip" gear="0 0 0 0 1 0" gainprm="1"/></actuator>'
+    left = ARM.replace("</actuator>", drive).replace('ctrl="0 0"', 'ctrl="0 0 0.1"')
+    right = left.replace('"tip"', '"end"')
+    found = explained(tmp_path, left, right, scenario=HOME)
+    assert found.shares == ()
+    assert found.is_rounding
+
+
+def test_how_a_floating_body_turns_is_measured(tmp_path):
+    fall = replace(HOME, controller=lambda _model, _seed: lambda _time, _data: None)
+    right = ARM.replace('name="ball_shape"', 'name="ball_shape" pos="0.001 0 0"')
+    found = explained(tmp_path, ARM, right, scenario=fall, quantity="ball, rotation")
+    assert found.unit == "rad"
+    assert shares(found) == {"place of ball_shape": pytest.approx(1.0)}

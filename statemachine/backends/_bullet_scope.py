@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -120,15 +121,16 @@ def _bounces(plan: Plan) -> list[str]:
     raw, pairs = plan.raw, plan.surfaces.meeting
     if not pairs:
         return []
-    ratio = np.clip(damping_ratios(raw, pairs), 0.0, 1 - 1e-9)
-    kept = np.exp(-np.pi * ratio / np.sqrt(1 - ratio**2))  # part of the speed, of a damped spring
-    most = int(kept.argmax())
-    if kept[most] < _BOUNCE:
+    ratios = np.clip(damping_ratios(raw, pairs), 0.0, 1 - 1e-9)
+    most = int(ratios.argmin())
+    ratio = float(ratios[most])
+    kept = math.exp(-math.pi * ratio / math.sqrt(1 - ratio**2))  # of its speed, a damped spring
+    if kept < _BOUNCE:
         return []
     names = " and ".join(str(_name(raw, "geom", geom)) for geom in pairs[most])
     return [
         f"contacts do not bounce: solref has no effect ({names} would keep about "
-        f"{100 * kept[most]:.0f} % of their speed)"
+        f"{100 * kept:.0f} % of their speed)"
     ]
 
 

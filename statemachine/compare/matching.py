@@ -23,6 +23,7 @@ from ..interface import Array, Model
 
 Pairs = tuple[tuple[int, int], ...]
 Only = Mapping[str, tuple[str, ...]]
+_ONE_PLACE = 1e-6  # [m] within which two sites without a common name are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +106,7 @@ def match_models(one: Model, two: Model, names: Mapping[str, str] | None = None)
     # A body with several joints is several parts of a description, of which the last has its mass.
     by_body = {solid.one: solid for solid in (_solid(p, trees, one, two) for p in found.pairs)}
     solids = (*by_body.values(), *_led(one, two, given))
-    sites = _by_name(one.site_names, two.site_names, given)
+    sites = _sites(one, two, given, found, trees)
     actuators = _actuators(one, two, joints, given)
     only = tuple(
         {
@@ -124,7 +125,7 @@ def match_models(one: Model, two: Model, names: Mapping[str, str] | None = None)
         actuators=actuators,
         solids=solids,
         only=(only[0], only[1]),
-        notes=tuple(_notes(found)),
+        notes=(*_notes(found), *_site_notes(one, two, sites, given)),
     )
 
 
@@ -207,6 +208,39 @@ def _by_name(ours: Sequence[str], theirs: Sequence[str], given: Mapping[str, str
     return tuple((k, there[name]) for k, name in enumerate(wanted) if name in there)
 
 
+def _sites(
+    one: Model,
+    two: Model,
+    given: Mapping[str, str],
+    found: Matching,
+    trees: Sequence[GroupTree],
+) -> Pairs:
+    """By name, then by place: of what is left, those in one place of the same solid."""
+    pairs = dict(_by_name(one.site_names, two.site_names, given))
+    places = [
+        [
+            (number, at @ frame.place)
+            for frame in tree.robot.frames
+            for number, at in [tree.at[frame.link]]
+        ]
+        for tree in trees
+    ]
+    left = [k for k in range(two.nsite) if k not in pairs.values()]
+    for a in range(one.nsite):
+        number, place = places[0][a]
+        pair = found.of(number)
+        if a in pairs or pair is None:
+            continue
+        here = pair.align @ place
+        for b in left:
+            there, other = places[1][b]
+            if there == pair.two.number and here.distance(other) < _ONE_PLACE:
+                pairs[a] = b
+                left.remove(b)
+                break
+    return tuple(sorted(pairs.items()))
+
+
 def _actuators(one: Model, two: Model, joints: Pairs, given: Mapping[str, str]) -> Pairs:
     """By name, then by the joint: the n-th of a joint is the n-th of its counterpart."""
     pairs = dict(_by_name(one.actuator_names, two.actuator_names, given))
@@ -251,6 +285,16 @@ def _notes(found: Matching) -> list[str]:
         elif a and b and a.kind != b.kind:
             notes.append(f"joint {a.name!r} is a {a.kind} on the left and a {b.kind} on the right")
     return notes
+
+
+def _site_notes(one: Model, two: Model, sites: Pairs, given: Mapping[str, str]) -> Iterator[str]:
+    for a, b in sites:
+        name, other = one.site_names[a], two.site_names[b]
+        if name and name != other and given.get(name) != other:
+            yield (
+                f"site {name!r} on the left is taken for {other!r} on the right: one place "
+                f"(--map {name}=NAME says otherwise)"
+            )
 
 
 def _rows(values: Array, start: Array) -> Array:

@@ -52,7 +52,7 @@ class _Measured:
     Attributes:
         hinges, slides: Addresses in qpos.
         balls: Those of quaternions, four for each ball joint.
-        free: Bodies that float.
+        free: Bodies that float; turned: addresses of the quaternion of each, (n, 4).
         tip: The site that is measured; None without one.
     """
 
@@ -60,6 +60,7 @@ class _Measured:
     slides: Ints
     balls: Ints
     free: Ints
+    turned: Ints
     tip: int | None
 
     @classmethod
@@ -88,6 +89,7 @@ class _Measured:
             slides=places[kinds == int(JointType.SLIDE)],
             balls=(places[kinds == int(JointType.BALL)][:, None] + np.arange(4)).ravel(),
             free=model.jnt_bodyid[joints[kinds == int(JointType.FREE)]],
+            turned=places[kinds == int(JointType.FREE)][:, None] + np.arange(3, 7),
             tip=tip,
         )
 
@@ -136,9 +138,11 @@ class Ruler:
         if measured.tip is not None:
             self.units[self._tip_name] = "m"
         for body in measured.free:
-            self.units[model.body_names[body]] = "m"
+            self.units[self._body(body)] = "m"
+            self.units[self._rotation(body)] = "rad"
             if measured.tip is not None:
                 self.units[self._in_hand(body)] = "m"
+        self._turns = {BALLS, *(self._rotation(body) for body in measured.free)}
         if not self.units:
             raise BadInputError(
                 f"nothing can be measured in {model.path.name}: it has no joint"
@@ -151,8 +155,14 @@ class Ruler:
         assert tip is not None
         return self._model.site_names[tip] or f"site {tip}"
 
+    def _body(self, body: int) -> str:
+        return self._model.body_names[body] or f"body {body}"
+
+    def _rotation(self, body: int) -> str:
+        return f"{self._body(body)}, rotation"
+
     def _in_hand(self, body: int) -> str:
-        return f"{self._model.body_names[body]} in the hand"
+        return f"{self._body(body)} in the hand"
 
     def curves(self, trace: Trace, model: Model | None = None, side: int = 0) -> Curves | None:
         """A run at the moments of the ruler; None if it ended before the last of them.
@@ -173,6 +183,8 @@ class Ruler:
             found["slides"] = qpos[:, measured.slides]
         if len(measured.balls):
             found[BALLS] = qpos[:, measured.balls]
+        for body, places in zip(self._sides[0].free, measured.turned, strict=True):
+            found[self._rotation(body)] = qpos[:, places]
         if measured.tip is None and not len(measured.free):
             return Curves(found)
         try:
@@ -197,7 +209,7 @@ class Ruler:
         if tip is not None:
             found[self._tip_name] = np.array(sites)
         for k, body in enumerate(self._sides[0].free):
-            found[self._model.body_names[body]] = where[:, k]
+            found[self._body(body)] = where[:, k]
             if tip is not None:  # along the axes of the hand
                 apart = where[:, k] - np.array(sites)
                 found[self._in_hand(body)] = np.einsum("nij,ni->nj", np.array(turns), apart)
@@ -207,14 +219,15 @@ class Ruler:
         """The quantity that an experiment is about: what is in the hand, else the joints."""
         for body in self._sides[0].free:
             name = self._in_hand(body)
-            if self._model.body_names[body] in touching and name in self.units:
+            if self._body(body) in touching and name in self.units:
                 return name
         return next(iter(self.units))
 
     def distances(self, quantity: str, one: Curves, two: Curves) -> Array:
         """(n,) how far apart: the worst joint, or the length of the way between."""
-        if quantity == BALLS:
-            a, b = (curves.of[BALLS].reshape(len(self.time), -1, 4) for curves in (one, two))
+        if quantity in self._turns:
+            quats = one.of[quantity], two.of[quantity]
+            a, b = (array.reshape(len(array), -1, 4) for array in quats)
             chord = np.minimum(*(np.linalg.norm(a + sign * b, axis=2) for sign in (-1, 1)))
             return 4 * np.arcsin(np.minimum(chord / 2, 1.0)).max(axis=1)
         apart = one.of[quantity] - two.of[quantity]

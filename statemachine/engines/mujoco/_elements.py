@@ -17,6 +17,7 @@ from ._solid import HINGE, SLIDE, name_of
 _DOFS = {0: 6, 1: 3}  # mjtJoint, where it is not 1
 _OF_A_SLIDE = {"rad": "m", "N·m/rad": "N/m", "N·m": "N", "kg m²": "kg", "N·m·s": "N·s/m"}
 _KEEPS = {1: "body", 3: "joint", 5: "geom", 6: "site", 18: "tendon"}  # mjtObj
+_NUMBERED = (1, 2)  # mjtWrap: a joint with its coefficient, a pulley with its divisor
 _NO_WRAP = {1: "joint", 3: "site", 4: "geom", 5: "geom"}  # mjtWrap, what an entry refers to
 
 
@@ -99,9 +100,21 @@ class Elements(ElementPairs):
         pairs = sorted(self._ids["tendon"].items())
         for a, b in pairs:
             name = name_of(one, "tendon", a)
-            if self._path(one, a, True) != self._path(two, b, False):
+            ours, theirs = self._path(one, a, True), self._path(two, b, False)
+            apart = [
+                k for k, pair in enumerate(zip(ours, theirs, strict=False)) if pair[0] != pair[1]
+            ]
+            numbers = [k for k in apart if ours[k][:2] == theirs[k][:2] and ours[k][0] in _NUMBERED]
+            if len(ours) != len(theirs) or numbers != apart:
                 why = "it takes another path"
                 yield ModelDifference("path", "tendon", name, (), refused=why)
+            elif apart:
+                values = tuple((f"coef[{k}]", ours[k][2], theirs[k][2]) for k in apart)
+                start, other = int(one.tendon_adr[a]), int(two.tendon_adr[b])
+                edits: tuple[Edit, ...] = tuple(
+                    ("wrap_prm", (other + k,), float(one.wrap_prm[start + k])) for k in apart
+                )
+                yield ModelDifference("coefficients", "tendon", name, values, "", edits)
         yield from self._rows("tendon", fields.TENDON, pairs)
         for side, raw in enumerate((one, two)):
             matched = {pair[side] for pair in pairs}
