@@ -114,7 +114,7 @@ def test_a_shorter_run_is_compared_as_far_as_it_goes_and_that_is_said(box: Trace
     said = [note for note in found.notes if "s long" in note]
     assert said == [
         "the runs are 0.145 and 0.3 s long: what "
-        f"{box.header.label} does after 0.145 s is not compared"
+        f"{box.header.label} (second) does after 0.145 s is not compared"
     ]
     # Other commands are found in runs of other lengths, too.
     ctrl = np.array(box.ctrl)
