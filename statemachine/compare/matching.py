@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +19,26 @@ from ..engines import needed_part
 from ..engines.parts import BodyPair, CompilerPart
 from ..errors import BadInputError, unknown_name
 from ..installed import DEFAULT
-from ..interface import Array, Model
+from ..interface import Array, Model, make_data, reset
 
 Pairs = tuple[tuple[int, int], ...]
 Only = Mapping[str, tuple[str, ...]]
 _ONE_PLACE = 1e-6  # [m] within which two sites without a common name are one
+
+
+class SideStart(NamedTuple):
+    """Where a run starts: qpos (nq,), qvel (nv,), ctrl (nu,)."""
+
+    qpos: Array
+    qvel: Array
+    ctrl: Array
+
+
+def start_of(model: Model, keyframe: int | str | None) -> SideStart:
+    """Where a Model starts: in a keyframe, or in its default state if that is None."""
+    with make_data(model) as data:
+        reset(model, data, keyframe)
+        return SideStart(data.qpos.copy(), data.qvel.copy(), data.ctrl.copy())
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +68,20 @@ class Matched:
     def whole(self) -> bool:
         """Whether every joint and every actuator has its counterpart."""
         return not any(only.get(kind) for only in self.only for kind in ("joint", "actuator"))
+
+    @property
+    def reordered(self) -> bool:
+        """Whether who writes ctrl by number meets other actuators on the second."""
+        places = [b for _, b in self.actuators]
+        return places != sorted(places)
+
+    def start(self, one: SideStart, two: SideStart) -> SideStart:
+        """The start of the first Model in the second's terms; the rest is that of `two`."""
+        return SideStart(
+            self.qpos(one.qpos, two.qpos),
+            self.qvel(one.qvel, two.qvel),
+            self.ctrl(one.ctrl, two.ctrl),
+        )
 
     def qpos(self, values: Array, start: Array) -> Array:
         """Positions of the second Model, from those of the first.
@@ -308,4 +337,4 @@ def _span(model: Model, joint: int, start: str, end: str) -> NDArray[Any]:
     return np.arange(starts[joint], starts[joint + 1])
 
 
-__all__ = ["Matched", "match_models"]
+__all__ = ["Matched", "SideStart", "match_models", "start_of"]

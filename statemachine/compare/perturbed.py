@@ -9,11 +9,12 @@ from typing import Any, Literal
 import numpy as np
 
 from ..errors import BadInputError
-from ..interface import Array, Data, JointType, Model, make_data, reset
+from ..interface import Array, Data, JointType, Model
 from ..rotations import times
 from ..scenarios import Controller, Scenario
 from ..scenarios.runs import Progress, part_of, silent
 from ..traces import Trace, record
+from .matching import start_of
 
 RUNS = 4
 ROUNDING = 1e-12  # of a value, or of 1 where it is less; some thousand times that of a float64
@@ -99,11 +100,11 @@ class Rerun:
 
     def start(self) -> tuple[Array, Array]:
         """Positions (nq,) and velocities (nv,) that it starts with."""
-        with make_data(self.model) as data:
-            reset(self.model, data, self.keyframe)
-            qpos = data.qpos.copy() if self.qpos is None else np.array(self.qpos)
-            qvel = data.qvel.copy() if self.qvel is None else np.array(self.qvel)
-        return qpos, qvel
+        qpos, qvel, _ = start_of(self.model, self.keyframe)
+        return (
+            qpos if self.qpos is None else np.array(self.qpos),
+            qvel if self.qvel is None else np.array(self.qvel),
+        )
 
 
 def rerun_of(

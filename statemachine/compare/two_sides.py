@@ -12,20 +12,19 @@ from ..backends import load
 from ..comparison import common_moments
 from ..comparison.text import milliseconds
 from ..errors import BadInputError, StateMachineError, TraceError
-from ..interface import Array, Data, Model, make_data, reset
+from ..interface import Array, Data, Model
 from ..scenarios import Controller, Scenario
 from ..scenarios.runs import Progress, check_length, part_of, silent, steps_in
 from ..traces import Trace, model_file, play, read
 from ..traces.recorder import layout_of
 from .alike import replace_layout, told_alike, translated
 from .labels import files_apart, labels_of
-from .matching import Matched, match_models
+from .matching import Matched, match_models, start_of
 from .perturbed import Rerun
 from .request import Request
 from .side import Side
 
 Loop = Literal["the same", "its own", "recorded"]
-_Start = tuple[Array, Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +188,7 @@ def _reruns(
     said = []
     key, begin = scenario.keyframe, None
     if key is not None and matched and key not in [frame.name for frame in right.keyframes]:
-        begin = _in_right(matched, _start(left, key), _start(right, None))
+        begin = matched.start(start_of(left, key), start_of(right, None))
         said.append(f"{right.path.name} has no keyframe {key!r}: it starts in the left's")
         key = None
     if request.every > 1 and left.timestep != right.timestep:
@@ -197,7 +196,7 @@ def _reruns(
             f"{request.every} steps are {milliseconds(request.every * left.timestep)} on the left "
             f"and {milliseconds(request.every * right.timestep)} on the right"
         )
-    ctrl = _start(right, key)[2]
+    ctrl = start_of(right, key)[2]
 
     def own(model: Model) -> Controller:
         return scenario.controller(model, request.seed)
@@ -252,14 +251,14 @@ def _for_left(trace: Trace, model: Model, request: Request) -> Trace:
             f"the trace has other joints or actuators than {model.path.name}, and what it was "
             f"recorded with cannot be matched: {error}"
         ) from None
-    return translated(trace, matched, _start(model, None))
+    return translated(trace, matched, start_of(model, None))
 
 
 def _in_terms_of_right(left: Trace, right: Trace | None, matched: Matched | None) -> Trace:
     """The left's run as one of the right's Model; what is the right's alone stays as it starts."""
     if matched is None:
         return left
-    start = _start(matched.two, None)
+    start = start_of(matched.two, None)
     if right is not None:
         start = right.qpos[0], right.qvel[0], right.ctrl[0]
     return translated(left, matched, start)
@@ -282,22 +281,6 @@ def _same_commands(theirs: Trace, right: Trace) -> bool:
     rows = np.searchsorted(times - early, since, side="right") - 1
     used = since < times[-1] - early  # the command of a last row is never carried out
     return np.array_equal(theirs.ctrl[rows[used]], right.ctrl[used])
-
-
-def _start(model: Model, keyframe: str | None) -> _Start:
-    """Qpos, qvel and ctrl that a Model starts with."""
-    with make_data(model) as data:
-        reset(model, data, keyframe)
-        return data.qpos.copy(), data.qvel.copy(), data.ctrl.copy()
-
-
-def _in_right(matched: Matched, left: _Start, right: _Start) -> _Start:
-    """The left's start, as the right's."""
-    return (
-        matched.qpos(left[0], right[0]),
-        matched.qvel(left[1], right[1]),
-        matched.ctrl(left[2], right[2]),
-    )
 
 
 def _retold(controller: Controller, matched: Matched, start: Array) -> Controller:

@@ -110,8 +110,7 @@ def _value(value: Any) -> Value:
 
 def _order(matched: Matched) -> Iterator[Difference]:
     """Whether who writes ctrl by number meets other actuators."""
-    places = [b for _, b in matched.actuators]
-    if places != sorted(places):
+    if matched.reordered:
         names = [few(list(model.actuator_names), 6) for model in (matched.one, matched.two)]
         yield _difference("ctrl", "order", names[0], names[1])
 

@@ -13,7 +13,7 @@ from ...scenarios.runs import Progress, silent
 from ..perturbed import EXACT, Uncertainty
 from .factors import FACTORS, OFF_ORDER, PARITY_ORDER, Factor
 from .gap import Deviation
-from .results import Attribution, FactorTrial, Way
+from .results import ROUNDING, Attribution, FactorTrial, Way
 from .runs import Runs
 from .sides import Change, Changes, same, side_of
 
@@ -22,8 +22,6 @@ _NOTHING = 1e-6  # of the first gap: what is less is left alone
 # it stays in the ladder only if it takes away this part of what was left, and if one still
 # moves by this part of what it moves as it comes.
 _MOST, _MOVES = 0.5, 0.1
-# Rounding, after it has grown for some seconds: less than this is no gap to be explained.
-_ROUNDING = {"rad": 1e-8, "m": 1e-9}
 
 ORDER = (
     "First the settings that differ: {two} gets those of {one}, and {one} moves as "
@@ -80,7 +78,7 @@ def attribute(
             f"as they come, a side does not reach the end: {runs.ended}", ended=runs.ended
         )
     floor = 0.0 if uncertain is None else runs.floor(uncertain)[runs.quantity].worst
-    nothing = first[runs.quantity].worst <= max(_ROUNDING[names[runs.quantity]], floor)
+    nothing = first[runs.quantity].worst <= max(ROUNDING[names[runs.quantity]], floor)
     ladder, parity = ((), ({}, {})) if nothing else _ladder(runs)
     alone = () if nothing else _alone(runs, *parity)
     steps = [trial.worst for trial in ladder if trial.explains is not None]
@@ -98,7 +96,7 @@ def attribute(
         alone=alone,
         ladder=ladder,
         left=next((worst for worst in reversed(steps) if worst is not None), runs.first),
-        negligible=_ROUNDING[names[runs.quantity]],
+        negligible=ROUNDING[names[runs.quantity]],
         floor=floor,
         extent=runs.extent({}),
         touch=runs.touch,

@@ -17,14 +17,11 @@ from ..perturbed import EXACT, Uncertainty
 from .attribute import attribute
 from .causes import Cause, causes, differences_of
 from .gap import Deviation
-from .results import UNEXPLAINED, Attribution
+from .results import ROUNDING, UNEXPLAINED, Attribution
 from .shapley import Method, Shares, shapley
 from .trials import Measure, Trials
 
 __all__ = ["CauseShare", "Explanation", "explain"]
-
-# Rounding, after it has grown for some seconds: less than this is no gap to be explained.
-_ROUNDING = {"rad": 1e-8, "m": 1e-9}
 
 
 @dataclass(frozen=True)
@@ -183,9 +180,9 @@ def explain(
         raise EndedEarlyError(
             f"as they come, a side does not reach the end: {trials.ended}", ended=trials.ended
         )
-    if asked is None and first[quantity].worst <= _ROUNDING[units[quantity]]:
+    if asked is None and first[quantity].worst <= ROUNDING[units[quantity]]:
         # The joints may agree while something else does not.
-        more = (name for name, each in first.items() if each.worst > _ROUNDING[units[name]])
+        more = (name for name, each in first.items() if each.worst > ROUNDING[units[name]])
         quantity = next(more, quantity)
     gap = _figure(first[quantity], measure)
     world = not any(_is_as_it_comes(model) for model in models)
@@ -198,7 +195,7 @@ def explain(
         gaps = trials.gaps(brought)
         return _figure(gaps[quantity], measure) if gaps else None
 
-    negligible, floor = _ROUNDING[units[quantity]], 0.0
+    negligible, floor = ROUNDING[units[quantity]], 0.0
     if uncertain is not None:
         floor = _figure(trials.floor(uncertain)[quantity], measure)
     nothing = gap <= max(negligible, floor)

@@ -8,6 +8,8 @@ from typing import Literal
 from ...scenarios.provenance import Provenance
 from .gap import Deviation
 
+# Rounding, after it has grown for some seconds: less than this is no gap to be explained.
+ROUNDING = {"rad": 1e-8, "m": 1e-9}
 UNEXPLAINED = 0.05  # of the gap: where more stays, the answer is no
 
 Way = Literal["parity", "off", "one side", "alike", "none"]

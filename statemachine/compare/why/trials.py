@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -12,10 +11,10 @@ from ...backends import load
 from ...engines.parts import ModelDifference
 from ...errors import DivergedError, EngineError, ModelError, UnsupportedError
 from ...installed import DEFAULT
-from ...interface import Array, Data, Model, make_data, reset
+from ...interface import Array, Data, Model
 from ...scenarios import Controller, Scenario
 from ...traces import Trace, record
-from ..matching import Matched
+from ..matching import Matched, start_of
 from ..perturbed import Rerun, Uncertainty, perturbed_runs
 from .causes import Cause, built
 from .gap import Curves, Deviation, Ruler
@@ -23,16 +22,6 @@ from .gap import Curves, Deviation, Ruler
 Measure = Literal["worst", "end", "rms"]
 START, ORDER = "start", "order of ctrl"
 _SAME = 1e-12
-
-
-@dataclass(frozen=True, eq=False)
-class SideStart:
-    """Where a side starts: keyframe, qpos (nq,), qvel (nv,), ctrl (nu,)."""
-
-    keyframe: str | None
-    qpos: Array
-    qvel: Array
-    ctrl: Array
 
 
 class Trials:
@@ -61,7 +50,12 @@ class Trials:
         self._models, self._matched = (one, two), matched
         self.seconds, self.seed, self._ran = seconds, seed, ran
         self._scenario = scenario
-        self._starts = _starts(one, two, matched, scenario.keyframe)
+        key, left = scenario.keyframe, start_of(one, scenario.keyframe)
+        # The second, if it has no such keyframe, starts where the first does.
+        known = key is None or key in [frame.name for frame in two.keyframes]
+        self._keyframes = key, key if known else None
+        right = start_of(two, self._keyframes[1])
+        self._starts = left, right if known else matched.start(left, right)
         self.count, self.ended = 0, ""
         self._runs: dict[tuple[int, frozenset[str]], Curves | None] = {}
         self._reasons: dict[tuple[int, frozenset[str]], str] = {}
@@ -83,8 +77,7 @@ class Trials:
             values = (("farthest coordinate", 0.0, off),)
             found.append(ModelDifference(START, "run", "", values))
         found += self._keyframe()
-        places = [b for _, b in self._matched.actuators]
-        if self._scenario.own and places != sorted(places):
+        if self._scenario.own and self._matched.reordered:
             names = [self._names(k) for k in (0, 1)]
             values = (("order", names[0], names[1]),)
             found.append(ModelDifference(ORDER, "run", "", values))
@@ -92,8 +85,8 @@ class Trials:
 
     def _keyframe(self) -> Iterator[ModelDifference]:
         """What else the keyframe sets that both start from: ctrl, act, the mocap bodies."""
-        name, (one, two) = self._starts[0].keyframe, (model.compiled for model in self._models)
-        if name is None or self._starts[1].keyframe is None:
+        name, (one, two) = self._keyframes[0], (model.compiled for model in self._models)
+        if name is None or self._keyframes[1] is None:
             return
         keys = [[frame.name for frame in model.keyframes].index(name) for model in self._models]
         owner = [np.repeat(np.arange(raw.nactuator), raw.actuator_ctrlnum) for raw in (one, two)]
@@ -203,7 +196,7 @@ class Trials:
             model,
             controller,
             self.seconds,
-            keyframe=start.keyframe,
+            keyframe=self._keyframes[side],
             qpos=qpos,
             qvel=qvel,
             derive=False,
@@ -245,13 +238,13 @@ class Trials:
 
     def floor(self, uncertain: Uncertainty) -> dict[str, Deviation]:
         """The chaos floor of each quantity: a gap that is no larger says nothing."""
-        start, first = self._starts[0], self._runs[0, frozenset()]
+        first = self._runs[0, frozenset()]
         assert first is not None  # it has gaps
         rerun = Rerun(
             self._models[0],
             lambda model: self._scenario.controller(model, self.seed),
             self.seconds,
-            start.keyframe,
+            self._keyframes[0],
         )
         runs = perturbed_runs(rerun, seed=self.seed, uncertain=uncertain, derive=False)
         return self.ruler.floor(first, runs)
@@ -270,21 +263,3 @@ class Trials:
 
 def _apart(one: Array, two: Array) -> float:
     return float(np.abs(np.asarray(one) - np.asarray(two)).max(initial=0.0))
-
-
-def _starts(
-    one: Model, two: Model, matched: Matched, keyframe: str | None
-) -> tuple[SideStart, SideStart]:
-    """Where both start; the second, if it has no such keyframe, where the first does."""
-    left = _start(one, keyframe)
-    if keyframe is None or keyframe in [frame.name for frame in two.keyframes]:
-        return left, _start(two, keyframe)
-    right = _start(two, None)
-    qpos, qvel = matched.qpos(left.qpos, right.qpos), matched.qvel(left.qvel, right.qvel)
-    return left, SideStart(None, qpos, qvel, matched.ctrl(left.ctrl, right.ctrl))
-
-
-def _start(model: Model, keyframe: str | None) -> SideStart:
-    with make_data(model) as data:
-        reset(model, data, keyframe)
-        return SideStart(keyframe, data.qpos.copy(), data.qvel.copy(), data.ctrl.copy())

@@ -68,12 +68,29 @@ class ElementPairs:
 
 
 def switched_off(
-    side: int, raw: Any, kind: str, k: int, edits: tuple[Edit, ...]
+    side: int,
+    raw: Any,
+    kind: str,
+    k: int,
+    edits: tuple[Edit, ...],
+    *,
+    called: str = "",
+    what: str = "there",
 ) -> ModelDifference:
-    """What only one of two has; without it, it is as the other."""
-    values = ((kind, "there", None) if side == 0 else (kind, None, "there"),)
+    """What only one of two has; without it, it is as the other.
+
+    Args:
+        side: Whose it is: 0 of the first, 1 of the second.
+        raw: That one's compiled model.
+        kind: Of the element; k: its id.
+        k: See kind.
+        edits: What takes its effect away.
+        called: What it is called instead of its kind.
+        what: What stands for it as a value.
+    """
+    values = ((kind, what, None) if side == 0 else (kind, None, what),)
     return ModelDifference(
-        f"extra {kind}",
+        f"extra {called or kind}",
         kind,
         name_of(raw, kind, k),
         values,

@@ -11,6 +11,7 @@ from ...description.records import HERE, Placement
 from ...installed import require
 from ...interface import Array
 from ..parts import BodyPair, Counterparts, Edit, ModelDifference
+from ._element_pairs import switched_off
 from ._figures import plain, same
 from ._solid import NEAR, SolidPairs, apart, name_of, quat_of
 
@@ -156,16 +157,7 @@ class Geoms(SolidPairs):
                     for k in range(raw.npair)
                     if g in (raw.pair_geom1[k], raw.pair_geom2[k])
                 )
-                values = (("geom", kind, None) if side == 0 else ("geom", None, kind),)
-                name = name_of(raw, "geom", g)
-                yield ModelDifference(
-                    "extra shape",
-                    "geom",
-                    name,
-                    values,
-                    edits=() if side == 0 else edits,
-                    edits_one=edits if side == 0 else (),
-                )
+                yield switched_off(side, raw, "geom", g, edits, called="shape", what=kind)
 
 
 def touches(raw: Any) -> Any:
