@@ -242,6 +242,19 @@ class Model(ABC):
     def _make_data(self) -> Any:
         """A new Data of this Model."""
 
+    def _make_worlds(
+        self, n: int, workers: int, derived: tuple[str, ...], options: dict[str, Any]
+    ) -> Any:
+        """N worlds in the engine's own way, or None where it has none.
+
+        Args:
+            n: Number of worlds.
+            workers: Threads, at least 1.
+            derived: Names of `worlds.BATCHED`.
+            options: Checked options of `replace`, each with a value for each world.
+        """
+        return None
+
     @abstractmethod
     def _replace(self, options: dict[str, Any]) -> Model:
         """Another Model; `options` are checked: bools, floats, (3,) and (nv,) arrays."""
