@@ -1,4 +1,4 @@
-"""`statemachine compare --models LEFT RIGHT`: two descriptions of a robot, before anything moves."""
+"""`statemachine compare --models LEFT RIGHT`: two files of a robot, before anything moves."""
 
 from __future__ import annotations
 

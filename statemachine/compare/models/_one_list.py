@@ -264,7 +264,7 @@ class _Joined:
     def leave_out_what_follows(self) -> None:
         """Take out figures that only sum up what other rows tell."""
         self._fold_efforts()
-        weighed = any(row.subject in _WEIGHTS and row.causes for row in self.rows)
+        weighed = any(row.subject == "mass" and row.causes for row in self.rows)
         self.rows = [
             row
             for row in self.rows
