@@ -117,6 +117,10 @@ class EngineWarning(UserWarning):
     """A warning that an engine gave, brought up into Python."""
 
 
+class DivergedWarning(UserWarning):
+    """Some of many worlds diverged and are left out from now on."""
+
+
 def shown(value: object) -> str:
     """What somebody gave, on one line of a message."""
     text = " ".join("".join(c if c.isprintable() else " " for c in repr(value)).split())

@@ -1,0 +1,25 @@
+"""Many worlds: one Model, thousands of Data, stepped together.
+
+from statemachine.worlds import make_worlds, step
+
+worlds = make_worlds(model, 1024)
+worlds.ctrl[:] = commands                      # (1024, nu)
+step(worlds, 100)                              # time passes in all of them
+"""
+
+from __future__ import annotations
+
+from ..interface.worlds import BATCHED, Worlds
+from .verbs import forward, get_state, make_worlds, record, reset, set_state, step
+
+__all__ = [
+    "BATCHED",
+    "Worlds",
+    "forward",
+    "get_state",
+    "make_worlds",
+    "record",
+    "reset",
+    "set_state",
+    "step",
+]
