@@ -348,6 +348,15 @@ class DifferencesPart(Protocol):
         """
         ...
 
+    def entries(self, two: Any, difference: ModelDifference) -> tuple[ModelDifference, ...]:
+        """A difference by its single entries, or itself where it is of one piece.
+
+        Args:
+            two: The compiled model that its edits are of.
+            difference: One of `differences`.
+        """
+        ...
+
     def edited(self, raw: Any, edits: Iterable[Edit]) -> Any:
         """A copy of a compiled model with these edits, and all that follows from them."""
         ...
