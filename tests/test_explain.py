@@ -639,3 +639,21 @@ def test_entries_of_every_case_bring_the_right_to_the_left(tmp_path):
         ]
         arrays = [n for n in dir(ways[0]) if isinstance(getattr(ways[0], n), np.ndarray)]
         assert [n for n in arrays if not same(*(getattr(way, n) for way in ways))] == [], name
+
+
+def test_no_command_leaves_ctrl_as_it_is_on_both_sides(tmp_path):
+    """As in a run of two sides: what the left was told last holds, and each begins with its own."""
+    once = replace(
+        HOME, controller=lambda _m, _s: lambda time, _d: [0.8, -0.5] if time < 0.1 else None
+    )
+    found = explained(tmp_path, ARM, ARM.replace('kp="20"', 'kp="20.0"'), scenario=once)
+    assert found.is_rounding
+    silent = replace(HOME, controller=lambda _m, _s: lambda _time, _data: None)
+    right = ARM.replace('0.6 0 0.2 1 0 0 0  0" ctrl="0 0"', '0.6 0 0.2 1 0 0 0  0" ctrl="0.3 0"')
+    assert right != ARM
+    assert shares(explained(tmp_path, ARM, right, scenario=silent)) == {
+        "ctrl of the start": pytest.approx(1.0)
+    }
+    nothing = ARM[: ARM.index("<keyframe>")] + "</mujoco>"  # it starts in the left's
+    left = right
+    assert explained(tmp_path, left, nothing, scenario=silent).is_rounding

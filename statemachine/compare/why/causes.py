@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from ...engines import needed_part
-from ...engines.parts import DifferencesPart, Edit, ModelDifference
+from ...engines.model_differences import DifferencesPart, Edit, ModelDifference
 from ...installed import DEFAULT
 from ...interface import Model
 from ..matching import Matched
