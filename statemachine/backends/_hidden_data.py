@@ -164,7 +164,11 @@ class Machine:
             self.moment, self._lives, self.derived = moment, True, {}
             # Nothing can interrupt this line, and no other moves the Data.
             self.qpos[:], self.qvel[:], self.time, self._left, self.given = (
-                qpos, qvel, time, left, given
+                qpos,
+                qvel,
+                time,
+                left,
+                given,
             )
         except BaseException:
             # The engine is elsewhere now; the arrays are not, nor is what else is known.

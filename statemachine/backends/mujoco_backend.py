@@ -31,8 +31,8 @@ from ..interface import (
     State,
 )
 from ..interface.checks import HUGE, TINY, check_finite
-from ._mujoco_alarms import AlarmError, Alarms, pass_on
 from ._delays import hold
+from ._mujoco_alarms import AlarmError, Alarms, pass_on
 from .compiled import (
     check_numbers,
     compile_file,
@@ -76,8 +76,8 @@ _NOTES = {
     ),
     "latency": Behaviour(
         "native",
-        "the engine's own delay of an actuator, in whole engine steps; before a keyframe the command "
-        "was that of the keyframe, to the engine zero",
+        "the engine's own delay of an actuator, in whole engine steps; before a keyframe the "
+        "command was that of the keyframe, where the engine has zero",
     ),
     "forces by part": Behaviour("native", "rows of the constraint solver, by their type"),
     "exact restore": Behaviour("native", "mjSTATE_INTEGRATION, warm start included"),

@@ -260,7 +260,7 @@ class Model(ABC):
     def _make_worlds(
         self, n: int, workers: int, derived: tuple[str, ...], options: dict[str, Any]
     ) -> Any:
-        """N worlds in the engine's own way, or None where it has none.
+        """`Worlds` of the engine's own way, or None where it has none.
 
         Args:
             n: Number of worlds.
