@@ -30,8 +30,17 @@ from ..interface import (
     State,
 )
 from ..interface.checks import HUGE, TINY, check_finite
+from ._delays import hold
 from ._mujoco_alarms import AlarmError, Alarms, pass_on
-from .compiled import check_numbers, compile_file, compiler_warnings, edited, facts, step_length
+from .compiled import (
+    check_numbers,
+    compile_file,
+    compiler_warnings,
+    edited,
+    facts,
+    step_length,
+    with_room,
+)
 
 _DISABLE = mujoco.mjtDisableBit
 # Not RK4: after its step the derived values are neither of the state before nor after.
@@ -63,6 +72,11 @@ _NATIVE = Behaviour("native", "the engine's own")
 _NOTES = {
     "position servo": Behaviour(
         "native", "the engine's own; an infinite ctrl is clamped to its range, or refused"
+    ),
+    "latency": Behaviour(
+        "native",
+        "the engine's own delay of an actuator, in whole engine steps; before a keyframe the "
+        "command was that of the keyframe, where the engine has zero",
     ),
     "forces by part": Behaviour("native", "rows of the constraint solver, by their type"),
     "exact restore": Behaviour("native", "mjSTATE_INTEGRATION, warm start included"),
@@ -160,7 +174,7 @@ class MujocoModel(Model):
             raw.opt.integrator = int(_INTEGRATORS[options["integrator"]])
         substeps = options.get("substeps", self.substeps)
         raw.opt.timestep = step_length(self.timestep, substeps, options)
-        return MujocoModel(raw, self.path, substeps)
+        return MujocoModel(with_room(raw), self.path, substeps)
 
 
 class MujocoData(Data):
@@ -237,6 +251,7 @@ class MujocoData(Data):
             mujoco.mj_resetData(self._home.raw, self.raw)
         else:
             mujoco.mj_resetDataKeyframe(self._home.raw, self.raw, key)
+            hold(self._home.raw, self.raw.history, self.raw.ctrl)
         self._alarms.clear()
 
     def _get_state(self) -> State:

@@ -186,7 +186,10 @@ def explain(
         quantity = next(more, quantity)
     gap = _figure(first[quantity], measure)
     world = not any(_is_as_it_comes(model) for model in models)
-    differences = (*differences_of(*models, matched, world, finer), *trials.of_the_run())
+    differences = (
+        *differences_of(models[0], models[1], matched, world, finer),
+        *trials.of_the_run(),
+    )
     listed = causes(differences, finer)
     trials.know(listed)
     able = [cause.name for cause in listed if not cause.refused]
