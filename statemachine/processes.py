@@ -28,11 +28,13 @@ def free_memory() -> int | None:
     What Linux calls available, and what is left to the control groups (containers) of this
     process.
     """
+    if sys.platform == "win32":
+        return None
     try:
         with open("/proc/meminfo", encoding="ascii") as file:
             lines = dict(line.split(":", 1) for line in file)
         free = int(lines["MemAvailable"].split()[0]) << 10
-    except (OSError, KeyError):  # not Linux
+    except (OSError, KeyError):  # nor on macOS
         return None
     return max(min([free, *_left_to_groups()]), 0)
 
@@ -47,7 +49,9 @@ _VERSIONS = {
 
 def _left_to_groups() -> Iterator[int]:
     """Bytes that each control group with a limit, of those that this process is in, has left."""
-    lines = []
+    lines: list[str] = []
+    if sys.platform == "win32":
+        return
     with suppress(OSError):
         lines = Path("/proc/self/cgroup").read_text(encoding="utf-8").splitlines()
     for line in lines:
@@ -59,7 +63,7 @@ def _left_to_groups() -> Iterator[int]:
         place = root / group.strip("/")
         for folder in (place, *place.parents[: len(place.parts) - len(root.parts)]):
             with suppress(OSError, ValueError):  # no such file, or no limit: "max"
-                most, now = (int((folder / name).read_text()) for name in (limit, used))
+                most, now = (int((folder / name).read_text("ascii")) for name in (limit, used))
                 stat = (folder / "memory.stat").read_text(encoding="ascii").split()
                 yield most - now + int(stat[stat.index(kept) + 1])
 

@@ -39,7 +39,7 @@ class WorldsProcess:
             block: The memory that it shares with this process.
             answers: Where in that the answers of all processes are.
         """
-        self.worlds, self.lost = worlds, False
+        self.worlds, self.lost, self._why = worlds, False, ""
         self._block, self._place = block, answers + number * ANSWER_MOST
         self._said = tempfile.TemporaryFile()  # noqa: SIM115  (until it has started)
         command, environment = fresh_python(
@@ -104,8 +104,7 @@ class WorldsProcess:
                 if self._read()[0] == number:
                     return
             elif time.monotonic() > deadline:
-                self.lost = True
-                self.kill()
+                self.give_up("it did not end its step when it was interrupted")
             else:  # what it is at may have swallowed the interrupt
                 self.send(number, Verb.STOP)
 
@@ -123,6 +122,8 @@ class WorldsProcess:
 
     def how_it_ended(self) -> str:
         """In a few words, of one that is lost."""
+        if self._why:
+            return self._why
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(_ENDS_IN)
         code = self._process.returncode
@@ -139,6 +140,11 @@ class WorldsProcess:
             lines = self._said.read().decode(errors="replace").strip().splitlines()
             return lines[-1] if lines else how
         return how
+
+    def give_up(self, why: str) -> None:
+        """Kill it: its worlds are lost."""
+        self.lost, self._why = True, why
+        self.kill()
 
     def leave(self) -> None:
         """Close the pipes: at their end it ends."""
@@ -176,10 +182,10 @@ def lost_worlds(processes: list[WorldsProcess]) -> EngineError:
     worlds = tuple(sorted(world for process in processes for world in process.worlds))
     hows = ", ".join(dict.fromkeys(process.how_it_ended() for process in processes))
     numbers = ", ".join(map(str, worlds[:8])) + (", …" if len(worlds) > 8 else "")
-    named = f"world {numbers}" if len(worlds) == 1 else f"{len(worlds)} worlds ({numbers})"
+    named = f"world {numbers} is" if len(worlds) == 1 else f"{len(worlds)} worlds ({numbers}) are"
     return EngineError(
-        f"a process that held {named} is gone: {hows}. They are left out until reset or "
-        "set_state, which make them anew; the others have gone on",
+        f"{named} lost with the process that held them: {hows}. They are left out until reset "
+        "or set_state, which make them anew; the others have gone on",
         worlds=worlds,
     )
 

@@ -20,7 +20,9 @@ from numpy.typing import NDArray
 
 _PAGE = 4096
 
-# Of each array: where it starts, its shape and its type.
+# Of each array its shape and its type.
+Shapes = Mapping[str, tuple[tuple[int, ...], str]]
+# Of each array where it starts, its shape and its type.
 Layout = dict[str, tuple[int, tuple[int, ...], str]]
 
 
@@ -72,9 +74,7 @@ def open_block(handle: str, size: int) -> mmap.mmap:
     return memory
 
 
-def laid_out(
-    shapes: Mapping[str, tuple[tuple[int, ...], str]], start: int = 0
-) -> tuple[Layout, int]:
+def laid_out(shapes: Shapes, start: int) -> tuple[Layout, int]:
     """Places for arrays one after the other, each on a page of its own, and where they end."""
     layout: Layout = {}
     for name, (shape, kind) in shapes.items():

@@ -15,7 +15,7 @@ import time
 import traceback
 import warnings
 from _thread import interrupt_main
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from queue import SimpleQueue
 from typing import Any
@@ -33,7 +33,7 @@ _ENDS_IN = 1.0  # seconds in which Python code may clean up
 Command = tuple[int, int, int, int, int]  # as `COMMAND` has it
 
 
-class Stopped(BaseException):
+class StepStopped(BaseException):
     """The process that asked no longer wants what is being done."""
 
 
@@ -79,7 +79,7 @@ class Inbox:
             sys.exit()
         if self.stoppable and self.stopped:
             self.stoppable = False
-            raise Stopped
+            raise StepStopped
 
 
 class Holder:
@@ -91,7 +91,7 @@ class Holder:
         self._made: dict[bytes, Model] = {}  # by the options that they differ in
         self._data: list[Data] = []
         self._told: list[tuple[type[Warning], str]] = []
-        self._verbs: dict[int, Callable[[int, Any, list[int]], Any]] = {
+        self._verbs: dict[int, Callable[[int, Any, Sequence[int]], Any]] = {
             Verb.START: self._start,
             Verb.FILL: self._fill,
             Verb.STEP: self._step,
@@ -110,13 +110,13 @@ class Holder:
         answer: dict[str, Any] = {}
         try:
             payload = pickle.loads(self._memory[:size]) if size else None
-            places = range(len(self._data))
+            places: Sequence[int] = range(len(self._data))
             if of_ids:
                 places = np.flatnonzero(self._chosen[self._number :: self._stride]).tolist()
             value = self._verbs[verb](argument, payload, places)
             if value is not None:
                 answer["value"] = value
-        except Stopped:
+        except StepStopped:
             pass
         except Exception as error:
             answer["error"] = portable(error)
@@ -183,7 +183,7 @@ class Holder:
             self._take(len(self._data) - 1)
 
     def _put(self, place: int) -> None:
-        """What was written into the arrays, into a Data: bit by bit, so that it sees what is new."""
+        """Copy what the arrays have into a Data, bit by bit: it sees itself what was written."""
         world, data = self._world(place), self._data[place]
         data.qpos[:], data.qvel[:] = self._qpos[world], self._qvel[world]
         data.ctrl[:] = self._ctrl[world]
@@ -197,13 +197,13 @@ class Holder:
         self._qpos[world], self._qvel[world] = data.qpos, data.qvel
         self._ctrl[world], self._time[world] = data.ctrl, data.time
 
-    def _step(self, nstep: int, _: Any, places: Iterable[int]) -> None:
+    def _step(self, nstep: int, _: Any, places: Sequence[int]) -> None:
         self._each(places, lambda place: step(self._models[place], self._data[place], nstep))
 
-    def _forward(self, _argument: int, _: Any, places: Iterable[int]) -> None:
+    def _forward(self, _argument: int, _: Any, places: Sequence[int]) -> None:
         self._each(places, lambda place: forward(self._models[place], self._data[place]))
 
-    def _each(self, places: Iterable[int], call: Callable[[int], None]) -> None:
+    def _each(self, places: Sequence[int], call: Callable[[int], None]) -> None:
         """Call something for each world that is meant; what it raises ends this world."""
         inbox = self._inbox
         for place in places:
@@ -224,13 +224,13 @@ class Holder:
             inbox.stoppable = True
             call(place)
             inbox.stoppable = False
-        except Stopped:  # the Data is where it was, or where it was to be
+        except StepStopped:  # the Data is where it was, or where it was to be
             self._take(place)
             raise
         finally:
             inbox.stoppable = False
 
-    def _reset(self, key: int, _: Any, places: Iterable[int]) -> None:
+    def _reset(self, key: int, _: Any, places: Sequence[int]) -> None:
         keyframe = None if key < 0 else key
         for place in places:
             if self._inbox.stopped:
@@ -250,7 +250,7 @@ class Holder:
         set_state(self._models[place], self._data[place], state)
         self._take(place)
 
-    def _record(self, every: int, layout: Any, places: Iterable[int]) -> None:
+    def _record(self, every: int, layout: Any, places: Sequence[int]) -> None:
         arrays = arrays_in(self._memory, layout)
         commands = arrays.pop("commands", None)
         rows = next(iter(layout.values()))[1][1]
@@ -267,7 +267,7 @@ class Holder:
 
         self._each(places, run)
 
-    def _derive(self, _argument: int, name: str, places: Iterable[int]) -> None:
+    def _derive(self, _argument: int, name: str, places: Sequence[int]) -> None:
         rows = self._arrays[name]
         for place in places:
             rows[self._world(place)] = getattr(self._data[place], name)

@@ -25,7 +25,7 @@ from ..interface.worlds import Worlds
 from ..processes import free_memory
 from ._process import WorldsProcess, end_all, lost_worlds
 from ._protocol import ANSWER_MOST, Verb
-from ._shared import Layout, SharedBlock, arrays_in, laid_out
+from ._shared import Layout, Shapes, SharedBlock, arrays_in, laid_out
 
 _PATIENCE = 1.0  # seconds in which a process has to end a step that was interrupted
 _SCRATCH = 1 << 24  # bytes for what belongs to a command, at least
@@ -86,7 +86,8 @@ class PoolWorlds(Worlds):
         self._block = SharedBlock(end)
         arrays = arrays_in(self._block.memory, job["layout"])
         self._options, self._job, self._replaced = options, job, dict[int, Model]()
-        self._chosen, self._rows = arrays.pop("ids"), arrays.pop("rows")
+        self._chosen: Any = arrays.pop("ids")
+        self._rows: Any = arrays.pop("rows")
         self._count, self._warned = 0, set[tuple[Any, str]]()
         self._processes: list[WorldsProcess] = []
         self._end = weakref.finalize(self, end_all, self._processes, os.getpid())
@@ -136,8 +137,8 @@ class PoolWorlds(Worlds):
 
     def _close(self) -> None:
         self._end()
-        self._chosen = self._rows = None
         self._kept.clear()
+        self._chosen = self._rows = np.zeros(0)
         self._block.close()
 
     def _exchange(
@@ -175,8 +176,7 @@ class PoolWorlds(Worlds):
                 process.stop(self._count, deadline)
         except BaseException:  # a second Ctrl-C
             for process in processes:
-                process.lost = True
-                process.kill()
+                process.give_up("it was interrupted twice")
             raise
         finally:
             self._find_lost(processes)
@@ -202,24 +202,25 @@ class PoolWorlds(Worlds):
             processes = [processes[k] for k in np.unique(ids % len(processes)).tolist()]
         answers = self._exchange(processes, verb, argument, payload, of_ids)
         errors: dict[int, Exception] = {}
-        raised = value = None
+        raised: Exception | None = None
+        value: Any = None
         for answer in answers:
             if answer:
                 errors |= answer.get("errors", {})
                 raised, value = raised or answer.get("error"), answer.get("value")
                 for kind, text in answer.get("warnings", ()):
                     self._warn(kind, text)
-        lost = self._find_lost(processes)
-        if lost or raised:
+        raised = self._find_lost(processes) or raised
+        if raised:
             self._errors.update(errors)
-            raise lost or raised
+            raise raised
         return errors, value
 
     def _warn(self, kind: type[Warning], text: str) -> None:
         """Say what an engine warned of, once for all worlds."""
         if (kind, text) not in self._warned:
             self._warned.add((kind, text))
-            warnings.warn(text, kind, stacklevel=9)
+            warnings.warn(text, kind, stacklevel=8)
 
     def _renew(self, ids: Ints) -> None:
         """Start the processes anew that these worlds were in, if they are lost."""
@@ -233,8 +234,7 @@ class PoolWorlds(Worlds):
                 try:
                     self._fill([process])
                 except BaseException:
-                    process.lost = True
-                    process.kill()
+                    process.give_up("it was not started")
                     raise
 
     def _forget(self) -> None:
@@ -316,9 +316,7 @@ class PoolWorlds(Worlds):
         return errors
 
 
-def _shapes(
-    model: Model, n: int, derived: Sequence[str]
-) -> dict[str, tuple[tuple[int, ...], str]]:
+def _shapes(model: Model, n: int, derived: Sequence[str]) -> Shapes:
     sizes = {"qpos": (model.nq,), "ctrl": (model.nu,), "time": ()}
     sizes |= {"xpos": (model.nbody, 3), "xquat": (model.nbody, 4)}
     sizes |= {"site_xpos": (model.nsite, 3), "site_xmat": (model.nsite, 9)}
