@@ -63,7 +63,9 @@ def _left_to_groups() -> Iterator[int]:
         place = root / group.strip("/")
         for folder in (place, *place.parents[: len(place.parts) - len(root.parts)]):
             with suppress(OSError, ValueError):  # no such file, or no limit: "max"
-                most, now = (int((folder / name).read_text("ascii")) for name in (limit, used))
+                most, now = (
+                    int((folder / name).read_text(encoding="ascii")) for name in (limit, used)
+                )
                 stat = (folder / "memory.stat").read_text(encoding="ascii").split()
                 yield most - now + int(stat[stat.index(kept) + 1])
 
