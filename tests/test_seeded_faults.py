@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from statemachine import conformance
-from statemachine.backends import compiled
+from statemachine.backends import _edits
 from statemachine.backends._mujoco_alarms import Alarms
 from statemachine.backends.mujoco_backend import MujocoData, MujocoModel
 from statemachine.grading.mutants import faults as mutants
@@ -120,7 +120,22 @@ def options_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def replace_in_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiled.copy, "copy", lambda raw: raw)
+    monkeypatch.setattr(_edits.copy, "copy", lambda raw: raw)
+
+
+def changes_with(*names: str) -> Patch:
+    """A fault: what options change in these arrays of the compiled model is lost."""
+
+    def apply(monkeypatch: pytest.MonkeyPatch) -> None:
+        right = _edits.changes
+
+        def faulty(raw: Any, options: Any) -> dict[str, Any]:
+            found = right(raw, options)
+            return {name: value for name, value in found.items() if name not in names}
+
+        monkeypatch.setattr(_edits, "changes", faulty)
+
+    return apply
 
 
 def fresh_arrays_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -219,6 +234,15 @@ FAULTS: dict[str, tuple[Patch, set[str]]] = {
     "joints shifted": (mutants.joints_shifted, {"the_witness_agrees"}),
     "options ignored": (options_ignored, {"options_do_what_they_say"}),
     "replace works in place": (replace_in_place, {"options_do_what_they_say"}),
+    "inertia stays with the old mass": (
+        changes_with("body_inertia"),
+        {"mass_scales_weight_and_inertia"},
+    ),
+    "friction is ignored": (changes_with("geom_friction"), {"friction_slows_what_slides"}),
+    "kp without its other half": (
+        changes_with("actuator_biasprm"),
+        {"gains_are_those_of_the_servo"},
+    ),
     "inputs are new arrays": (fresh_arrays_each_time, {"inputs_are_the_same_arrays_for_life"}),
     "acceleration negated": (
         acceleration_negated,

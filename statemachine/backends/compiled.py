@@ -12,7 +12,6 @@ an `mjModel`, and give its Model the facts that every other backend gives:
 
 from __future__ import annotations
 
-import copy
 import os
 import re
 from collections.abc import Iterator
@@ -24,25 +23,23 @@ from xml.sax.saxutils import escape, unescape
 import mujoco
 import numpy as np
 
-from ..errors import BadInputError, ModelError
+from ..errors import ModelError
 from ..interface import Array, JointType, Keyframe
 from ..interface.checks import HUGE, TINY
 from ..models import mesh_file
+from ._edits import edited, servos, step_length
 from ._mjb import check_binary
 
-_DISABLE = mujoco.mjtDisableBit
-_SWITCHES = {  # option of `replace` -> the flag that turns it off
-    "actuation": _DISABLE.mjDSBL_ACTUATION,
-    "contacts": _DISABLE.mjDSBL_CONTACT,
-    "limits": _DISABLE.mjDSBL_LIMIT,
-}
-_HINDRANCES = {  # option -> flags of a file that would leave it without effect
-    "gravity": (_DISABLE.mjDSBL_GRAVITY,),
-    "damping": (_DISABLE.mjDSBL_DAMPER,),
-    "frictionloss": (_DISABLE.mjDSBL_FRICTIONLOSS, _DISABLE.mjDSBL_CONSTRAINT),
-    "contacts": (_DISABLE.mjDSBL_CONSTRAINT,),
-    "limits": (_DISABLE.mjDSBL_CONSTRAINT,),
-}
+__all__ = [
+    "check_numbers",
+    "compile_file",
+    "compiler_warnings",
+    "edited",
+    "facts",
+    "fastest",
+    "gravity",
+    "step_length",
+]
 
 # For `fastest`: in a step [rad, or the model's extent]; at least [rad/s or m/s]; about a day [s].
 _FAR, _FAST, _DAY = 1000.0, 1e5, 1e5
@@ -170,48 +167,6 @@ def _owner(raw: mujoco.MjModel, name: str, row: Array) -> str:
     return f" of {kind} {label or f'number {index}'}"
 
 
-def edited(raw: mujoco.MjModel, options: dict[str, Any]) -> mujoco.MjModel:
-    """A copy with options of `Model.replace`, which has checked them.
-
-    Args:
-        raw: Stays as it is.
-        options: actuation, contacts, limits: bool; gravity: (3,) [m/s²]; armature [kg·m² or
-            kg], damping [N·m·s/rad or N·s/m], frictionloss [N·m or N]: (nv,). Others,
-            `timestep`, `substeps` and `integrator` among them, are left to the backend.
-    """
-    raw = copy.copy(raw)
-    for name, value in options.items():
-        for flag in _HINDRANCES.get(name, ()):  # else the option would be without effect
-            raw.opt.disableflags &= ~int(flag)
-        if name in _SWITCHES:
-            flag = int(_SWITCHES[name])
-            raw.opt.disableflags = (raw.opt.disableflags & ~flag) | (0 if value else flag)
-        elif name == "gravity":
-            raw.opt.gravity[:] = value
-        elif name in ("armature", "damping", "frictionloss"):
-            getattr(raw, f"dof_{name}")[:] = value
-    if "armature" in options:
-        mujoco.mj_setConst(raw, mujoco.MjData(raw))  # inverse weights follow from it
-    return raw
-
-
-def step_length(timestep: float, substeps: int, options: dict[str, Any]) -> float:
-    """What one engine step takes [s] after `replace`.
-
-    Args:
-        timestep: Of the Model before [s].
-        substeps: Of the Model after.
-        options: What `Model.replace` has checked; its "timestep" comes before the first one.
-
-    Raises:
-        BadInputError: So many substeps leave nothing of a timestep.
-    """
-    whole = options.get("timestep", timestep)
-    if whole / substeps <= 0:
-        raise BadInputError(f"a timestep of {whole} s cannot have {substeps} substeps")
-    return whole / substeps
-
-
 def fastest(m: mujoco.MjModel) -> Array:
     """Velocities (nv,) [rad/s or m/s] beyond which a degree of freedom has diverged.
 
@@ -251,7 +206,8 @@ def fastest(m: mujoco.MjModel) -> Array:
 
 def gravity(m: mujoco.MjModel) -> Array:
     """Gravity (3,) [m/s²], zero where the model's file turns it off."""
-    return np.array(m.opt.gravity) * (not m.opt.disableflags & int(_DISABLE.mjDSBL_GRAVITY))
+    off = int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+    return np.array(m.opt.gravity) * (not m.opt.disableflags & off)
 
 
 def facts(m: mujoco.MjModel) -> dict[str, Any]:
@@ -260,18 +216,12 @@ def facts(m: mujoco.MjModel) -> dict[str, Any]:
     A backend adds `backend`, `engine_version`, `path`, `raw`, `capabilities`, `timestep` and
     `substeps`.
     """
-    # An actuator may take several numbers of ctrl: whose each of them is, and which of its own.
-    owner = np.repeat(np.arange(m.nactuator), m.actuator_ctrlnum)
+    owner, servo = servos(m)
     on_joint = (m.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT))[owner]
     gain, bias = m.actuator_gainprm[owner, 0], m.actuator_biasprm[owner]
     fixed = (m.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_FIXED))[owner]
     unbiased = (m.actuator_biastype == int(mujoco.mjtBias.mjBIAS_NONE))[owner]
-    affine = (m.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE))[owner]
-    dynamics = m.actuator_dyntype[owner]
-    filtered = (int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT))
-    direct = dynamics == int(mujoco.mjtDyn.mjDYN_NONE)
-    servo = fixed & affine & (bias[:, 1] == -gain) & (gain != 0)
-    servo &= direct | np.isin(dynamics, filtered)  # an integrator's ctrl is a velocity
+    direct = (m.actuator_dyntype == int(mujoco.mjtDyn.mjDYN_NONE))[owner]
     return {
         "gravity": gravity(m),
         "nq": m.nq,
@@ -303,6 +253,8 @@ def facts(m: mujoco.MjModel) -> dict[str, Any]:
         "dof_armature": m.dof_armature,
         "dof_damping": m.dof_damping,
         "dof_frictionloss": m.dof_frictionloss,
+        "body_mass": m.body_mass,
+        "geom_friction": m.geom_friction,
         "body_parentid": m.body_parentid.astype(np.int64),
         "jnt_bodyid": m.jnt_bodyid.astype(np.int64),
         "geom_bodyid": m.geom_bodyid.astype(np.int64),

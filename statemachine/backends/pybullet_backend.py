@@ -64,7 +64,8 @@ _EMULATED = {
 _NATIVE = {
     "contacts": "the engine's own, which are hard: solref, solimp and the friction cone have no "
     "counterpart. It multiplies the frictions of two links: they are chosen so that the products "
-    "are the model's, and load warns where that cannot be. Edges of a mesh are rounded by 1 mm",
+    "are the model's; load and replace(friction=…) warn where that cannot be. Edges of a mesh are "
+    "rounded by 1 mm",
 }
 _RESTORE = (
     "two restores of one State have the same future, bit by bit, but not that of the run it was "
@@ -158,10 +159,15 @@ def load(
     check(plan, "pybullet")
     model = PybulletModel(plan, Path(path), substeps, defaults, checked.get("max_qvel"))
     World(plan, model._shared.kind).close()  # what PyBullet cannot read shows now
-    differences = [*ignored(plan), *plan.surfaces.differences]
-    if differences and defaults == "model":
-        warnings.warn(f"PyBullet: {'; '.join(differences)}", EngineWarning, stacklevel=3)
+    if defaults == "model":
+        _tell([*ignored(plan), *plan.surfaces.differences], stacklevel=4)
     return model
+
+
+def _tell(differences: list[str], stacklevel: int) -> None:
+    """Warn of what is not as the model has it."""
+    if differences:
+        warnings.warn(f"PyBullet: {'; '.join(differences)}", EngineWarning, stacklevel=stacklevel)
 
 
 class PybulletModel(HiddenModel):
@@ -232,7 +238,10 @@ class PybulletModel(HiddenModel):
         raw = edited(self.plan.raw, options)
         substeps = options.get("substeps", self.substeps)
         raw.opt.timestep = step_length(self.timestep, substeps, options)
-        return self._of(raw, substeps, options.get("max_qvel", self._asked))
+        model = self._of(raw, substeps, options.get("max_qvel", self._asked))
+        if "friction" in options:
+            _tell(model.plan.surfaces.differences, stacklevel=4)
+        return model
 
     def _of(self, raw: mujoco.MjModel, substeps: int, asked: Array | None) -> PybulletModel:
         plan = Plan(raw)

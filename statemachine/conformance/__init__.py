@@ -19,14 +19,14 @@ from typing import Literal
 
 from ..backends import backend_engine
 from ..errors import MissingEngineError, UnsupportedError
-from . import derived, inputs, physics, states
+from . import derived, inputs, options, physics, states
 from ._lab import Lab
 
 Check = Callable[[Lab], None]
 
 CHECKS: dict[str, Check] = {
     name.removeprefix("check_"): function
-    for part in (inputs, derived, states, physics)
+    for part in (inputs, derived, states, physics, options)
     for name, function in vars(part).items()
     if name.startswith("check_")
 }

@@ -273,6 +273,15 @@ def check_bad_options_are_refused(lab: Lab) -> None:
         {"damping": -1.0},
         {"damping": [1.0, 2.0]},
         {"armature": np.nan},
+        {"mass": 1.0},
+        {"mass": 0 * model.body_mass},
+        {"mass": model.body_mass + 1},
+        {"friction": -0.1},
+        {"friction": [1.0, 2.0]},
+        {"kp": 0},
+        {"kp": np.full(model.nu, np.nan)},
+        {"kv": -1},
+        {"kv": [1.0, 2.0]},
         {"integrator": "magic"},
     ):
         require_raises(StateMachineError, lambda o=options: model.replace(**o))

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import BadInputError, ReadOnlyError, shown, unknown_name
-from .records import Array
+from ..errors import BadInputError, ForeignStateError, ReadOnlyError, shown, unknown_name
+from .records import Array, State
 
 # MuJoCo calls a coordinate beyond this "huge" and the simulation unstable (mjMAXVAL).
 HUGE = 1e10
@@ -101,13 +101,43 @@ def check_finite(array: Array, name: str) -> None:
         raise BadInputError(f"{name}[{index}] = {array[index]} is not a finite number")
 
 
-def check_writable(array: Array, name: str) -> None:
+def check_writable(array: Array, name: str, owner: str = "data") -> None:
     """Raise ReadOnlyError if the caller took the flag of an input away with `setflags`."""
     if not array.flags.writeable:
         raise ReadOnlyError(
             f"{name} was made read-only, so that the engine has nowhere to write to: "
-            f"call data.{name}.setflags(write=True)"
+            f"call {owner}.{name}.setflags(write=True)"
         )
+
+
+def check_state(
+    state: Any, model: Any, fingerprint: str, layout: tuple[tuple[str, int], ...]
+) -> None:
+    """Raise unless `state` is a State that a Data of `model` can take.
+
+    Args:
+        state: Whatever the caller gave.
+        model: The Model of the Data, for the messages and the name of its backend.
+        fingerprint: Of the States of the Data.
+        layout: Of the States of the Data.
+
+    Raises:
+        TypeError: It is no State.
+        ForeignStateError: It has another layout.
+        BadInputError: It holds a number that is not finite.
+    """
+    if not isinstance(state, State):
+        raise TypeError(f"set_state wants a State, from get_state; got {kind_of(state)}")
+    if state.backend != model.backend:
+        raise ForeignStateError(
+            f"this State was made by backend {state.backend!r}, the Data is {model.backend!r}"
+        )
+    size = 8 * sum(length for _, length in layout)
+    if (state.fingerprint, state.layout, len(state.blob)) != (fingerprint, layout, size):
+        raise ForeignStateError(
+            f"this State has another layout than {model!r}: it was made by another model"
+        )
+    check_finite(state.vector, "state")
 
 
 def index_of(kind: str, name: str, names: Sequence[str]) -> int:

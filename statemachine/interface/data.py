@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TypeVar
 
 from numpy.typing import ArrayLike
 
@@ -303,8 +303,20 @@ class Data(ABC):
     def _close(self) -> None: ...
 
 
+class Guarded(Protocol):
+    """What one thread at a time may use: a Data, or Worlds."""
+
+    _home: Model
+    _turn: Turn
+    _trouble: str
+
+    def _refuse_if_troubled(self) -> None: ...
+
+    def _failed(self, error: Exception) -> None: ...
+
+
 def alone(
-    data: Data,
+    data: Guarded,
     call: Callable[..., T],
     *args: Any,
     even_troubled: bool = False,

@@ -45,6 +45,8 @@ class Model(ABC):
         actuator_gear: (nu,) what that force is multiplied by on the joint, and the joint's
             position where a servo compares it with ctrl.
         dof_armature, dof_damping, dof_frictionloss: (nv,) of each degree of freedom.
+        body_mass: (nbody,) [kg], zero of a body without mass, as the world is.
+        geom_friction: (ngeom, 3) sliding, torsional [m] and rolling [m] friction of each geom.
         body_parentid: (nbody,) the body that carries each body; the world carries itself.
         jnt_bodyid, geom_bodyid, site_bodyid: The body of each joint, geom and site.
         site_pos, site_quat: (nsite, 3) [m] and (nsite, 4) wxyz, in that body's frame.
@@ -86,6 +88,8 @@ class Model(ABC):
     dof_armature: Array
     dof_damping: Array
     dof_frictionloss: Array
+    body_mass: Array
+    geom_friction: Array
     body_parentid: Ints
     jnt_bodyid: Ints
     geom_bodyid: Ints
@@ -173,6 +177,13 @@ class Model(ABC):
                 timestep: > 0 [s]; substeps: engine steps within it, at least 1;
                 armature, damping, frictionloss: ≥ 0, (nv,) or one number for every
                 hinge and slide joint;
+                mass: > 0 [kg], (nbody,), 0 of a body that has none; the inertia of a body
+                is scaled by as much;
+                friction: ≥ 0, (ngeom,) or one number for every geom: the sliding friction,
+                `geom_friction[:, 0]`. A pair takes the larger, as in MuJoCo. Explicit pairs
+                have their own, which stays;
+                kp > 0, kv ≥ 0: gains of the position servos, (nu,) with NaN where there is
+                none, or one number for every servo;
                 integrator: a name of `capabilities.integrators`;
                 max_qvel: > 0 [rad/s or m/s], (nv,) or one number: beyond it a step raises
                 DivergedError. By default it is computed for each Model.
@@ -245,7 +256,7 @@ class Model(ABC):
     def _make_worlds(
         self, n: int, workers: int, derived: tuple[str, ...], options: dict[str, Any]
     ) -> Any:
-        """N worlds in the engine's own way, or None where it has none.
+        """`Worlds` of the engine's own way, or None where it has none.
 
         Args:
             n: Number of worlds.
@@ -257,7 +268,7 @@ class Model(ABC):
 
     @abstractmethod
     def _replace(self, options: dict[str, Any]) -> Model:
-        """Another Model; `options` are checked: bools, floats, (3,) and (nv,) arrays."""
+        """Another Model; `options` are checked: bools, floats and arrays of whole length."""
 
 
 def _quaternions(types: Ints, addresses: Ints) -> list[tuple[int, int]]:

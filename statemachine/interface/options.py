@@ -21,6 +21,10 @@ OPTIONS = (
     "substeps",
     "contacts",
     *PER_DOF,
+    "mass",
+    "friction",
+    "kp",
+    "kv",
     "limits",
     "integrator",
     "max_qvel",
@@ -32,12 +36,19 @@ class Optioned(Protocol):
 
     backend: str
     capabilities: Capabilities
+    nu: int
     nv: int
+    nbody: int
+    ngeom: int
+    body_names: tuple[str, ...]
+    actuator_names: tuple[str, ...]
     jnt_type: Ints
     jnt_dofadr: Ints
     dof_armature: Array
     dof_damping: Array
     dof_frictionloss: Array
+    body_mass: Array
+    actuator_kp: Array
 
 
 def checked_options(of: Optioned, options: Mapping[str, Any]) -> dict[str, Any]:
@@ -56,10 +67,8 @@ def checked_options(of: Optioned, options: Mapping[str, Any]) -> dict[str, Any]:
             ) from None
         if name not in of.capabilities.options:
             raise unsupported(of, name)
-        if name in PER_DOF:
-            checked[name] = _per_dof(of, name, value)
-        elif name == "max_qvel":
-            checked[name] = _fastest(of, value)
+        if name in _OF_MODELS:
+            checked[name] = _OF_MODELS[name](of, name, value)
         else:
             checked[name] = as_option(name, value, of.capabilities.integrators)
     return checked
@@ -79,9 +88,7 @@ def unsupported(of: Optioned, feature: str) -> UnsupportedError:
 
 def _per_dof(of: Optioned, name: str, value: Any) -> Array:
     """The value of an option of `PER_DOF`, one number or (nv,), as a new array (nv,)."""
-    given = _numbers(of, name, value)
-    if (given < 0).any():
-        raise BadInputError(f"{name} must not be negative; got {shown(value)}")
+    given = _not_negative(name, value, of.nv)
     if given.ndim:
         return given
     # One number is meant for the joints of the robot, not for a free body.
@@ -91,25 +98,91 @@ def _per_dof(of: Optioned, name: str, value: Any) -> Array:
     return values
 
 
-def _fastest(of: Optioned, value: Any) -> Array:
+def _mass(of: Optioned, name: str, value: Any) -> Array:
+    """The mass of each body, (nbody,), as a new array."""
+    given = as_vector(value, (of.nbody,), name)
+    wrong = (given > 0) != (of.body_mass > 0)
+    for body in np.flatnonzero(wrong | (given < 0))[:1].tolist():
+        wanted = (
+            "must be above 0" if of.body_mass[body] > 0 else "must be 0: the body has no inertia"
+        )
+        label = of.body_names[body]
+        raise BadInputError(
+            f"mass[{body}]{f' ({label})' if label else ''} = {given[body]:g} {wanted}",
+            quantity=name,
+            index=body,
+        )
+    return given
+
+
+def _friction(of: Optioned, name: str, value: Any) -> Array:
+    """The sliding friction of each geom, one number or (ngeom,), as a new array (ngeom,)."""
+    return np.array(np.broadcast_to(_not_negative(name, value, of.ngeom), (of.ngeom,)))
+
+
+def _gain(of: Optioned, name: str, value: Any) -> Array:
+    """A gain, one number or (nu,), as a new array (nu,) with NaN where there is no servo."""
+    servo = ~np.isnan(of.actuator_kp)
+    numbers = as_numbers(value, name)
+    given = np.array(np.broadcast_to(numbers, (of.nu,) if numbers.ndim == 0 else numbers.shape))
+    given = given.astype(np.float64)
+    if not servo.any():
+        raise BadInputError(f"{name} is of position servos, and the model has none")
+    if given.shape != (of.nu,):
+        as_vector(given, (of.nu,), name)  # says which shape it wants
+    if not numbers.ndim:
+        given[~servo] = np.nan
+    for k in np.flatnonzero(~servo & ~np.isnan(given))[:1].tolist():
+        raise BadInputError(
+            f"{name}[{k}] is given for {of.actuator_names[k] or f'actuator {k}'}, which is no "
+            f"position servo: it wants NaN there, as actuator_{name} has"
+        )
+    as_vector(given[servo], (int(servo.sum()),), name)  # finite
+    wrong = given[servo] <= 0 if name == "kp" else given[servo] < 0
+    if wrong.any():
+        wanted = {"kp": "be above 0; actuation=False turns servos off", "kv": "not be negative"}
+        raise BadInputError(f"{name} must {wanted[name]}; got {shown(value)}")
+    return given
+
+
+def _fastest(of: Optioned, name: str, value: Any) -> Array:
     """The value of max_qvel, one number or (nv,), as a new array (nv,)."""
-    given = _numbers(of, "max_qvel", value)
+    given = _numbers(name, value, of.nv)
     if (given <= 0).any():
         raise BadInputError(f"max_qvel must be above 0; got {shown(value)}")
     return np.array(np.broadcast_to(given, (of.nv,)))
 
 
-def _numbers(of: Optioned, name: str, value: Any) -> Array:
-    """One number, or one for each degree of freedom (nv,)."""
+def _not_negative(name: str, value: Any, length: int) -> Array:
+    """One number, or (length,), that are at least 0."""
+    given = _numbers(name, value, length)
+    if (given < 0).any():
+        raise BadInputError(f"{name} must not be negative; got {shown(value)}")
+    return given
+
+
+def _numbers(name: str, value: Any, length: int) -> Array:
+    """One number, or (length,)."""
     numbers = as_numbers(value, name)
-    return as_vector(numbers, (of.nv,) if numbers.ndim else (), name)
+    return as_vector(numbers, (length,) if numbers.ndim else (), name)
+
+
+# What depends on the model: its options, and how a value is checked.
+_OF_MODELS = {
+    **dict.fromkeys(PER_DOF, _per_dof),
+    "mass": _mass,
+    "friction": _friction,
+    "kp": _gain,
+    "kv": _gain,
+    "max_qvel": _fastest,
+}
 
 
 def as_option(name: str, value: Any, integrators: Sequence[str]) -> Any:
     """The value of an option that does not depend on the model, as a backend takes it.
 
     Args:
-        name: Of `OPTIONS`, but for `PER_DOF` and max_qvel.
+        name: Of `OPTIONS`, but for those that are arrays of the model's.
         value: Whatever the caller gave.
         integrators: Those that the backend knows.
 

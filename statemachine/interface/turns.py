@@ -1,8 +1,8 @@
 """Whose turn it is with a Data: who uses one takes it, and gives it back.
 
-Each Data has a `Turn`. To delete what is in it is to take the Data, which only one thread
-can do; a second one finds nothing. So a step learns from one attribute that the Data belongs
-to the Model, that it is usable, and that nobody else uses it.
+Each Data has a `Turn`, and so have Worlds. To delete what is in it is to take the Data, which
+only one thread can do; a second one finds nothing. So a step learns from one attribute that the
+Data belongs to the Model, that it is usable, and that nobody else uses it.
 
 In the child of a fork there is no other thread. What one was doing with a Data is left half
 done there: such a Data is free, and to be reset or set to a State.
@@ -17,6 +17,7 @@ from types import CodeType
 from typing import Any
 
 from ..errors import BusyDataError
+from .checks import kind_of
 
 
 class Turn:
@@ -51,8 +52,9 @@ def in_use_here(data: object) -> bool:
         while frame is not None:
             if frame.f_code in HOLDERS and frame.f_locals.get("data") is data:
                 if thread != here:
+                    kind = kind_of(data).removeprefix("a ")
                     raise BusyDataError(
-                        "another thread is using this Data: a Data belongs to one thread at a "
+                        f"another thread is using this {kind}: a {kind} belongs to one thread at a "
                         "time. Make one for each thread (a Model can be shared), or take a lock "
                         "around every use"
                     )

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from ..errors import BadInputError, ForeignDataError, ForeignStateError
-from .checks import as_count, check_entries, check_finite, kind_of
+from ..errors import BadInputError, ForeignDataError
+from .checks import as_count, check_entries, check_state, kind_of
 from .data import Data, alone
 from .model import Model
 from .records import INPUTS, State
@@ -168,19 +168,7 @@ def set_state(model: Model, data: Data, state: State) -> None:
         ClosedDataError: `data` is closed.
     """
     _admit(model, data, even_troubled=True)
-    if not isinstance(state, State):
-        raise TypeError(f"set_state wants a State, from get_state; got {kind_of(state)}")
-    fingerprint, layout = data._state_layout()
-    if state.backend != model.backend:
-        raise ForeignStateError(
-            f"this State was made by backend {state.backend!r}, the Data is {model.backend!r}"
-        )
-    size = 8 * sum(length for _, length in layout)
-    if (state.fingerprint, state.layout, len(state.blob)) != (fingerprint, layout, size):
-        raise ForeignStateError(
-            f"this State has another layout than {model!r}: it was made by another model"
-        )
-    check_finite(state.vector, "state")
+    check_state(state, model, *data._state_layout())
     alone(data, _overwrite, data, "set_state", data._set_state, state, even_troubled=True)
 
 

@@ -2,26 +2,42 @@
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NoReturn
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NoReturn
 
+import numpy as np
+
+from ..errors import BadInputError, ClosedDataError, ReadOnlyError, StateMachineError
+from .checks import HUGE, TINY, as_numbers, as_vector, check_entries, check_writable
+from .data import alone
 from .model import Model
-from .records import FORCES, POSES, Array, Ints, State
+from .records import FORCES, INPUTS, POSES, Array, Ints, State, read_only
+from .turns import Turn
+
+if TYPE_CHECKING:
+    from .data import _Input
 
 BATCHED = (*POSES, "qacc", *FORCES)  # the derived arrays that worlds can keep
+WRITABLE = (*INPUTS, "time")
 
 
 class Worlds(ABC):
     """n worlds: each what one Data of its Model would be, bit for bit.
 
-    The inputs are writable in place and the same arrays for the whole life; `worlds.ctrl = x`
-    copies in, and one row is given to all worlds. The derived arrays are those that
-    `make_worlds` was asked for. They are read-only, zero in a fresh or reset world, and belong
-    to the state before the last engine step or to that of the last `forward`, as in a Data.
+    The inputs and the time are writable in place and the same arrays for the whole life;
+    `worlds.ctrl = x` copies in, and one row is given to all worlds. The derived arrays are
+    those that `make_worlds` was asked for. They are read-only, zero in a fresh or reset world,
+    and belong to the state before the last engine step or to that of the last `forward`, as
+    in a Data.
 
-    A world that diverges is told of by a DivergedWarning, listed in `diverged` and left out of
-    every call until `reset` or `set_state`; the others go on.
+    What would raise in one Data while it steps (it diverges, a number of its input is none)
+    ends this world only: it is told of by a DivergedWarning, listed in `diverged` and left out
+    of every call until `reset` or `set_state`. The others go on.
+
+    Worlds belong to one thread at a time, as a Data does, and to the process that made them.
 
     Attributes:
         model: The Model.
@@ -31,19 +47,23 @@ class Worlds(ABC):
         time: (n,) simulated time of each world [s].
         xpos: (n, nbody, 3), and so on for each name of `derived`.
         derived: Names of the derived arrays that are kept, of `BATCHED`.
-        diverged: The error of each world that is left out, by its number.
     """
 
     model: Model
     n: int
     workers: int
     derived: tuple[str, ...]
-    diverged: Mapping[int, Exception]
+    _errors: dict[int, Exception]
+    _numbers: Ints
+    _process: int
+    _home: Model
+    _turn: Turn
+    _trouble: str
     if TYPE_CHECKING:
-        qpos: Array
-        qvel: Array
-        ctrl: Array
-        time: Array
+        qpos = _Input()
+        qvel = _Input()
+        ctrl = _Input()
+        time = _Input()
         xpos: Array
         xquat: Array
         site_xpos: Array
@@ -54,43 +74,112 @@ class Worlds(ABC):
         qfrc_passive: Array
         qfrc_constraint: Array
 
+    def __init__(
+        self,
+        model: Model,
+        n: int,
+        workers: int,
+        derived: tuple[str, ...],
+        arrays: Mapping[str, Array],
+    ) -> None:
+        """Take the arrays; a backend's own `__init__` calls this last.
+
+        Args:
+            model: The Model.
+            n: Number of worlds.
+            workers: Threads or processes that there are.
+            derived: Names of the derived arrays.
+            arrays: (n, ...) of each input, of time and of each name of `derived`: the same
+                memory for the whole life.
+        """
+        kept = {name: arrays[name].view() for name in (*WRITABLE, *derived)}
+        for name in derived:
+            kept[name].setflags(write=False)
+        vars(self).update(
+            model=model,
+            n=n,
+            workers=workers,
+            derived=derived,
+            **kept,
+            _errors={},
+            _numbers=np.arange(n),
+            _process=os.getpid(),
+            # What `alone` asks of what it guards, as of a Data.
+            _home=model,
+            _turn=Turn(model),
+            _trouble="",
+        )
+
+    @property
+    def diverged(self) -> Mapping[int, Exception]:
+        """The error of each world that is left out, by its number."""
+        return MappingProxyType(self._errors)
+
     @abstractmethod
     def model_of(self, world: int) -> Model:
         """The Model of one world: `model`, with the options that were given for this world."""
 
-    @abstractmethod
     def close(self) -> None:
         """Give back threads, processes and memory. Idempotent.
 
         The last qpos, qvel, ctrl and time stay readable; every other use is an error.
         """
+        if self._trouble != "closed":
+            alone(self, self._shut, even_troubled=True)
 
-    # Hooks of the functions in statemachine.worlds, which check their arguments. `ids` are
-    # world numbers, each once and in order; where time passes, none of them has diverged.
+    def _shut(self) -> None:
+        # Copies: a view would keep the memory of the engine alive, or outlive it.
+        own = vars(self)
+        own["_trouble"] = "closed"
+        for name in self.derived:
+            del own[name]
+        for name in WRITABLE:
+            view = own[name]
+            own[name] = read_only(view)
+            view.setflags(write=False)  # where the caller kept it
+        if self._process == os.getpid():
+            self._close()
+
+    # Hooks of the functions in statemachine.worlds, which check their arguments and keep
+    # `diverged`. `ids` are world numbers, each once and in order; where time passes, none of
+    # them has diverged. One thread calls at a time. Whoever implements them writes into the
+    # arrays given to `__init__`.
+
+    @abstractmethod
+    def _close(self) -> None:
+        """Give back threads, processes and memory; the arrays are copied already."""
 
     @abstractmethod
     def _step(self, ids: Ints, nstep: int) -> Mapping[int, Exception]:
-        """Advance these worlds; the error of each that diverged."""
+        """Advance these worlds; by its number the error of each where one Data would raise."""
 
     @abstractmethod
     def _forward(self, ids: Ints) -> Mapping[int, Exception]:
-        """Recompute what is derived; the error of each that cannot be."""
+        """Recompute what is derived, of checked inputs; the error of each that cannot be."""
 
     @abstractmethod
     def _reset(self, ids: Ints, key: int | None) -> None:
-        """Put these worlds to the default state or a keyframe."""
+        """Put these worlds to the default state or a keyframe; what is derived becomes zero."""
 
     @abstractmethod
-    def _get_state(self, world: int) -> State: ...
+    def _get_state(self, world: int) -> State:
+        """The State of one world, of checked inputs."""
 
     @abstractmethod
-    def _set_state(self, world: int, state: State) -> None: ...
+    def _set_state(self, world: int, state: State) -> None:
+        """Take a State of the right layout; BadInputError only before anything changes."""
+
+    @abstractmethod
+    def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
+        """Fingerprint and layout of the States, as one Data of the Model has them."""
 
     @abstractmethod
     def _record(
         self, ids: Ints, nstep: int, every: int, arrays: Mapping[str, Array], ctrl: Array | None
     ) -> Mapping[int, Exception]:
         """Advance by `nstep`, and after each `every` steps write into arrays[name][world, k].
+
+        The rows of a world that ends are left as they are from there on.
 
         Args:
             ids: The worlds.
@@ -99,6 +188,70 @@ class Worlds(ABC):
             arrays: (n, nstep // every, ...) of each name, of the inputs, time and `derived`.
             ctrl: (n, nstep // every, nu), the command from each record to the next, or None.
         """
+
+    def _failed(self, error: Exception) -> None:  # noqa: B027  (optional hook)
+        """Raise what `error`, out of a hook, means for all worlds, if it means more."""
+
+    def _refuse_if_troubled(self) -> None:
+        if self._trouble:
+            raise ClosedDataError("these Worlds are closed: make others with make_worlds")
+
+    def _check_inputs(self, ids: Ints) -> None:
+        """Raise BadInputError for the first entry of these worlds that is no finite number."""
+        for name in INPUTS:
+            rows = getattr(self, name)[ids]
+            if not np.abs(rows).max(initial=0.0) <= HUGE:  # NaN fails it, too
+                row = int(np.flatnonzero(~(np.abs(rows) <= HUGE).all(axis=1))[0])
+                try:
+                    check_entries(rows[row], name, self.model._coordinate_name)
+                except BadInputError as error:
+                    raise in_world(int(ids[row]), error) from None
+        for error in self._zero_quaternions(self.qpos[ids], ids).values():
+            raise error
+
+    def _zero_quaternions(self, qpos: Array, ids: Ints) -> dict[int, BadInputError]:
+        """The error of each world whose row of `qpos` (len(ids), nq) has a zero quaternion."""
+        errors: dict[int, BadInputError] = {}
+        for joint, start in self.model._quaternions:
+            quats = qpos[:, start : start + 4]
+            # One whose first number is not zero is none, which is the cheapest look.
+            for row in np.flatnonzero(np.abs(quats[:, 0]) < TINY).tolist():
+                if quats[row].dot(quats[row]) < TINY * TINY:
+                    error = self.model._zero_quaternion(joint, start)
+                    errors.setdefault(int(ids[row]), in_world(int(ids[row]), error))
+        return errors
+
+    def _check_writable(self) -> None:
+        for name in WRITABLE:
+            check_writable(getattr(self, name), name, "worlds")
+
+    def __getattr__(self, name: str) -> Any:  # only for what is not there
+        if name in BATCHED and "_trouble" in vars(self):
+            self._refuse_if_troubled()
+            raise AttributeError(
+                f"these Worlds do not keep {name!r}: name it in make_worlds(…, derived=…)"
+            )
+        raise AttributeError(f"Worlds have no attribute {name!r}")
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in WRITABLE:
+            self._refuse_if_troubled()
+            self._check_writable()
+            target = getattr(self, name)
+            numbers = as_numbers(value, name)
+            shape = target.shape if numbers.ndim == target.ndim else target.shape[1:]
+            checked = as_vector(numbers, shape, name)
+            if name == "qpos":
+                rows = np.broadcast_to(checked, target.shape)
+                for error in self._zero_quaternions(rows, self._numbers).values():
+                    raise error
+            target[:] = checked
+        elif name.startswith("_"):
+            vars(self)[name] = value
+        else:
+            raise ReadOnlyError(
+                f"{name!r} of Worlds cannot be assigned to; write qpos, qvel, ctrl or time"
+            )
 
     def __enter__(self) -> Worlds:
         return self
@@ -109,5 +262,14 @@ class Worlds(ABC):
     def __len__(self) -> int:
         return self.n
 
+    def __repr__(self) -> str:
+        about = self._trouble or (f"{len(self._errors)} diverged" if self._errors else "")
+        return f"<Worlds: {self.n} of {self.model!r}{about and f': {about}'}>"
+
     def __reduce__(self) -> NoReturn:
         raise TypeError("Worlds are live simulations: pickle the State of each, by get_state")
+
+
+def in_world(world: int, error: StateMachineError) -> Any:
+    """The same error, saying which of many worlds it is of."""
+    return type(error)(f"world {world}: {error}", **{**vars(error), "world": world})

@@ -46,7 +46,9 @@ def energies(
             if (yardstick.nq, yardstick.nv) != (qpos.shape[1], qvel.shape[1]):
                 return unknown
             if defaults == "model":
-                yardstick = yardstick.replace(gravity=model.gravity, armature=model.dof_armature)
+                yardstick = yardstick.replace(
+                    gravity=model.gravity, armature=model.dof_armature, mass=model.body_mass
+                )
             elif gravity is not None:
                 yardstick = yardstick.replace(gravity=gravity)
         room: EnergyPart = needed_part(DEFAULT, "energy")

@@ -2,12 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from ..interface import Array, Model, State
-from ..interface.worlds import BATCHED, Worlds
+from ..errors import (
+    BadInputError,
+    BusyDataError,
+    DivergedError,
+    DivergedWarning,
+    shown,
+    unknown_name,
+)
+from ..interface import Array, Ints, Model, State
+from ..interface.checks import as_count, as_vector, check_state, kind_of, whole_number
+from ..interface.data import alone
+from ..interface.options import checked_options
+from ..interface.worlds import BATCHED, WRITABLE, Worlds, in_world
+
+_SHOWN = 5  # diverged worlds that a warning names
 
 
 def make_worlds(
@@ -16,7 +33,7 @@ def make_worlds(
     *,
     workers: int | None = None,
     derived: Sequence[str] = BATCHED,
-    **options: ArrayLike,
+    **options: Any,
 ) -> Worlds:
     """Make n worlds of one Model, each as `make_data` would: its zero or default pose.
 
@@ -26,8 +43,8 @@ def make_worlds(
         workers: Threads or processes; by default one for each processor. No result depends
             on it.
         derived: The derived arrays that are kept after each call. Fewer take less memory.
-        **options: Of `Model.replace`, each an array with a first axis of length n: world i is
-            a Data of `model.replace(name=value[i], ...)`.
+        **options: Of `Model.replace`, each a sequence of n values: world i is a Data of
+            `model.replace(name=values[i], ...)`.
 
     Raises:
         TypeError: `model` is not a Model.
@@ -35,40 +52,130 @@ def make_worlds(
         UnknownNameError: `derived` has a name that is not of `BATCHED`.
         UnsupportedError: The backend has no such option.
     """
-    raise NotImplementedError
+    if not isinstance(model, Model):
+        raise TypeError(f"make_worlds wants a Model, from statemachine.load; got {kind_of(model)}")
+    n = as_count(n, "n")
+    workers = min(_processors() if workers is None else as_count(workers, "workers"), n)
+    names = _names(derived, "derived array", BATCHED)
+    each = _options(model, n, options)
+    worlds = model._make_worlds(n, workers, names, each)
+    if worlds is None:
+        from .pool import PoolWorlds
+
+        worlds = PoolWorlds(model, n, workers, names, each)
+    return worlds
 
 
 def step(worlds: Worlds, nstep: int = 1, *, ids: ArrayLike | None = None) -> None:
     """Advance the worlds by `nstep` timesteps, each under its own ctrl.
 
+    A world in which `statemachine.step` would raise is told of by a DivergedWarning and left
+    out from then on; the others go on.
+
     Args:
         worlds: From `make_worlds`.
         nstep: Number of timesteps, at least 1.
-        ids: Numbers of some worlds, or a mask (n,) of bools; all by default.
+        ids: Numbers of some worlds, each once, or a mask (n,) of bools; all by default. Those
+            that have diverged are left out.
+
+    Raises:
+        BadInputError: `nstep` or `ids` is no such value.
+        BusyDataError: Another thread is using `worlds`, or they are another process's.
+        ClosedDataError: `worlds` are closed.
     """
-    raise NotImplementedError
+    _admit(worlds)
+    nstep = as_count(nstep, "nstep")
+    _run(worlds, worlds._step, _chosen(worlds, ids), nstep)
 
 
 def forward(worlds: Worlds, *, ids: ArrayLike | None = None) -> None:
-    """Recompute everything derived; no time passes."""
-    raise NotImplementedError
+    """Recompute everything derived; no time passes.
+
+    Args:
+        worlds: From `make_worlds`.
+        ids: As in `step`.
+
+    Raises:
+        BadInputError: An input is not finite, or `ids` is no such value; nothing is changed.
+        BusyDataError, ClosedDataError: As in `step`.
+    """
+    _admit(worlds)
+    _run(worlds, _forward, worlds, _chosen(worlds, ids))
+
+
+def _forward(worlds: Worlds, ids: Ints) -> Mapping[int, Exception]:
+    worlds._check_inputs(ids)
+    return worlds._forward(ids)
 
 
 def reset(
     worlds: Worlds, *, ids: ArrayLike | None = None, keyframe: int | str | None = None
 ) -> None:
-    """Put worlds back to the default state, or to a keyframe."""
-    raise NotImplementedError
+    """Put worlds back to the default state, or to a keyframe.
+
+    Args:
+        worlds: From `make_worlds`.
+        ids: As in `step`, but those that have diverged are reset, too.
+        keyframe: Its number or name; None for the default state.
+
+    Raises:
+        UnknownNameError: There is no such keyframe; nothing is changed then.
+        BadInputError, BusyDataError, ClosedDataError: As in `step`.
+    """
+    _admit(worlds)
+    key = None if keyframe is None else worlds.model.key_id(keyframe)
+    alone(worlds, _reset, worlds, _numbers(worlds, ids), key)
+
+
+def _reset(worlds: Worlds, ids: Ints, key: int | None) -> None:
+    worlds._check_writable()
+    worlds._reset(ids, key)
+    if worlds._errors:
+        for world in ids.tolist():
+            worlds._errors.pop(world, None)
 
 
 def get_state(worlds: Worlds, world: int) -> State:
-    """The State of one world; a single Data of the same Model takes it, and the other way."""
-    raise NotImplementedError
+    """The State of one world; a single Data of the same Model takes it, and the other way.
+
+    Raises:
+        BadInputError: There is no such world, or an input of it is not finite.
+        DivergedError: It diverged earlier.
+        BusyDataError, ClosedDataError: As in `step`.
+    """
+    _admit(worlds)
+    return alone(worlds, _get_state, worlds, _world(worlds, world))
+
+
+def _get_state(worlds: Worlds, world: int) -> State:
+    if world in worlds._errors:
+        raise DivergedError(
+            f"world {world} is not usable any more ({worlds._errors[world]}): reset it, or "
+            "set_state",
+            world=world,
+        )
+    worlds._check_inputs(worlds._numbers[world : world + 1])
+    return worlds._get_state(world)
 
 
 def set_state(worlds: Worlds, world: int, state: State) -> None:
-    """Overwrite one world with a State; what is derived becomes zero."""
-    raise NotImplementedError
+    """Overwrite one world with a State; what is derived becomes zero.
+
+    Raises:
+        ForeignStateError: The State has another layout; nothing is changed then.
+        BadInputError: There is no such world, or the State holds a number that is not finite.
+        BusyDataError, ClosedDataError: As in `step`.
+    """
+    _admit(worlds)
+    number = _world(worlds, world)
+    check_state(state, worlds.model, *worlds._state_layout())
+    alone(worlds, _set_state, worlds, number, state)
+
+
+def _set_state(worlds: Worlds, world: int, state: State) -> None:
+    worlds._check_writable()
+    worlds._set_state(world, state)
+    worlds._errors.pop(world, None)
 
 
 def record(
@@ -81,7 +188,152 @@ def record(
 ) -> dict[str, Array]:
     """Advance by `nstep` and record: field to (n, nstep // every, ...), after each `every` steps.
 
+    A world that has diverged, or does so meanwhile, has NaN from there on.
+
     Args:
-        ctrl: (n, nstep // every, nu), a command for each stretch; by default ctrl as it is.
+        worlds: From `make_worlds`.
+        nstep: Number of timesteps, a multiple of `every`.
+        fields: Of qpos, qvel, ctrl, time and `worlds.derived`.
+        every: Timesteps from one record to the next.
+        ctrl: (n, nstep // every, nu), a command from each record to the next, or one
+            (nstep // every, nu) for all worlds; by default ctrl as it is.
+
+    Raises:
+        UnknownNameError: There is no such field, or these Worlds do not keep it.
+        BadInputError: `nstep`, `every` or `ctrl` is no such value; nothing is changed then.
+        BusyDataError, ClosedDataError: As in `step`.
     """
-    raise NotImplementedError
+    _admit(worlds)
+    nstep, every = as_count(nstep, "nstep"), as_count(every, "every")
+    if nstep % every:
+        raise BadInputError(f"every must divide nstep; got every={every} and nstep={nstep}")
+    names = _names(fields, "field", (*WRITABLE, *worlds.derived))
+    rows = nstep // every
+    commands = None
+    if ctrl is not None:
+        shape = (worlds.n, rows, worlds.model.nu)
+        commands = as_vector(ctrl, shape[1:] if np.ndim(ctrl) == 2 else shape, "ctrl")
+        commands = np.broadcast_to(commands, shape)
+    arrays = {}
+    for name in names:
+        array = getattr(worlds, name)
+        arrays[name] = np.full((worlds.n, rows, *array.shape[1:]), np.nan)
+    _run(worlds, worlds._record, _chosen(worlds, None), nstep, every, arrays, commands)
+    return arrays
+
+
+def _run(worlds: Worlds, call: Any, *args: Any) -> None:
+    """Call a hook, and tell of the worlds that are left out from now on."""
+    errors = alone(worlds, _kept, worlds, call, args)
+    if errors:
+        warnings.warn(_told(worlds, errors), DivergedWarning, stacklevel=3)
+
+
+def _kept(worlds: Worlds, call: Any, args: tuple[Any, ...]) -> Mapping[int, Exception]:
+    worlds._check_writable()
+    errors = call(*args)
+    if errors:
+        worlds._errors.update(errors)
+    return errors
+
+
+def _told(worlds: Worlds, errors: Mapping[int, Exception]) -> str:
+    """'3 of 1024 worlds diverged and are left out: 17 (qpos[2] (elbow) at 0.34 s), …'."""
+    each = [f"{world} ({_entry(worlds, errors[world])})" for world in sorted(errors)]
+    more = f" and {len(each) - _SHOWN} more" if len(each) > _SHOWN else ""
+    verbs = ("diverged", "is") if len(each) == 1 else ("diverged", "are")
+    return (
+        f"{len(each)} of {worlds.n} worlds {verbs[0]} and {verbs[1]} left out until reset or "
+        f"set_state: {', '.join(each[:_SHOWN])}{more}"
+    )
+
+
+def _entry(worlds: Worlds, error: Exception) -> str:
+    """What one world ended of, shortly: 'qpos[2] (elbow) at 0.34 s'."""
+    quantity, index = getattr(error, "quantity", None), getattr(error, "index", None)
+    if quantity is None or index is None:
+        return shown(str(error)).strip("'\"")
+    time = getattr(error, "time", None)
+    label = worlds.model._coordinate_name(quantity, index)
+    return f"{quantity}[{index}]{label}" + ("" if time is None else f" at {time:g} s")
+
+
+def _admit(worlds: Worlds) -> None:
+    """Raise unless these are usable Worlds of this process."""
+    if not isinstance(worlds, Worlds):
+        raise TypeError(f"the first argument is Worlds, from make_worlds; got {kind_of(worlds)}")
+    worlds._refuse_if_troubled()
+    if worlds._process != os.getpid():
+        raise BusyDataError(
+            "these Worlds belong to another process, which made them: make others here"
+        )
+
+
+def _chosen(worlds: Worlds, ids: ArrayLike | None) -> Ints:
+    """The worlds that are meant and have not diverged."""
+    numbers = _numbers(worlds, ids)
+    if not worlds._errors:
+        return numbers
+    return numbers[~np.isin(numbers, list(worlds._errors))]
+
+
+def _numbers(worlds: Worlds, ids: ArrayLike | None) -> Ints:
+    """The worlds that are meant, each once and in order."""
+    if ids is None:
+        return worlds._numbers
+    wanted = f"ids wants numbers of worlds, each once, or a mask ({worlds.n},) of bools"
+    try:
+        array = np.asarray(ids)
+    except (TypeError, ValueError, OverflowError) as error:  # a ragged list
+        raise BadInputError(f"{wanted}; got {shown(ids)}") from error
+    if array.dtype == bool and array.shape == (worlds.n,):
+        return np.flatnonzero(array)
+    if array.size == 0 and array.shape == (0,):
+        return worlds._numbers[:0]
+    if array.ndim != 1 or array.dtype.kind not in "iu":
+        raise BadInputError(f"{wanted}; got {array.dtype} of shape {array.shape}")
+    for bad in array[(array < 0) | (array >= worlds.n)][:1].tolist():
+        raise BadInputError(f"there is no world {bad}: they are 0 to {worlds.n - 1}")
+    numbers, counts = np.unique(array, return_counts=True)
+    for twice in numbers[counts > 1][:1].tolist():
+        raise BadInputError(f"{wanted}; world {twice} is there {counts.max()} times")
+    return numbers.astype(np.int64)
+
+
+def _world(worlds: Worlds, world: int) -> int:
+    number = whole_number(world)
+    if number is None or not 0 <= number < worlds.n:
+        raise BadInputError(f"there is no world {shown(world)}: they are 0 to {worlds.n - 1}")
+    return number
+
+
+def _names(names: Sequence[str], kind: str, known: tuple[str, ...]) -> tuple[str, ...]:
+    """Names that are known, each once, as given."""
+    listed = (names,) if isinstance(names, str) else tuple(names)
+    for name in listed:
+        if not isinstance(name, str) or name not in known:
+            raise unknown_name(kind, name, known)
+    return tuple(dict.fromkeys(listed))
+
+
+def _options(model: Model, n: int, options: Mapping[str, Any]) -> dict[str, list[Any]]:
+    """Each option of `Model.replace` as a checked value for each world."""
+    checked = {}
+    for name, values in options.items():
+        if isinstance(values, str) or not hasattr(values, "__len__") or len(values) != n:
+            got = f"{len(values)}" if hasattr(values, "__len__") else shown(values)
+            raise BadInputError(f"{name} wants {n} values, one for each world; got {got}")
+        checked[name] = []
+        for world, value in enumerate(values):
+            try:
+                checked[name].append(checked_options(model, {name: value})[name])
+            except BadInputError as error:
+                raise in_world(world, error) from None
+    return checked
+
+
+def _processors() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

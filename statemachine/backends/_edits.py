@@ -1,0 +1,144 @@
+"""What the options of `Model.replace` change in a compiled model: said once.
+
+`edited` writes it into a copy. Worlds of one compiled model get it as arrays, one row a world.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from ..errors import BadInputError
+from ..interface import Array, Ints
+
+_DISABLE = mujoco.mjtDisableBit
+_SWITCHES = {  # option of `replace` -> the flag that turns it off
+    "actuation": _DISABLE.mjDSBL_ACTUATION,
+    "contacts": _DISABLE.mjDSBL_CONTACT,
+    "limits": _DISABLE.mjDSBL_LIMIT,
+}
+_HINDRANCES = {  # option -> flags of a file that would leave it without effect
+    "gravity": (_DISABLE.mjDSBL_GRAVITY,),
+    "damping": (_DISABLE.mjDSBL_DAMPER,),
+    "frictionloss": (_DISABLE.mjDSBL_FRICTIONLOSS, _DISABLE.mjDSBL_CONSTRAINT),
+    "contacts": (_DISABLE.mjDSBL_CONSTRAINT,),
+    "limits": (_DISABLE.mjDSBL_CONSTRAINT,),
+}
+# Options after which constants of the compiled model have to follow (`mj_setConst`).
+CONSTANTS_FOLLOW = frozenset({"armature", "mass"})
+
+
+def changes(raw: mujoco.MjModel, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Which arrays of a compiled model some options change, and to what.
+
+    Args:
+        raw: The compiled model; stays as it is.
+        options: actuation, contacts, limits: bool; gravity: (3,) [m/s²]; armature [kg·m² or
+            kg], damping [N·m·s/rad or N·s/m], frictionloss [N·m or N]: (nv,); mass: (nbody,)
+            [kg]; friction: (ngeom,); kp, kv: (nu,), NaN of what is no position servo. All may
+            have one more axis in front, with a value for each world. Others are ignored.
+
+    Returns:
+        Arrays by their names in MjModel, and as "opt.gravity" in MjOption; with that axis in
+        front where an option has it. Constants that follow from them are not among them.
+    """
+    found: dict[str, Any] = {}
+    flags = np.asarray(raw.opt.disableflags)
+    for name, value in options.items():
+        for flag in _HINDRANCES.get(name, ()):  # else the option would be without effect
+            flags = flags & ~int(flag)
+        if name in _SWITCHES:
+            flag = int(_SWITCHES[name])
+            flags = (flags & ~flag) | np.where(value, 0, flag)
+        elif name == "gravity":
+            found["opt.gravity"] = value
+        elif name in ("armature", "damping", "frictionloss"):
+            found[f"dof_{name}"] = value
+        elif name == "mass":
+            found["body_mass"] = value
+            own = raw.body_mass > 0
+            factor = np.where(own, value / np.where(own, raw.body_mass, 1.0), 1.0)
+            found["body_inertia"] = factor[..., None] * raw.body_inertia
+        elif name == "friction":
+            found["geom_friction"] = friction = _rows(raw.geom_friction, value)
+            friction[..., 0] = value
+        elif name in ("kp", "kv"):
+            owner, servo = servos(raw)
+            bias = found.setdefault("actuator_biasprm", _rows(raw.actuator_biasprm, value))
+            bias[..., owner[servo], 1 if name == "kp" else 2] = -value[..., servo]
+            if name == "kp":
+                found["actuator_gainprm"] = gain = _rows(raw.actuator_gainprm, value)
+                gain[..., owner[servo], 0] = value[..., servo]
+    if flags.ndim or int(flags) != raw.opt.disableflags:
+        found["opt.disableflags"] = flags
+    return found
+
+
+def _rows(array: Array, value: Any) -> Array:
+    """A copy of an array of the compiled model, once for each world that a value speaks of."""
+    return np.array(np.broadcast_to(array, (*value.shape[:-1], *array.shape[-2:])))
+
+
+def servos(m: mujoco.MjModel) -> tuple[Ints, Any]:
+    """Of each number of ctrl (nu,): the actuator that takes it, and whether it is a position servo.
+
+    An actuator may take several numbers of ctrl.
+    """
+    owner = np.repeat(np.arange(m.nactuator), m.actuator_ctrlnum)
+    fixed = m.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_FIXED)
+    affine = m.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
+    gain = m.actuator_gainprm[:, 0]
+    servo = fixed & affine & (m.actuator_biasprm[:, 1] == -gain) & (gain != 0)
+    # An integrator's ctrl is a velocity.
+    direct = (mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT)
+    servo &= np.isin(m.actuator_dyntype, [int(kind) for kind in direct])
+    return owner, servo[owner]
+
+
+def edited(raw: mujoco.MjModel, options: dict[str, Any]) -> mujoco.MjModel:
+    """A copy with options of `Model.replace`, which has checked them.
+
+    Args:
+        raw: Stays as it is.
+        options: Those of `changes`. Others, `timestep`, `substeps` and `integrator` among
+            them, are left to the backend.
+    """
+    written = changes(raw, options)
+    raw = copy.copy(raw)
+    for name, value in written.items():
+        put(raw, name, value)
+    if CONSTANTS_FOLLOW & options.keys():
+        mujoco.mj_setConst(raw, mujoco.MjData(raw))
+    return raw
+
+
+def put(raw: mujoco.MjModel, name: str, value: Any) -> None:
+    """Write one entry of `changes` into a compiled model."""
+    option = name.removeprefix("opt.")
+    if option == name:
+        getattr(raw, name)[:] = value
+    elif np.ndim(value):
+        getattr(raw.opt, option)[:] = value
+    else:
+        setattr(raw.opt, option, value)
+
+
+def step_length(timestep: float, substeps: int, options: Mapping[str, Any]) -> float:
+    """What one engine step takes [s] after `replace`.
+
+    Args:
+        timestep: Of the Model before [s].
+        substeps: Of the Model after.
+        options: What `Model.replace` has checked; its "timestep" comes before the first one.
+
+    Raises:
+        BadInputError: So many substeps leave nothing of a timestep.
+    """
+    whole = options.get("timestep", timestep)
+    if whole / substeps <= 0:
+        raise BadInputError(f"a timestep of {whole} s cannot have {substeps} substeps")
+    return whole / substeps

@@ -1,0 +1,144 @@
+"""Mass, friction and gains of `Model.replace`: values, errors, and what follows from them.
+
+What they do to a motion is checked by `statemachine.conformance.options`, on every backend.
+"""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.errors import BadInputError, EngineWarning, UnsupportedError
+
+from .conftest import need_engine
+
+CART = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body name="cart">
+<joint name="rail" type="slide" axis="1 0 0"/><joint name="other" type="slide" axis="0 1 0"/>
+<geom size=".1" mass="2"/></body></worldbody>
+<actuator>{actuators}</actuator></mujoco>"""
+SERVO = '<position name="servo" joint="rail" kp="100" kv="20"/>'
+MOTOR = '<motor name="motor" joint="other"/>'
+
+
+def cart(tmp_path: Path, actuators: str, backend: str = "mujoco") -> Any:
+    path = tmp_path / "cart.xml"
+    path.write_text(CART.format(actuators=actuators))
+    return sm.load(path, backend=backend)
+
+
+def test_a_replaced_model_is_as_if_compiled_with_that_mass() -> None:
+    """The compiler, told the same masses and inertias, gives the same constants."""
+    model = sm.load("so101/scene_box")
+    scale = np.linspace(0.5, 1.5, model.nbody)
+    replaced = model.replace(mass=scale * model.body_mass).raw
+    spec = mujoco.MjSpec.from_file(str(model.path))
+    for body in spec.bodies:
+        k = model.raw.body(body.name).id
+        if model.body_mass[k]:
+            # What the compiler found of geoms or an inertial element, as an inertial element.
+            body.explicitinertial = True
+            body.ipos, body.iquat = model.raw.body_ipos[k], model.raw.body_iquat[k]
+            body.mass = scale[k] * model.raw.body_mass[k]
+            body.inertia = scale[k] * model.raw.body_inertia[k]
+            body.fullinertia = [np.nan] * 6
+    compiled = spec.compile()
+    names = ("body_mass", "body_inertia", "body_subtreemass", "body_invweight0", "dof_invweight0")
+    for name in (*names, "dof_M0"):
+        np.testing.assert_allclose(getattr(replaced, name), getattr(compiled, name), rtol=1e-9)
+
+
+def test_gains_are_of_servos_alone(tmp_path: Path, backend: str) -> None:
+    model = cart(tmp_path, MOTOR + SERVO, backend)
+    assert np.isnan(model.actuator_kp[0])
+    for gains in ({"kp": 50}, {"kp": 0.5 * model.actuator_kp}):
+        other = model.replace(**gains)
+        assert other.actuator_kp[1] == 50
+        assert other.actuator_kv[1] == 20
+        assert other.actuator_gain[0] == 1
+    assert model.replace(kv=0).actuator_kv[1] == 0
+    with pytest.raises(BadInputError, match=r"kp\[0\] is given for motor, which is no position"):
+        model.replace(kp=[1.0, 2.0])
+    with pytest.raises(BadInputError, match="the model has none"):
+        cart(tmp_path, MOTOR, backend).replace(kv=1)
+    with pytest.raises(BadInputError, match=r"kp\[0\] = nan"):
+        model.replace(kp=model.actuator_kp * np.nan)
+
+
+def test_the_mass_that_is_wrong_is_named(backend: str) -> None:
+    model = sm.load("so101/scene_box", backend=backend)
+    for place, value, said in ((0, 1.0, "(world) = 1 must be 0"), (2, 0.0, "must be above 0")):
+        mass = model.body_mass.copy()
+        mass[place] = value
+        with pytest.raises(BadInputError) as caught:
+            model.replace(mass=mass)
+        assert said in str(caught.value)
+        assert model.body_names[place] in str(caught.value)
+    with pytest.raises(BadInputError, match=r"wants 10 numbers"):
+        model.replace(mass=1.0)
+
+
+def test_options_add_up_and_their_order_does_not_count(backend: str) -> None:
+    model = sm.load("so101/scene_box", backend=backend)
+    options = {"mass": 1.5 * model.body_mass, "kv": 3.0, "friction": 0.5, "kp": 200.0}
+    once = model.replace(**options)
+    step_by_step = model
+    for name in reversed(options):
+        step_by_step = step_by_step.replace(**{name: options[name]})
+    for name in ("body_mass", "actuator_kp", "actuator_kv", "geom_friction"):
+        np.testing.assert_array_equal(getattr(once, name), getattr(step_by_step, name))
+    ends = []
+    for each in (once, step_by_step):
+        with sm.make_data(each) as data:
+            sm.reset(each, data, keyframe=0)
+            sm.step(each, data, 40)
+            ends.append(data.qpos.copy())
+    np.testing.assert_array_equal(ends[0], ends[1])
+    # The friction of turning stays.
+    np.testing.assert_array_equal(once.geom_friction[:, 1:], model.geom_friction[:, 1:])
+
+
+def test_load_takes_them_too(backend: str) -> None:
+    model = sm.load("so101", backend=backend, kp=500)
+    assert (model.actuator_kp == 500).all()
+
+
+def test_pybullet_says_which_frictions_it_cannot_have() -> None:
+    """It multiplies the frictions of two links; MuJoCo takes the larger."""
+    need_engine("pybullet")
+    model = sm.load("so101/scene_box", backend="pybullet")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", EngineWarning)
+        model.replace(friction=0.5)
+        model.replace(kp=500)
+    friction = np.full(model.ngeom, 0.1)
+    friction[model.geom_bodyid == model.body_id("box")] = 0.2
+    friction[model.geom_bodyid == model.body_id("gripper")] = 0.9
+    with pytest.warns(EngineWarning, match=r"friction of .* is .*, not") as caught:
+        model.replace(friction=friction)
+    assert caught[0].filename == __file__
+
+
+def test_pybullet_as_it_comes_has_none_of_them() -> None:
+    need_engine("pybullet")
+    model = sm.load("so101", backend="pybullet", defaults="engine")
+    for name in ("mass", "friction", "kp", "kv"):
+        with pytest.raises(UnsupportedError):
+            model.replace(**{name: 1.0})
+
+
+def test_energies_are_those_of_the_changed_mass() -> None:
+    need_engine("pybullet")
+    from statemachine.traces.energy import energies
+
+    found = []
+    for backend in ("mujoco", "pybullet"):
+        model = sm.load("so101", backend=backend)
+        model = model.replace(mass=2 * model.body_mass)
+        found.append(energies(model, "model", np.zeros((1, 6)), np.full((1, 6), 0.1))[0])
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-12)
