@@ -80,6 +80,14 @@ class DivergedError(StateMachineError, ArithmeticError):
     index: int
 
 
+class TimedOutError(StateMachineError, TimeoutError):
+    """A run took longer than it was given."""
+
+
+class WorkerEndedError(StateMachineError, RuntimeError):
+    """The process that ran something ended before it was done."""
+
+
 class EngineError(StateMachineError, RuntimeError):
     """An engine gave up in the middle of a step; the Data is of no use any more.
 
