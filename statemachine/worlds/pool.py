@@ -13,6 +13,7 @@ import time
 import warnings
 import weakref
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -167,16 +168,20 @@ class PoolWorlds(Worlds):
 
     def _halt(self, processes: list[WorldsProcess]) -> None:
         """Let processes end what they are at; kill those that do not."""
-        self._count += 1
         deadline = time.monotonic() + _PATIENCE
+        ended = False
         try:
+            while not ended:
+                with suppress(KeyboardInterrupt):  # one is on its way already
+                    self._count += 1
+                    for process in processes:
+                        process.send(self._count, Verb.STOP)
+                    for process in processes:
+                        process.stop(self._count, deadline)
+                    ended = True
+        except BaseException:
             for process in processes:
-                process.send(self._count, Verb.STOP)
-            for process in processes:
-                process.stop(self._count, deadline)
-        except BaseException:  # a second Ctrl-C
-            for process in processes:
-                process.give_up("it was interrupted twice")
+                process.give_up("what was asked of it was interrupted twice")
             raise
         finally:
             self._find_lost(processes)
