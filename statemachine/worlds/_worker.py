@@ -270,6 +270,8 @@ class Holder:
     def _derive(self, _argument: int, name: str, places: Sequence[int]) -> None:
         rows = self._arrays[name]
         for place in places:
+            if self._inbox.stopped:
+                return
             rows[self._world(place)] = getattr(self._data[place], name)
 
 

@@ -28,7 +28,7 @@ from ._process import WorldsProcess, end_all, lost_worlds
 from ._protocol import ANSWER_MOST, Verb
 from ._shared import Layout, Shapes, SharedBlock, arrays_in, laid_out
 
-_PATIENCE = 1.0  # seconds in which a process has to end a step that was interrupted
+_PATIENCE = 2.0  # seconds in which a process has to end a step that was interrupted
 _SCRATCH = 1 << 24  # bytes for what belongs to a command, at least
 _WORDS = 1 << 16  # of these, for what is no array of a record
 _SPARE = 0.95  # of the memory that is free, what worlds may take
@@ -163,7 +163,8 @@ class PoolWorlds(Worlds):
                 process.send(number, verb, argument, size, of_ids)
             return [process.receive(number) or {} for process in processes]
         except BaseException:  # Ctrl-C, mostly
-            self._halt(processes)
+            if verb > Verb.FILL:  # who starts is closed
+                self._halt(processes)
             raise
 
     def _halt(self, processes: list[WorldsProcess]) -> None:
