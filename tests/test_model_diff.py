@@ -180,7 +180,7 @@ def test_the_public_pair(pair: Pair, cli: Cli) -> None:
     assert by["tool frame", frame, "axes"]["size"] == pytest.approx(math.pi / 2)
     limit = by["limits", "wrist_roll", "upper"]
     assert (limit["one"], limit["two"]) == (2.841, 2.744)
-    assert limit["effect"] == "A goes 5.56° further"
+    assert limit["effect"] == "the left goes 5.56° further"
     effort = by["effort", "wrist_roll", ""]
     assert (effort["one"], effort["two"], effort["effect"]) == (10, 2.94, "3.4 times")
     assert by["damping", "elbow", ""]["one"] is None
@@ -346,7 +346,8 @@ def test_joints_of_other_names(pair: Pair, tmp_path: Path) -> None:
     )
     by_place = compare(one, two)
     assert by_place.equal, _differ(by_place)
-    assert any("joint '1' of A is taken for 'shoulder' of B" in n for n in by_place.found.notes)
+    taken = "joint '1' of the left is taken for 'shoulder' of the right"
+    assert any(taken in note for note in by_place.found.notes)
     by_name = compare(
         one, two, rename={"1": "shoulder", "2": "elbow", "3": "wrist_roll", "h": "hand"}
     )
@@ -361,7 +362,7 @@ def test_joints_that_may_be_one_are_suggested(pair: Pair) -> None:
     text = one.read_text().replace('"wrist_roll"', '"roll"').replace('"hand"', '"palm"')
     one.write_text(text)
     result = compare(one, two)
-    assert any("--rename roll=wrist_roll takes them for one" in note for note in result.found.notes)
+    assert any("--map roll=wrist_roll takes them for one" in note for note in result.found.notes)
     assert {d.subject for d in _differ(result)} >= {"structure"}
     (found,) = _differ(compare(one, two, rename={"roll": "wrist_roll"}))
     assert (found.subject, found.figure) == ("places", "axis")
@@ -567,8 +568,8 @@ def test_what_an_import_drops() -> None:
     assert result.equal, _differ(result)
     assert {d.subject for d in result.found.differences} == {"speed"}
     notes = " ".join(result.found.notes)
-    assert "B gives its base no mass" in notes
-    assert "only A has the frames camera_mount, baseframe, gripperframe" in notes.replace(
+    assert "the right gives its base no mass" in notes
+    assert "only the left has the frames camera_mount, baseframe, gripperframe" in notes.replace(
         "camera_mount, gripperframe, baseframe", "camera_mount, baseframe, gripperframe"
     )
 
@@ -711,8 +712,8 @@ def test_what_a_difference_does_is_a_closed_form(tmp_path: Path) -> None:
 def test_an_effort_of_a_servo_is_what_it_can_exert(tmp_path: Path) -> None:
     limited = 'kp="50" kv="1" forcerange="-4 4" gear="2"'
     found = {d.figure: d for d in _pendula(tmp_path, gains=limited)}
-    assert (found[""].one, found[""].two) == ("unlimited", 8.0)
     assert found["forcerange"].two == (-4.0, 4.0)
+    assert found["forcerange"].effect == "at most unlimited / 8 N·m"
     assert found["gear"].size == 1.0
 
 

@@ -1,4 +1,4 @@
-"""`statemachine compare --models A B`: two descriptions of a robot, before anything moves."""
+"""`statemachine compare --models LEFT RIGHT`: two files of a robot, before anything moves."""
 
 from __future__ import annotations
 
@@ -19,11 +19,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "model: what an engine makes of it",
     )
     group.add_argument(
-        "--frame", action="append", default=[], metavar="A=B", help="a frame of A that is B's"
+        "--frame",
+        action="append",
+        default=[],
+        metavar="LEFT=RIGHT",
+        help="a frame of the left and what the right calls it",
     )
-    group.add_argument(
-        "--rename", action="append", default=[], metavar="A=B", help="a joint or link that is B's"
-    )
+    group.add_argument("--rename", action="append", dest="map", default=[], help=argparse.SUPPRESS)
     group.add_argument(
         "--digits", type=int, default=None, metavar="N", help="equal means to so many digits (6)"
     )
@@ -49,7 +51,6 @@ def run(options: argparse.Namespace) -> int:
         "film",
         "every",
         "keyframe",
-        "map",
     ):
         if getattr(options, name) not in (None, []):
             raise BadInputError(f"--{name} is of a run, and --models runs nothing")
@@ -77,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
             given[1][0],
             engines=(given[0][1], given[1][1]),
             frames=pairs_of(options.frame, "--frame"),
-            rename=pairs_of(options.rename, "--rename"),
+            rename=pairs_of(options.map, "--map"),
             digits=digits,
             seed=options.seed,
             menagerie=options.menagerie,
@@ -87,7 +88,7 @@ def run(options: argparse.Namespace) -> int:
 
 def refuse_alone(options: argparse.Namespace) -> None:
     """Raise BadInputError for an option of --models without it."""
-    for name in ("frame", "rename", "all"):
+    for name in ("frame", "all"):
         if getattr(options, name):
             raise BadInputError(f"--{name} goes with --models")
     if options.digits is not None:

@@ -66,7 +66,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="LEFT=RIGHT",
-        help="a joint, body, site or actuator of the left and what the right calls it",
+        help="a joint, body, site or actuator of the left and its name on the right; of --models, "
+        "too",
     )
     group.add_argument(
         "--every",

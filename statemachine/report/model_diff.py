@@ -7,8 +7,8 @@ from itertools import groupby
 
 from ..compare.models import AgreedFigures, Compared, DescribedFile, Difference
 from ..compare.models.ledger import SUBJECTS, Value
-from ..comparison.text import after, listed, reading, rounded, sentence, significant
-from ..page import Block, Page, Table, Text, Verdict
+from ..comparison.text import after, capital, listed, reading, rounded, sentence, significant
+from ..page import Block, Items, Page, Table, Text, Verdict
 
 _ROWS = 8  # of a table, unless all are asked for
 _MOMENT = "of a part"  # kg m², which are of another size than those of a joint
@@ -26,7 +26,7 @@ _LAST = {
     "armature": "share",
     "drive": "holds",
     "effort": "ratio",
-    "damping": "slows in, A / B",
+    "damping": "slows in, left / right",
     "dry friction": "share",
     "limits": "so",
     "mass": "share",
@@ -35,10 +35,16 @@ _LAST = {
     "settings": "",
     "structure": "",
 }
+# Figures that say no more than the name of their difference.
+_SAID_BY_ITS_NAME = {
+    *("ctrlrange", "forcerange", "gear", "range", "axis", "origin", "moments", "stiffness"),
+    *("friction", "condim", "priority", "active", "jnt", "geom", "shapes", "joint", "actuator"),
+    *("timestep", "gravity", "integrator", "middle", "frame turned", "place", "zero position"),
+}
 _WHY = {
-    "places": "In the frame of the link that carries the joint. A zero position of x: where A "
-    "reads 0, B reads x.",
-    "tool frame": "In the frame of B's link.",
+    "places": "In the frame of the link that carries the joint. A zero position of x: where the "
+    "left reads 0, the right reads x.",
+    "tool frame": "In the frame of the right's link.",
     "armature": "M_ii is the inertia that the joint's motor feels, at zero, armature included.",
     "drive": "sags: by how much the servo gives way to the weight of what the joint carries, its "
     "axis level. damping ratio: of the joint alone, with M_ii at zero.",
@@ -48,7 +54,8 @@ _WHY = {
     "inertia": "Principal moments of the rigid part, about its centre of mass. M_ii is that of "
     "the joint that carries it, at zero, armature included.",
     "mass": "Of rigid parts: links without a joint between them are weighed together.",
-    "shapes": "In the frame of B's link; sizes are half edges, radius, or radius and half length.",
+    "shapes": "In the frame of the right's link; sizes are half edges, radius, or radius and half "
+    "length.",
 }
 
 
@@ -62,10 +69,11 @@ def page(result: Compared, everything: bool = False) -> Page:
     blocks: list[Block] = [_sides(result), _verdict(result)]
     for subject, group in groupby(result.found.differences, key=lambda each: each.subject):
         blocks += _subject(subject, list(group), everything)
+    blocks += _brought(result)
     blocks += _equal(result)
     notes = [
-        *(f"A: {note}" for note in result.one.notes),
-        *(f"B: {note}" for note in result.two.notes),
+        *(f"left: {note}" for note in result.one.notes),
+        *(f"right: {note}" for note in result.two.notes),
         *result.found.notes,
         *result.skipped,
     ]
@@ -91,7 +99,7 @@ def _sides(result: Compared) -> Text:
 
     weigh = [rounded(mass, "kg", 4) for mass in result.found.mass]
     alike = f"Both weigh {weigh[0]}" if weigh[0] == weigh[1] else f"They weigh {listed(weigh)}"
-    return Text(f"A is {said(result.one)}. B is {said(result.two)}. {alike}.")
+    return Text(f"Left is {said(result.one)}. Right is {said(result.two)}. {alike}.")
 
 
 def _verdict(result: Compared) -> Verdict:
@@ -110,7 +118,7 @@ def _subject(subject: str, found: list[Difference], everything: bool) -> Iterato
         [_row(subject, [each]) for each in found] if everything else list(_together(subject, found))
     )
     shown = rows if everything else rows[:_ROWS]
-    headers: list[str] = ["", "A", "B", "apart", _LAST.get(subject, "")]
+    headers: list[str] = ["", "left", "right", "apart", _LAST.get(subject, "")]
     keep = [k for k in range(5) if k < 3 or any(row[k] for row in shown)]
     title = SUBJECTS[subject]
     if not any(each.matters for each in found):
@@ -133,12 +141,12 @@ def _faster(found: list[Difference]) -> Iterator[Block]:
     """What the absence of armature does, at its worst."""
     worst = max(found, key=lambda each: each.share)
     if 0 < worst.share < 1 and not (worst.one and worst.two):
-        side = "B" if worst.two is None or not worst.two else "A"
+        side = "right" if worst.two is None or not worst.two else "left"
         times = 1 / (1 - worst.share)
         shown = f"{times:,.0f}" if times >= 100 else f"{times:.3g}"
         yield Text(
             "By this alone, and with the other joints held, the same torque accelerates "
-            f"{worst.where} {shown} times as fast in {side}."
+            f"{worst.where} {shown} times as fast on the {side}."
         )
 
 
@@ -157,18 +165,43 @@ def _together(subject: str, found: Sequence[Difference]) -> Iterator[list[str]]:
 
 def _row(subject: str, group: Sequence[Difference]) -> list[str]:
     first, last = group[0], group[-1]
-    where = first.where if len(group) == 1 else f"{first.where} + {len(group) - 1} more:"
     unit = _MOMENT if subject == "inertia" and first.unit == "kg m²" else first.unit
     effect = first.effect
     if len(group) > 1 and last.effect != effect:
         effect = f"{effect} … {last.effect}"
-    label = f"{where} {first.figure}".strip().removesuffix(":")
     shows = first.size is not None and first.one is not None and first.two is not None
     turned = first.size is not None and first.one is None and first.two is None
+    label = _label(first, len(group) - 1)
     # What one of them does not say is no distance.
     apart = _number(first.size or 0.0, unit, _APART) if shows or turned else ""
     values = ["", ""] if turned else [_value(each, unit) for each in (first.one, first.two)]
     return [label, *values, apart, effect]
+
+
+def _label(row: Difference, more: int) -> str:
+    """What a row is called: as its difference is, with the figure that it is of it."""
+    if len(row.causes) != 1:
+        where = f"{row.where} + {more} more:" if more else row.where
+        return f"{where} {row.figure}".strip().removesuffix(":")
+    name, figure = row.causes[0], row.figure
+    name = f"{capital(name)} + {more} more" if more else capital(name)
+    return name if not figure or figure in _SAID_BY_ITS_NAME else f"{name}: {figure}"
+
+
+def _brought(result: Compared) -> Iterator[Block]:
+    """What the right can be brought to the left in, and why not in the rest."""
+    rows = result.found.differences
+    able = dict.fromkeys(name for row in rows for name in row.causes if not row.refused)
+    refused = {row.causes[0]: row.refused for row in rows if row.refused}
+    if able:
+        many = "What differs" if not refused else f"{len(able)} of these differences"
+        yield Text(
+            f"{many} can be brought from the right to the left, one by one: statemachine compare "
+            "hold LEFT RIGHT --why does so, and tells what each explains."
+        )
+    if refused:
+        yield Text("These cannot be brought over:")
+        yield Items([f"{capital(name)}: {why}." for name, why in refused.items()])
 
 
 def _value(value: Value, unit: str) -> str:

@@ -6,7 +6,7 @@
   engine's own is the part `reading` of its room
 - `diff`: every difference with its size, entered into a `ledger`; by subject in `_places`,
   `_joints`, `_solids`, `_shapes`, `_settings`
-- `_compiled`: what only compiled models tell, by the list that `..why` explains a gap with
+- `_one_list`: joins that with the list of compiled models that `..why` explains a gap with
 - `engines`: what engines do of themselves
 """
 
@@ -30,10 +30,10 @@ from ...engines.parts import CompilerPart, ReadingPart
 from ...errors import UnsupportedError
 from ...installed import DEFAULT
 from ...models import resolve
-from ._compiled import further
-from .diff import Found, diff
+from ._one_list import one_list
+from .diff import Found, diff, reach_of
 from .engines import own_ways
-from .ledger import AgreedFigures, Difference
+from .ledger import AgreedFigures, Difference, ordered
 
 __all__ = [
     "AgreedFigures",
@@ -74,7 +74,7 @@ class Compared:
     """What came out; `found` holds the differences.
 
     Attributes:
-        one, two: The sides, A and B.
+        one, two: The sides, left and right.
         found: Differences and agreements.
         digits: Figures that agree to so many counted as equal.
         versions: Of what computed it.
@@ -168,10 +168,17 @@ def compare(
     robots = [read(m, e, menagerie) for m, e in zip((one, two), engines, strict=True)]
     trees = [GroupTree(renamed(robots[0], rename or {})), GroupTree(robots[1])]
     found = diff(trees[0], trees[1], frames, digits, seed, own_ways(*engines))
-    more, skipped = list[Difference](), list[str]()
+    skipped = list[str]()
     if engines == (None, None) and any(robot.format != "URDF" for robot in robots):
-        more, skipped = further([resolve(m, menagerie) for m in (one, two)], rename or {})
-        found = replace(found, differences=(*found.differences, *more))
+        rows, skipped = one_list(
+            found.differences,
+            [resolve(m, menagerie) for m in (one, two)],
+            rename or {},
+            complete=all(robot.format != "URDF" for robot in robots),
+            digits=digits,
+            reach=reach_of(*trees),
+        )
+        found = replace(found, differences=ordered(rows))
     versions = {
         "statemachine": __version__,
         "numpy": np.__version__,

@@ -118,16 +118,16 @@ def _limits(book: Ledger, a: RobotJoint, b: RobotJoint, unit: str) -> None:
                 unit,
                 None,
                 1.0,
-                f"{'A' if a.limits is None else 'B'} has no stop",
+                f"the {'left' if a.limits is None else 'right'} has no stop",
             )
         return
     for k, figure in enumerate(("lower", "upper")):
         size = book.same("limits", a.name, a.limits[k], b.limits[k], unit, span)
         if size is not None:
-            further = "A" if (a.limits[k] > b.limits[k]) == (k == 1) else "B"
+            further = "left" if (a.limits[k] > b.limits[k]) == (k == 1) else "right"
             text = rounded(size, unit)
             share = size / span if span else 1.0
-            effect = f"{further} goes {text} further"
+            effect = f"the {further} goes {text} further"
             book.differ(
                 "limits", a.name, figure, a.limits[k], b.limits[k], unit, size, share, effect
             )
@@ -212,8 +212,8 @@ def _drives(
         gains: list[tuple[str, float | None]] = [("kp", drive.kp), ("kv", drive.kv)]
         lacking = None if (theirs if there == 0 else ours) is None else "nothing"
         x, y = (drive.kind, lacking) if there == 0 else (lacking, drive.kind)
-        silent = "B" if there == 0 else "A"
-        book.differ("drive", a.name, "drive", x, y, "", None, 1.0, f"{silent} names none")
+        silent = "right" if there == 0 else "left"
+        book.differ("drive", a.name, "drive", x, y, "", None, 1.0, f"the {silent} names none")
         for name, value in gains:
             if value:
                 pair = (value, None) if there == 0 else (None, value)
@@ -276,8 +276,9 @@ def _pair_of_drives(
             book.differ("drive", a.name, figure, mine or "none", theirs or "none")
         elif mine is not None and theirs is not None:
             unit = "" if name == "forces" or x.kind != "position" else "rad"
-            size = book.same("drive", a.name, mine, theirs, unit)
-            if size is not None:
+            apart = book.same("drive", a.name, mine, theirs, unit)
+            if apart is not None:
+                size = max(abs(x - y) for x, y in zip(mine, theirs, strict=True))
                 span = max(high - low for low, high in (mine, theirs))
                 share = size / span if span else 1.0
                 book.differ("drive", a.name, figure, mine, theirs, unit, size, share)

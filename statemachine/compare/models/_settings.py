@@ -41,10 +41,10 @@ def compare(book: Ledger, one: GroupTree, two: GroupTree, notes: list[str]) -> N
         size = book.same("settings", name, a, b, _unit(name))
         if size is not None:
             book.differ("settings", "", name, a, b, _unit(name), size, _share(name, a, b))
-    for which, mine, other in (("A", ours, theirs), ("B", theirs, ours)):
+    for which, mine, other in (("left", ours, theirs), ("right", theirs, ours)):
         alone = sorted(mine.keys() - other.keys())
         if alone:
-            notes.append(f"only the engine of {which} has the settings {', '.join(alone)}")
+            notes.append(f"only the engine of the {which} has the settings {', '.join(alone)}")
 
 
 def _unit(name: str) -> str:

@@ -26,10 +26,10 @@ def compare(
     )
     if any(worlds):
         if mine.mass or theirs.mass:
-            silent = "B" if mine.mass else "A"
+            silent = "right" if mine.mass else "left"
             heavy = max(mine.mass, theirs.mass)
             notes.append(
-                f"{silent} gives its base no mass, the other {heavy:.4g} kg; it stands still"
+                f"the {silent} gives its base no mass, the other {heavy:.4g} kg; it stands still"
             )
     else:
         _inertials(book, pair, one, two, mine, theirs, reach)

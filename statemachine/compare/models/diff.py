@@ -13,7 +13,7 @@ from ...description.match import Matching, frame_names, match
 from ...description.records import HERE
 from ...description.tree import Group, GroupTree
 from . import _joints, _places, _settings, _shapes, _solids
-from .ledger import AgreedFigures, Difference, Ledger
+from .ledger import AgreedFigures, Difference, Ledger, ordered
 
 POSES = 100  # at which the same positions are put into both
 
@@ -79,7 +79,7 @@ def diff(
     """
     named = frame_names(one, two, frames)
     book, found = Ledger(digits), match(one, two)
-    reach = max(_reach(one), _reach(two))
+    reach = reach_of(one, two)
     notes: list[str] = []
     _structure(book, one, two, found, notes)
     for pair in found.pairs:
@@ -96,7 +96,7 @@ def diff(
     for question, a, b in ways:
         book.differ("engine", "", question, a, b, share=0.5)
     return Found(
-        differences=book.ordered(),
+        differences=ordered(book.differences),
         agreements=book.agreements(),
         posed=_posed(found, one, two, seed),
         mass=(_mass(one), _mass(two)),
@@ -107,6 +107,11 @@ def diff(
 def _mass(tree: GroupTree) -> float:
     first = 1 if tree.robot.rooted else 0
     return sum(link.inertial.mass for link in tree.robot.links[first:] if link.inertial)
+
+
+def reach_of(one: GroupTree, two: GroupTree) -> float:
+    """How far the larger of two robots reaches [m], which distances are set against."""
+    return max(_reach(one), _reach(two))
 
 
 def _reach(tree: GroupTree) -> float:
@@ -142,8 +147,8 @@ def _structure(
             book.differ("structure", _label(a), "hangs on", on[0], on[1])
         if pair.by == "place" and a.joint and b.joint and a.joint.name != b.joint.name:
             notes.append(
-                f"joint {a.joint.name!r} of A is taken for {b.joint.name!r} of B: one kind, one "
-                "place, one axis (--rename A=B says otherwise)"
+                f"joint {a.joint.name!r} of the left is taken for {b.joint.name!r} of the right: "
+                "one kind, one place, one axis (--map LEFT=RIGHT says otherwise)"
             )
         kinds = [g.joint.kind if g.joint else "fixed" for g in (a, b)]
         if pair.by == "root" and "free" in kinds and kinds[0] != kinds[1]:
@@ -174,8 +179,8 @@ def _suggest(found: Matching, notes: list[str]) -> None:
             one, two = a.joint, theirs[0].joint
             if one.kind == two.kind:
                 notes.append(
-                    f"joints {one.name!r} of A and {two.name!r} of B hang on the same part, by "
-                    f"other axes: --rename {one.name}={two.name} takes them for one"
+                    f"joints {one.name!r} of the left and {two.name!r} of the right hang on the "
+                    f"same part, by other axes: --map {one.name}={two.name} takes them for one"
                 )
 
 
@@ -220,11 +225,16 @@ def _tools(
             book.differ("tool frame", label, "axes", None, None, "rad", turn, turn / math.pi)
         else:
             book.agree("tool frame", label, turn, turn / math.pi, "rad")
-    for tree, those, which in ((one, set(named), "A"), (two, set(named.values()), "B")):
+    for tree, those, which in (
+        (one, set(named), "left"),
+        (two, set(named.values()), "right"),
+    ):
         matched = {g.name for p in found.pairs for g in (p.one, p.two)} | {"world"}
         alone = [name for name in tree.frames if name not in those and name not in matched]
         if alone:
-            notes.append(f"only {which} has the frames {few(alone, 8)} (--frame A=B pairs two)")
+            notes.append(
+                f"only the {which} has the frames {few(alone, 8)} (--frame LEFT=RIGHT pairs two)"
+            )
 
 
 def _posed(found: Matching, one: GroupTree, two: GroupTree, seed: int) -> Posed:
@@ -256,4 +266,4 @@ def _posed(found: Matching, one: GroupTree, two: GroupTree, seed: int) -> Posed:
     return Posed(POSES, seed, worst, angle, link, len(ranges))
 
 
-__all__ = ["POSES", "Found", "Posed", "diff"]
+__all__ = ["POSES", "Found", "Posed", "diff", "reach_of"]

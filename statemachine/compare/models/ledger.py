@@ -48,6 +48,10 @@ class Difference:
         share: How much it matters, from 0 to 1; of what, each comparing function says.
         effect: What it does, as far as that was computed.
         matters: Whether it makes the two descriptions differ; else it is said for the record.
+        causes: The differences of the compiled models that it is a figure of, as `why.explain`
+            names them; none where only a description tells of it.
+        refused: Why the right cannot be brought to the left in it; "" where it can, or where only
+            a description tells of it.
     """
 
     subject: str
@@ -60,6 +64,8 @@ class Difference:
     share: float
     effect: str = ""
     matters: bool = True
+    causes: tuple[str, ...] = ()
+    refused: str = ""
 
 
 @dataclass(frozen=True)
@@ -173,21 +179,22 @@ class Ledger:
                 )
         return tuple(found)
 
-    def ordered(self) -> tuple[Difference, ...]:
-        """The differences, by subject; the subject with the weightiest one first."""
-        weight: dict[str, float] = {}
-        for each in self.differences:
-            matter = each.share + each.matters
-            weight[each.subject] = max(weight.get(each.subject, -1.0), matter)
-        places = {subject: k for k, subject in enumerate(SUBJECTS)}
-        return tuple(
-            sorted(
-                self.differences,
-                key=lambda d: (
-                    -round(weight[d.subject], 3),
-                    places[d.subject],
-                    not d.matters,
-                    -round(d.share, 6),
-                ),
-            )
+
+def ordered(differences: Sequence[Difference]) -> tuple[Difference, ...]:
+    """The differences, by subject; the subject with the weightiest one first."""
+    weight: dict[str, float] = {}
+    for each in differences:
+        matter = each.share + each.matters
+        weight[each.subject] = max(weight.get(each.subject, -1.0), matter)
+    places = {subject: k for k, subject in enumerate(SUBJECTS)}
+    return tuple(
+        sorted(
+            differences,
+            key=lambda d: (
+                -round(weight[d.subject], 3),
+                places[d.subject],
+                not d.matters,
+                -round(d.share, 6),
+            ),
         )
+    )
