@@ -18,6 +18,7 @@ from ..errors import BadInputError, UnsupportedError
 from ..interface import Array, Ints, Model, State
 from ..interface.checks import check_finite
 from ..interface.worlds import WRITABLE, Worlds
+from ._delays import hold
 from ._mujoco_alarms import (
     FATAL,
     AlarmError,
@@ -185,6 +186,10 @@ class MujocoWorlds(Worlds):
         if len(ids):
             self._batch.reset(ids, -1 if key is None else key, _NO_STAGE)
             self._told[ids] = self._warned[ids]
+        if key is not None and self.model.raw.nhistory:
+            history = self._batch.bind("history")
+            for world in ids.tolist():
+                hold(self.model_of(world).raw, history[world], self.ctrl[world])
         listen()
 
     def _get_state(self, world: int) -> State:

@@ -6,7 +6,6 @@ its own buffers, seen read-only.
 
 from __future__ import annotations
 
-import functools
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -31,8 +30,17 @@ from ..interface import (
     State,
 )
 from ..interface.checks import HUGE, TINY, check_finite
+from ._delays import hold
 from ._mujoco_alarms import AlarmError, Alarms, ended, gave_up, pass_on, resets_itself
-from .compiled import check_numbers, compile_file, compiler_warnings, edited, facts, step_length
+from .compiled import (
+    check_numbers,
+    compile_file,
+    compiler_warnings,
+    edited,
+    facts,
+    step_length,
+    with_room,
+)
 
 _DISABLE = mujoco.mjtDisableBit
 # Not RK4: after its step the derived values are neither of the state before nor after.
@@ -64,6 +72,11 @@ _NATIVE = Behaviour("native", "the engine's own")
 _NOTES = {
     "position servo": Behaviour(
         "native", "the engine's own; an infinite ctrl is clamped to its range, or refused"
+    ),
+    "latency": Behaviour(
+        "native",
+        "the engine's own delay of an actuator, in whole engine steps; before a keyframe the "
+        "command was that of the keyframe, where the engine has zero",
     ),
     "forces by part": Behaviour("native", "rows of the constraint solver, by their type"),
     "exact restore": Behaviour("native", "mjSTATE_INTEGRATION, warm start included"),
@@ -172,13 +185,13 @@ class MujocoModel(Model):
             raw.opt.integrator = int(_INTEGRATORS[options["integrator"]])
         substeps = options.get("substeps", self.substeps)
         raw.opt.timestep = step_length(self.timestep, substeps, options)
-        return MujocoModel(raw, self.path, substeps)
+        return MujocoModel(with_room(raw), self.path, substeps)
 
 
 class MujocoData(Data):
     """An MjData. Inputs and derived arrays are views of its memory."""
 
-    __slots__ = ("_alarms", "_layout", "_raw", "_views")
+    __slots__ = ("_alarms", "_layout", "_views")
 
     _raw: mujoco.MjData | None
     _alarms: Any  # Alarms; None once closed
@@ -192,10 +205,16 @@ class MujocoData(Data):
         views = {name: getattr(raw, name).view() for name in (*POSES, "qacc", *FORCES)}
         for view in views.values():
             view.setflags(write=False)
-        self._raw, self._views, self._alarms = raw, views, alarms
+        self._views, self._alarms = views, alarms
         self._layout = _layout(model)
         inputs = {name: getattr(raw, name).view() for name in INPUTS}
-        super().__init__(model, _transition(model, raw), inputs, (alarms.now, alarms.seen))
+        super().__init__(
+            model,
+            _transition(model, raw),
+            inputs,
+            (alarms.now, alarms.seen),
+            (model.raw, raw),
+        )
 
     @property
     def raw(self) -> mujoco.MjData:
@@ -243,6 +262,7 @@ class MujocoData(Data):
             mujoco.mj_resetData(self._home.raw, self.raw)
         else:
             mujoco.mj_resetDataKeyframe(self._home.raw, self.raw, key)
+            hold(self._home.raw, self.raw.history, self.raw.ctrl)
         self._alarms.clear()
 
     def _get_state(self) -> State:
@@ -270,7 +290,7 @@ class MujocoData(Data):
         self.raw.time = time
 
     def _close(self) -> None:
-        self._raw = self._alarms = None
+        self._alarms = None
         self._views.clear()
 
     def _attend(self) -> None:
@@ -293,30 +313,37 @@ class MujocoData(Data):
 
 
 def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:
-    """The engine's step bound to its arguments; Python runs only where it must."""
-    mj_step, engine_model, substeps = mujoco.mj_step, model.raw, model.substeps
-    bare = functools.partial(mj_step, engine_model, raw)
+    """The engine's step, of (mjModel, mjData, nstep=1); Python runs only where it must."""
+    mj_step, substeps = mujoco.mj_step, model.substeps
 
-    def finer(nstep: int = 1) -> None:
+    def finer(engine_model: mujoco.MjModel, engine_data: mujoco.MjData, nstep: int = 1) -> None:
         if nstep * substeps >= 2**31:  # the engine counts in a C int
             raise BadInputError(f"nstep {nstep} × {substeps} substeps is too large for one call")
-        bare(nstep * substeps)
+        mj_step(engine_model, engine_data, nstep * substeps)
 
-    advance = bare if substeps == 1 else finer
+    advance = mj_step if substeps == 1 else finer
     qpos, low, high = memoryview(raw.qpos), -TINY, TINY
     starts = [start for _, start in model._quaternions]
     if not starts:
         return advance
+    only = starts[0]
 
-    def checked(nstep: int = 1) -> None:
-        # MuJoCo takes a zero quaternion for the identity without a word. One whose first
-        # number is not zero is none, which is the cheapest look; others are looked at again.
+    # MuJoCo takes a zero quaternion for the identity without a word. One whose first number
+    # is not zero is none, which is the cheapest look; others are looked at again.
+    def checked(engine_model: mujoco.MjModel, engine_data: mujoco.MjData, nstep: int = 1) -> None:
         for start in starts:
             if low < qpos[start] < high:
-                model._check_quaternions(raw.qpos)
-        advance(nstep)
+                model._check_quaternions(engine_data.qpos)
+        advance(engine_model, engine_data, nstep)
 
-    return checked
+    def checked_one(
+        engine_model: mujoco.MjModel, engine_data: mujoco.MjData, nstep: int = 1
+    ) -> None:
+        if qpos[only] < high and qpos[only] > low:
+            model._check_quaternions(engine_data.qpos)
+        advance(engine_model, engine_data, nstep)
+
+    return checked_one if len(starts) == 1 else checked
 
 
 def _layout(model: MujocoModel) -> tuple[str, tuple[tuple[str, int], ...]]:

@@ -54,6 +54,7 @@ BEHAVIOURS = (
     "stale after a step",
     "zeros when fresh",
     "position servo",
+    "latency",
     "armature",
     "joint damping",
     "dry friction",
