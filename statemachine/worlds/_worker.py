@@ -168,7 +168,7 @@ class Holder:
 
     def _fill(self, _argument: int, _payload: Any, _places: Any) -> Any:
         self._make(self._all)
-        return self._data[0]._state_layout()
+        return [data._state_layout() for data in self._data[: None if self._options else 1]]
 
     def _make(self, most: int) -> None:
         while len(self._data) < min(most, self._all):

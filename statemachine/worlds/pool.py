@@ -91,6 +91,7 @@ class PoolWorlds(Worlds):
         self._rows: Any = arrays.pop("rows")
         self._count, self._warned = 0, set[tuple[Any, str]]()
         self._processes: list[WorldsProcess] = []
+        self._layouts: dict[int, Any] = {}  # of the States, by process
         self._end = weakref.finalize(self, end_all, self._processes, os.getpid())
         super().__init__(model, n, workers, derived, arrays)
         self._kept = {name: vars(self)[name] for name in derived}
@@ -121,8 +122,8 @@ class PoolWorlds(Worlds):
         _check_memory(self.n, [answer["value"] for answer in answers])
         answers = self._exchange(processes, Verb.FILL)
         self._check(processes, answers)
-        self._fingerprint = answers[0]["value"]
-        for process in processes:
+        for process, answer in zip(processes, answers, strict=True):
+            self._layouts[process.worlds[0]] = answer["value"]
             process.started()
 
     def _check(self, processes: list[WorldsProcess], answers: Answers) -> None:
@@ -290,8 +291,9 @@ class PoolWorlds(Worlds):
         self._renew(ids)
         self._ask(ids, Verb.SET_STATE, world, state)
 
-    def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
-        return self._fingerprint
+    def _state_layout(self, world: int) -> tuple[str, tuple[tuple[str, int], ...]]:
+        own = self._layouts[world % len(self._processes)]
+        return own[world // len(self._processes) if self._options else 0]
 
     def _record(
         self, ids: Ints, nstep: int, every: int, arrays: Mapping[str, Array], ctrl: Array | None
