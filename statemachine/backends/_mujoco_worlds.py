@@ -95,7 +95,7 @@ class MujocoWorlds(Worlds):
 
     def model_of(self, world: int) -> Model:
         if not self._varied:
-            return self.model
+            return self._base
         self._refuse_if_troubled()
         return self._base.with_compiled(self._batch.get_model(world))
 
@@ -119,10 +119,10 @@ class MujocoWorlds(Worlds):
         return self._call(ids, 0, self._batch.forward)
 
     def _engine_steps(self, nstep: int) -> int:
-        count = nstep * self.model.substeps
+        count = nstep * self._base.substeps
         if count >= 2**31:  # the engine counts in a C int
             raise BadInputError(
-                f"nstep {nstep} × {self.model.substeps} substeps is too large for one call"
+                f"nstep {nstep} × {self._base.substeps} substeps is too large for one call"
             )
         return count
 

@@ -171,7 +171,7 @@ class MujocoModel(Model):
     ) -> Any:
         from ._mujoco_worlds import MujocoWorlds
 
-        base, varied = self._varied(options)
+        base, varied = self._varied(options) if options else (self, {})
         follow = bool(CONSTANTS_FOLLOW & options.keys())
         return MujocoWorlds(self, base, (n, workers), derived, (varied, follow), _layout(base))
 
