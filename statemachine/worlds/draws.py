@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -72,7 +73,7 @@ class LogUniform(Uniform):
 
 def draw(
     model: Model, n: int, *, seed: int, **ranges: Uniform | tuple[float, float]
-) -> dict[str, Array]:
+) -> dict[str, Any]:
     """Options for `make_worlds`, drawn for n worlds.
 
     A world's values depend on the seed, its number and the option alone: not on `n`, nor on
@@ -100,7 +101,7 @@ def draw(
     number = whole_number(seed)
     if number is None or number < 0:
         raise BadInputError(f"seed must be a whole number of at least 0; got {shown(seed)}")
-    found = {}
+    found: dict[str, Any] = {}  # of arrays; typed so that make_worlds takes it by **
     for name, given in ranges.items():
         if name not in _NOMINAL:
             raise unknown_name("option to draw", name, _NOMINAL)
