@@ -80,8 +80,21 @@ class DivergedError(StateMachineError, ArithmeticError):
     index: int
 
 
+class TimedOutError(StateMachineError, TimeoutError):
+    """A run took longer than it was given."""
+
+
+class WorkerEndedError(StateMachineError, RuntimeError):
+    """The process that ran something ended before it was done."""
+
+
 class EngineError(StateMachineError, RuntimeError):
-    """An engine gave up in the middle of a step; the Data is of no use any more."""
+    """An engine gave up in the middle of a step; the Data is of no use any more.
+
+    `worlds` has the numbers of those of many that are lost with their process.
+    """
+
+    worlds: tuple[int, ...] = ()
 
 
 class UnsupportedError(StateMachineError, NotImplementedError):

@@ -95,7 +95,7 @@ def test_command(cli: Cli, command: str, request: pytest.FixtureRequest, tmp_pat
             (tmp_path / "submissions" / name).write_text(solution)
     ours = ("exercises/", "models")
     words = [str(ROOT / word) if word.startswith(ours) else word for word in words]
-    if words and words[0] in ("compare", "audit", "view", "trace"):
+    if words and words[0] in ("compare", "audit", "view", "trace", "sweep"):
         need_engine("pybullet")
     if "view" in words:
         words += ["--seconds", "1", "--port", "0"]
@@ -152,6 +152,7 @@ PRINTS = {
     "docs/interface.md": ("no joint named 'elbow'; known: ", "0.001\n", "options of replace: "),
     "docs/platforms.md": ("armature: emulated", "position servo: emulated"),
     "docs/robots.md": ("True {}",),
+    "docs/sweeps.md": ("2 done, 0 missing",),
     "docs/traces.md": ("101 (101, 6)",),
 }
 

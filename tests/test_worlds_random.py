@@ -84,6 +84,27 @@ def test_a_world_is_the_data_of_a_replaced_model(box: Any, name: str) -> None:
                 np.testing.assert_array_equal(got, wanted, err_msg=fact)
 
 
+def test_every_backend_has_worlds_that_differ(backend: str) -> None:
+    """What is drawn for domain randomisation, on each, bit for bit."""
+    model = sm.load("so101/scene_box", backend=backend)
+    options = draw(
+        model, 2, seed=4, mass=Uniform(0.8, 1.2, each=True), friction=(0.6, 1.0),
+        kp=(0.8, 1.2), damping=(0.5, 2.0), latency=(0.005, 0.02),
+    )  # fmt: skip
+    with make_worlds(model, 2, workers=2, **options) as many:
+        worlds.reset(many, keyframe=0)
+        many.ctrl += 0.1
+        worlds.step(many, 20)
+        for i in range(2):
+            one = model.replace(**{name: values[i] for name, values in options.items()})
+            with sm.make_data(one) as data:
+                sm.reset(one, data, keyframe=0)
+                data.ctrl += 0.1
+                sm.step(one, data, 20)
+                np.testing.assert_array_equal(many.qpos[i], data.qpos)
+    assert (many.qpos[0] != many.qpos[1]).any()
+
+
 def test_no_world_has_a_compiled_model_of_its_own(box: Any) -> None:
     """Its own are some kilobytes of arrays; a compiled model of the scene takes 3 MB."""
     n = 64

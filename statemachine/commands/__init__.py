@@ -15,6 +15,7 @@ COMMANDS = {
     "fingertip": "the engine's fingertip against an independent witness",
     "compare": "where two engines part, by how much, and why",
     "robots": "any folder of models: what each does on every engine, in a table",
+    "sweep": "an experiment at many settings, on every engine, as a dataset",
     "trace": "record a run, play it on another engine, look into it, draw it",
     "view": "a running simulation in the browser, with sliders",
     "doctor": "what this machine has, and what to do",

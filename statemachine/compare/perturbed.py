@@ -203,8 +203,8 @@ def _displaced(
             qpos[place] += opposite * most * float(draw.choice((-1.0, 1.0)))
             continue
         if kind == JointType.FREE:
-            qpos[place : place + 3] += opposite * size.length * _direction(draw)
-        _turn(qpos[place + JointType(kind).nq - 4 :][:4], opposite * size.angle * _direction(draw))
+            qpos[place : place + 3] += opposite * size.length * direction(draw)
+        turn(qpos[place + JointType(kind).nq - 4 :][:4], opposite * size.angle * direction(draw))
     return qpos
 
 
@@ -213,20 +213,20 @@ def _nudged_pose(model: Model, qpos: Array, draw: np.random.Generator) -> Array:
     nudged = _nudged(qpos, draw)
     for _, place in model._quaternions:
         nudged[place : place + 4] = qpos[place : place + 4]
-        _turn(nudged[place : place + 4], ROUNDING * _direction(draw))
+        turn(nudged[place : place + 4], ROUNDING * direction(draw))
     return nudged
 
 
-def _turn(quat: Array, turn: Array) -> None:
+def turn(quat: Array, by: Array) -> None:
     """Turn a quaternion (4,), in place, by a vector (3,) along the axis, as long as the angle."""
-    angle = float(np.linalg.norm(turn))
+    angle = float(np.linalg.norm(by))
     if angle:
-        half = np.array([np.cos(angle / 2), *(np.sin(angle / 2) * turn / angle)])
+        half = np.array([np.cos(angle / 2), *(np.sin(angle / 2) * by / angle)])
         turned = times(half, quat)
         quat[:] = turned / np.linalg.norm(turned)
 
 
-def _direction(draw: np.random.Generator) -> Array:
+def direction(draw: np.random.Generator) -> Array:
     """A unit vector (3,), every direction as likely as any other."""
     vector = draw.standard_normal(3)
     return vector / np.linalg.norm(vector)

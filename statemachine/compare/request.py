@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from ..comparison.text import command, count, listed
+from ..comparison.text import command, listed
 from ..errors import BadInputError, StateMachineError
 from ..installed import PAIR
 from ..models import SUFFIXES as MODELS
 from ..scenarios import SCENARIOS, Scenario, scenario
-from ..traces.controllers import command_function, is_function
+from ..traces.controllers import function_scenario, is_function
 from ..traces.files import SUFFIXES
 from .side import Side, parse_sides
 
@@ -87,21 +87,7 @@ class Request:
         (what,) = self.what
         if not is_function(what):
             return scenario(what)
-        controller_of = command_function(what, self.every)
-        file, colon, name = what.rpartition(":")
-        called = f"{Path(file).name}:{name}" if colon else Path(what).name
-        steps = "every step" if self.every == 1 else f"every {count(self.every, 'step')}"
-        says = f"{called} is asked for ctrl at {steps}, on each side for its own."
-        return Scenario(
-            called,
-            says,
-            "",
-            2.0,
-            lambda model, _seed: controller_of(model),
-            lambda _model: says,
-            keyframe=self.keyframe,
-            own=True,
-        )
+        return function_scenario(what, self.every, self.keyframe)
 
 
 def is_trace(word: str) -> bool:

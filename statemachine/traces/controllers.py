@@ -7,17 +7,19 @@ import importlib.util
 import inspect
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from ..comparison.text import count
 from ..errors import BadInputError, StateMachineError
 from ..interface import Data, Model
 from ..interface.checks import as_vector
-from ..scenarios import Controller
+from ..scenarios import Controller, Scenario
 
 Function = Callable[..., Any]
+_TAKES = ("model", "data")
 
 
 def controller_from(spec: str) -> Controller:
@@ -44,7 +46,65 @@ def is_function(spec: str) -> bool:
     return Path(_place(spec, "")[0]).suffix == ".py"
 
 
-def command_function(spec: str, every: int = 1) -> Callable[[Model], Controller]:
+def function_scenario(
+    spec: str,
+    every: int = 1,
+    keyframe: str | None = None,
+    parameters: Mapping[str, Any] | None = None,
+) -> Scenario:
+    """What the function (model, data) that "FILE.py:NAME" says does on any robot.
+
+    Args:
+        spec: A file and a function of it; without a name, `controller`.
+        every: The function is called at the first of so many steps, and its ctrl holds.
+        keyframe: Where it starts; None for the default state.
+        parameters: Further keyword arguments of the function.
+
+    Raises:
+        BadInputError: As `command_function` does.
+    """
+    controller_of = command_function(spec, every, parameters)
+    path, name = _place(spec, "")
+    called = f"{path.name}:{name}" if name else path.name
+    steps = "every step" if every == 1 else f"every {count(every, 'step')}"
+    says = f"{called} is asked for ctrl at {steps}, on each side for its own."
+    return Scenario(
+        called,
+        says,
+        "",
+        2.0,
+        lambda model, _seed: controller_of(model),
+        lambda _model: says,
+        keyframe=keyframe,
+        own=True,
+    )
+
+
+def parameters_of(spec: str) -> tuple[str, ...]:
+    """What the function (model, data, …) that "FILE.py:NAME" says takes by keyword.
+
+    Raises:
+        BadInputError: There is no such function, or the file fails.
+    """
+    path, name = _place(spec, "controller")
+    try:
+        given = inspect.signature(_function(path, name, _TAKES)).parameters.values()
+    except ValueError:  # something of C's without a signature
+        return ()
+    kinds = inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
+    takes = [each.name for each in given if each.kind in kinds][: len(_TAKES)]
+    named = inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY
+    return tuple(each.name for each in given if each.kind in named and each.name not in takes)
+
+
+def function_file(spec: str) -> Path:
+    """The file that "FILE.py:NAME" names."""
+    return _place(spec, "controller")[0]
+
+
+def command_function(
+    spec: str, every: int = 1, parameters: Mapping[str, Any] | None = None
+) -> Callable[[Model], Controller]:
     """What makes a controller of the function (model, data) that "FILE.py:NAME" says.
 
     Each controller has the file's names to itself: it is run anew for each.
@@ -52,16 +112,18 @@ def command_function(spec: str, every: int = 1) -> Callable[[Model], Controller]
     Args:
         spec: A file and a function of it; without a name, `controller`.
         every: The function is called at the first of so many steps, and its ctrl holds.
+        parameters: Further keyword arguments of the function.
 
     Raises:
         BadInputError: There is no such file or function, or the file fails; the controller
             raises it where the function fails, or returns what is no ctrl.
     """
     path, name = _place(spec, "controller")
-    _imported(path, name, ("model", "data"))  # that it fails is said before anything is loaded
+    given = dict(parameters or {})
+    _imported(path, name, _TAKES, given)  # that it fails is said before anything is loaded
 
     def controller_of(model: Model) -> Controller:
-        function = _imported(path, name, ("model", "data"))
+        function = _imported(path, name, _TAKES, given)
         steps = 0
 
         def controller(time: float, data: Data) -> Any:
@@ -70,7 +132,7 @@ def command_function(spec: str, every: int = 1) -> Callable[[Model], Controller]
             if (steps - 1) % every:
                 return None
             with _errors_of(path, time):
-                ctrl = function(model, data)
+                ctrl = function(model, data, **given)
             if ctrl is None:
                 return None
             try:
@@ -94,7 +156,25 @@ def _place(spec: str, usual: str) -> tuple[Path, str]:
     return Path(file), name
 
 
-def _imported(path: Path, name: str, takes: tuple[str, ...]) -> Function:
+def _imported(
+    path: Path, name: str, takes: tuple[str, ...], parameters: Mapping[str, Any] | None = None
+) -> Function:
+    """A function of a file, which is run for it, that can be called like this."""
+    function = _function(path, name, takes)
+    try:
+        inspect.signature(function).bind(*takes, **(parameters or {}))
+    except TypeError:
+        listed = ", ".join((*takes, *(parameters or {})))
+        raise BadInputError(
+            f"{name} of {path.name} takes {inspect.signature(function)}, and is called with "
+            f"({listed})"
+        ) from None
+    except ValueError:  # something of C's without a signature
+        pass
+    return function
+
+
+def _function(path: Path, name: str, takes: tuple[str, ...]) -> Function:
     """A function of a file, which is run for it."""
     if path.suffix != ".py" or not path.is_file():
         raise _missing(path)
@@ -112,15 +192,6 @@ def _imported(path: Path, name: str, takes: tuple[str, ...]) -> Function:
         close = difflib.get_close_matches(name, functions, n=1, cutoff=0.5)
         hint = f". Did you mean {close[0]}?" if close else ""
         raise BadInputError(f"{path.name} has no function {name}({listed}){hint}")
-    try:
-        inspect.signature(function).bind(*takes)
-    except TypeError:
-        raise BadInputError(
-            f"{name} of {path.name} takes {inspect.signature(function)}, and is called with "
-            f"({listed})"
-        ) from None
-    except ValueError:  # something of C's without a signature
-        pass
     return function
 
 

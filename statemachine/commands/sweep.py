@@ -1,0 +1,157 @@
+"""`statemachine sweep`: one experiment at many settings, on every engine, as a dataset."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from ._common import SAYS_NO, add_json, add_menagerie, complain, show
+from .compare import add_defaults, experiments
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Its options."""
+    parser.description = (
+        "Run an experiment at every combination of settings, from several starts, on every\n"
+        "engine, and write a row for each run into a partitioned Parquet dataset. A run that\n"
+        "fails is a row with its error. Typed again, it runs only what is missing.\n\n"
+        "What --vary takes:\n"
+        "  timestep=0.001,0.005      a list; also contacts=on,off and integrator=Euler,RK4\n"
+        "  damping=0.5:1.5:11        a grid: from, to, count\n"
+        "  damping=0.5x:2x:5         times the model's own values\n"
+        "  damping[elbow_flex]=0:1:3 of one joint; mass[gripper], gravity[z], …\n"
+        "  frictionloss=0:0.1        a range, sampled with --samples\n"
+        "  model=so101/scene,A.xml   variants of the model\n"
+        "  qpos[elbow_flex]=-1:1:5   where the run starts; qvel[…] too\n"
+        "  gain=1,2,5                a keyword argument of FUNCTION(model, data, gain=…)"
+    )
+    parser.epilog = (
+        f"experiments:\n{experiments()}\n\n"
+        "Exit code 1: a cell failed. docs/sweeps.md has the columns of the dataset."
+    )
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("what", metavar="WHAT", help="an experiment, or FILE.py:FUNCTION")
+    parser.add_argument(
+        "--vary", action="append", default=[], metavar="NAME=VALUES", help="what changes; see above"
+    )
+    parser.add_argument(
+        "--out",
+        required=True,
+        metavar="DIR",
+        help="the folder of the dataset; a new one, or to go on",
+    )
+    parser.add_argument(
+        "--backend",
+        action="append",
+        default=None,
+        metavar="NAME",
+        help="an engine, or all; may be repeated (all)",
+    )
+    parser.add_argument(
+        "--seeds",
+        type=int,
+        default=1,
+        metavar="N",
+        help="starts for each setting: seeds 0 to N-1 (1)",
+    )
+    parser.add_argument(
+        "--spread",
+        default=None,
+        metavar="SIZES",
+        help="how far a seed other than 0 puts the start away (1deg,1mm; 0 for not at all)",
+    )
+    group = parser.add_argument_group("ranges")
+    group.add_argument(
+        "--samples",
+        type=int,
+        default=0,
+        metavar="N",
+        help="Sobol points of the ranges, a power of 2",
+    )
+    group.add_argument(
+        "--indices",
+        action="store_true",
+        help="the points that Sobol indices are computed from: N for each range, and 2 N more",
+    )
+    group.add_argument(
+        "--design-seed", type=int, default=0, metavar="N", help="of what is drawn for them (0)"
+    )
+    group = parser.add_argument_group("the run")
+    group.add_argument(
+        "--model", default=None, metavar="NAME|FILE", help="instead of the experiment's own"
+    )
+    add_menagerie(parser)
+    group.add_argument("--seconds", type=float, default=None, metavar="S", help="simulated time")
+    group.add_argument("--keyframe", default=None, metavar="NAME", help="where a FUNCTION starts")
+    group.add_argument(
+        "--every",
+        type=int,
+        default=1,
+        metavar="N",
+        help="steps for which what a FUNCTION returned holds (1)",
+    )
+    add_defaults(parser)
+    group.add_argument(
+        "--moments", type=int, default=20, metavar="N", help="of each run that are kept (20)"
+    )
+    group.add_argument(
+        "--timeout", type=float, default=600.0, metavar="S", help="that a cell may take (600)"
+    )
+    group = parser.add_argument_group("where")
+    group.add_argument(
+        "--jobs", type=int, default=None, metavar="N", help="processes here (one a processor)"
+    )
+    group.add_argument(
+        "--scheduler", default=None, metavar="ADDRESS", help="of Dask, whose workers run it instead"
+    )
+    group.add_argument(
+        "--extend",
+        action="store_true",
+        help="let the dataset in DIR grow by values, seeds, engines",
+    )
+    add_json(parser, "summary")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run what is missing, and say what there is."""
+    from ..report import sweep as words
+    from ..report.progress import progress
+    from ..sweep import prepared, run_sweep
+
+    ready = prepared(_asked(options))
+    for line in ready.said:
+        complain(line, 0)
+    out = Path(options.out)
+    try:
+        with progress(f"{len(ready)} cells") as told:
+            summary = run_sweep(
+                ready,
+                out,
+                jobs=options.jobs,
+                scheduler=options.scheduler,
+                extend=options.extend,
+                progress=told,
+            )
+    except KeyboardInterrupt:
+        if out.is_dir():
+            return complain(f"stopped; {out} has what was done. Type the same to go on", 130)
+        raise
+    show(words.page(ready, summary), summary, options.json)
+    return SAYS_NO if summary.failed else 0
+
+
+def _asked(options: argparse.Namespace) -> Any:
+    from ..sweep import Sweep
+
+    given = {
+        name: getattr(options, name)
+        for name in (
+            *("what", "vary", "seeds", "samples", "indices", "design_seed", "model", "menagerie"),
+            *("seconds", "every", "keyframe", "defaults", "moments", "timeout"),
+        )
+    }
+    if options.spread is not None:
+        given["spread"] = options.spread.split(",")
+    return Sweep(backends=options.backend or ("all",), **given)

@@ -1,0 +1,105 @@
+"""Cells in processes of their own, one after the other: what may end its process is run here."""
+
+from __future__ import annotations
+
+import importlib
+import threading
+from collections.abc import Callable, Generator, Iterable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import TimeoutError as WaitedTooLong
+from contextlib import suppress
+from itertools import islice
+from typing import Any
+
+from ..errors import MissingEngineError, WorkerEndedError
+from .cell import CellRules, SweepCell, timed_out
+from .worker import Row, failed_row, run_batch
+
+Batch = Sequence[SweepCell]
+Results = Generator[list[Row], None, None]
+_GRACE = 30.0  # seconds beyond what a batch may take; its process ends itself before
+ALONE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # several processes run at once
+
+
+def require_joblib() -> Any:
+    """The package joblib.
+
+    Raises:
+        MissingEngineError: It is not installed; the message names the extra.
+    """
+    try:
+        return importlib.import_module("joblib")
+    except ImportError as error:
+        raise MissingEngineError(
+            "a sweep needs joblib: pip install 'statemachine-sim[sweep]'", engine="joblib"
+        ) from error
+
+
+class _Process:
+    """A process that runs batches; after its end, another one."""
+
+    def __init__(self, rules: CellRules) -> None:
+        require_joblib()
+        self._loky = importlib.import_module("joblib.externals.loky.process_executor")
+        self._rules = rules
+        self._pool: Any = None
+
+    def rows(self, batch: Batch) -> list[Row]:
+        """The rows of a batch; a cell that ends the process twice, the second time alone, fails."""
+        try:
+            return self._run(batch)
+        except WorkerEndedError as error:
+            if len(batch) > 1:
+                return [row for cell in batch for row in self.rows([cell])]
+            first = error
+        try:
+            return self._run(batch)
+        except WorkerEndedError as error:
+            late = [each for each in (first, error) if isinstance(each.__cause__, WaitedTooLong)]
+            return [failed_row(batch[0], timed_out(self._rules.timeout) if late else error)]
+
+    def _run(self, batch: Batch) -> list[Row]:
+        if self._pool is None:
+            self._pool = self._loky.ProcessPoolExecutor(max_workers=1, env=ALONE)
+        future: Future[list[Row]] = self._pool.submit(run_batch, self._rules, batch, True)
+        try:
+            return future.result(self._rules.timeout * len(batch) + _GRACE)
+        except (self._loky.BrokenProcessPool, WaitedTooLong) as error:
+            self.close()
+            raise WorkerEndedError("its process ended before it was done, twice") from error
+
+    def close(self) -> None:
+        """End the process."""
+        pool, self._pool = self._pool, None
+        if pool is not None:
+            with suppress(Exception):
+                pool.shutdown(wait=True, kill_workers=True)
+
+
+def apart(rules: CellRules, batches: Iterable[Batch], jobs: int) -> Results:
+    """The rows of each batch, as they are ready, in processes that nothing else depends on."""
+    processes = [_Process(rules) for _ in range(jobs)]
+    free, lock = list(processes), threading.Lock()
+
+    def run(batch: Batch) -> list[Row]:
+        with lock:
+            process = free.pop()
+        try:
+            return process.rows(batch)
+        finally:
+            with lock:
+                free.append(process)
+
+    work: Callable[[Batch], list[Row]] = run
+    with ThreadPoolExecutor(jobs) as threads:
+        try:
+            coming = iter(batches)
+            waiting = {threads.submit(work, batch) for batch in islice(coming, jobs)}
+            while waiting:
+                done, waiting = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
+                for future in done:
+                    yield future.result()
+                waiting |= {threads.submit(work, batch) for batch in islice(coming, len(done))}
+        finally:
+            for process in processes:
+                process.close()

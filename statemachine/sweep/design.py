@@ -1,0 +1,158 @@
+"""The points of a sweep: every combination of lists and grids, times the samples of ranges."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import inspect
+import itertools
+import json
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import BadInputError, MissingEngineError
+from ..interface import Array
+from .factors import Value, Vary, is_number
+
+_DIGITS = 32  # hexadecimal, of a digest
+_DIMENSIONS = 21201  # that SciPy has Sobol directions for
+
+
+@dataclass(frozen=True)
+class DesignPoint:
+    """One setting of everything that is varied.
+
+    Attributes:
+        id: A digest of the values.
+        values: One for each `Vary`, in their order.
+        block: "" of lists and grids, "sobol" of samples; of a design for indices "A", "B", or
+            the label of the factor that is taken from B and the others from A.
+        sample: Number of the sample within its block; 0 of lists and grids.
+    """
+
+    id: str
+    values: tuple[Value, ...]
+    block: str = ""
+    sample: int = 0
+
+
+@dataclass(frozen=True)
+class Design:
+    """What points a sweep has.
+
+    Attributes:
+        factors: What is varied; none for the experiment as it is.
+        samples: How many points of the ranges are drawn; for indices, in each block.
+        indices: Whether the samples are those of first-order and total Sobol indices (A. Saltelli
+            et al., Computer Physics Communications 181, 2010): a block A, a block B, and for each
+            range a block of A with that one from B.
+        seed: Of the scrambling of the Sobol sequence.
+    """
+
+    factors: tuple[Vary, ...] = ()
+    samples: int = 0
+    indices: bool = False
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if bool(self.sampled) != (self.samples > 0):
+            if self.sampled:
+                raise BadInputError(
+                    f"{self.sampled[0].typed} is a range: say --samples N, or a count behind it"
+                )
+            raise BadInputError("--samples is of ranges, NAME=from:to, and none is varied")
+        if self.indices and not self.sampled:
+            raise BadInputError("--indices wants ranges, NAME=from:to, and --samples")
+        if len(self.sampled) * (1 + self.indices) > _DIMENSIONS:
+            raise BadInputError(f"{len(self.sampled)} ranges are more than can be sampled")
+
+    @property
+    def sampled(self) -> tuple[Vary, ...]:
+        """The factors with a range."""
+        return tuple(vary for vary in self.factors if vary.bounds is not None)
+
+    @property
+    def listed(self) -> tuple[Vary, ...]:
+        """The factors with a list or a grid."""
+        return tuple(vary for vary in self.factors if vary.bounds is None)
+
+    def __len__(self) -> int:
+        blocks = len(self.sampled) + 2 if self.indices else 1
+        count = blocks * self.samples if self.sampled else 1
+        for vary in self.listed:
+            count *= len(vary.values)
+        return count
+
+    def points(self) -> Iterator[DesignPoint]:
+        """Every point; the samples change slowest."""
+        names = [vary.label for vary in self.factors]
+        order = {vary.label: k for k, vary in enumerate((*self.sampled, *self.listed))}
+        for block, sample, drawn in self._drawn():
+            for chosen in itertools.product(*(vary.values for vary in self.listed)):
+                every = (*drawn, *chosen)
+                values = tuple(every[order[name]] for name in names)
+                yield DesignPoint(
+                    digest(dict(zip(names, values, strict=True))), values, block, sample
+                )
+
+    def _drawn(self) -> Iterator[tuple[str, int, tuple[Value, ...]]]:
+        """Block, number and values of each sample; one without values where nothing is sampled."""
+        ranges = self.sampled
+        if not ranges:
+            yield "", 0, ()
+            return
+        width = len(ranges)
+        unit = _sobol(width * (1 + self.indices), self.samples, self.seed)
+        low, high = np.array([vary.bounds for vary in ranges]).T
+        blocks = {"A" if self.indices else "sobol": unit[:, :width]}
+        if self.indices:
+            blocks["B"] = unit[:, width:]
+            for k, vary in enumerate(ranges):
+                blocks[vary.label] = np.where(np.arange(width) == k, blocks["B"], blocks["A"])
+        for block, rows in blocks.items():
+            for sample, row in enumerate((low + (high - low) * rows).tolist()):
+                yield block, sample, tuple(row)
+
+
+def _sobol(width: int, count: int, seed: int) -> Array:
+    """(count, width) points in the unit cube, of a scrambled Sobol sequence."""
+    qmc = require_qmc()
+    # SciPy 1.15 calls the seed of a generator `rng`.
+    name = "rng" if "rng" in inspect.signature(qmc.Sobol).parameters else "seed"
+    engine = qmc.Sobol(width, scramble=True, **{name: np.random.default_rng(seed)})
+    with warnings.catch_warnings():  # of a number that is no power of two: said when it is asked
+        warnings.simplefilter("ignore")
+        found: Array = engine.random(count)
+    return found
+
+
+def require_qmc() -> Any:
+    """SciPy's quasi-Monte-Carlo designs.
+
+    Raises:
+        MissingEngineError: SciPy is not installed; the message names the extra.
+    """
+    try:
+        return importlib.import_module("scipy.stats.qmc")
+    except ImportError as error:
+        raise MissingEngineError(
+            "sampling a range needs SciPy: pip install 'statemachine-sim[sweep]'", engine="scipy"
+        ) from error
+
+
+def digest(content: object) -> str:
+    """Of plain values; 1 and 1.0 are the same."""
+    text = json.dumps(_plain(content), sort_keys=True, ensure_ascii=False, allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()[:_DIGITS]
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, dict):
+        return {str(key): _plain(each) for key, each in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_plain(each) for each in value]
+    return float(value) if is_number(value) else value  # pyright: ignore[reportArgumentType]

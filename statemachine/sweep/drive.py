@@ -1,0 +1,287 @@
+"""The driver of a sweep: hands out what is missing, and keeps what comes back."""
+
+from __future__ import annotations
+
+import importlib
+import itertools
+import math
+import os
+import threading
+import time
+import warnings
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, closing, contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..errors import BadInputError, MissingEngineError, StateMachineError
+from ..grading.parallel import checked_jobs
+from ..grading.unwinding import unwinding
+from ..scenarios.runs import Progress, silent
+from .apart import Batch, Results, apart, require_joblib
+from .cell import DONE, CellRules
+from .folder import check_folder, locked, settle_manifest
+from .request import PreparedSweep, Sweep, prepared
+from .rows import CELLS, RowWriter, counted
+from .worker import Row, differing, probe, run_batch
+
+_BATCH, _MOST = 1.0, 500  # a task takes about so many seconds, and has at most so many cells
+_TASKS = 4  # at least so many for each job, so that none is idle at the end
+_PATIENCE = 10.0  # seconds for a scheduler to answer
+
+
+@dataclass(frozen=True)
+class SweepSummary:
+    """What has become of a sweep.
+
+    Attributes:
+        folder: Where it is.
+        cells: How many it has; points: of the design.
+        points: See cells.
+        done: How many have a result.
+        failed: How many have none, by the class of the error.
+        ran: How many were run this time.
+        seconds: What this time took.
+        said: What a reader should know.
+        read: Python that opens the dataset.
+    """
+
+    folder: str
+    cells: int
+    points: int
+    done: int
+    failed: Mapping[str, int]
+    ran: int
+    seconds: float
+    said: tuple[str, ...] = ()
+    read: str = field(default="")
+
+    @property
+    def missing(self) -> int:
+        """How many have not run."""
+        return self.cells - self.done - sum(self.failed.values())
+
+
+def run_sweep(
+    sweep: Sweep | PreparedSweep,
+    out: str | Path,
+    *,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    extend: bool = False,
+    progress: Progress = silent,
+) -> SweepSummary:
+    """Run what is missing of a sweep.
+
+    Args:
+        sweep: What is asked for.
+        out: The folder of its dataset; what it has of the same sweep is not run again.
+        jobs: How many processes here; by default one for each processor.
+        scheduler: Address of a Dask scheduler, whose workers run it instead.
+        extend: Whether the design may be larger than that of the folder.
+        progress: Told the fraction of what is missing that is done.
+
+    Raises:
+        BadInputError: The folder is of another sweep, or in use; see `prepared` for the rest.
+        MissingEngineError: An engine or a package is missing.
+        KeyboardInterrupt: It was interrupted; what was done is in the folder.
+    """
+    began = time.monotonic()
+    jobs, folder = checked_jobs(jobs), Path(out)
+    require_joblib()
+    ready = sweep if isinstance(sweep, PreparedSweep) else prepared(sweep)
+    check_folder(folder)
+    with locked(folder), ExitStack() as stack:
+        client = None
+        if scheduler is not None:
+            client = stack.enter_context(_connected(scheduler, ready.rules))
+        known = dict(counted(folder))
+        if extend:
+            _check_growth(ready, known, folder)
+        manifest = ready.manifest()
+        settle_manifest(folder, manifest, extend)
+        total = len(ready)
+        missing = total - len(known)
+        writer = RowWriter(
+            folder,
+            ready.design.factors,
+            {name: manifest[name] for name in ("request", "files", "function", "versions")},
+        )
+        kinds = Counter(known.values())
+        ran = 0
+        batches = _batches(ready, known, jobs if client is None else _workers(client))
+        with unwinding():
+            try:
+                with closing(_results(ready.rules, batches, jobs, client)) as found:
+                    for rows in found:
+                        writer.add(rows)
+                        kinds.update(row.get("error_class") or row["status"] for row in rows)
+                        ran += len(rows)
+                        progress(ran / max(1, missing))
+            finally:
+                writer.flush()
+    done = kinds.pop(DONE, 0)
+    place = (folder / CELLS).as_posix()
+    return SweepSummary(
+        folder=os.fspath(folder),
+        cells=total,
+        points=len(ready.design),
+        done=done,
+        failed=dict(kinds.most_common()),
+        ran=ran,
+        seconds=time.monotonic() - began,
+        said=ready.said,
+        read=f'pyarrow.dataset.dataset("{place}", partitioning="hive").to_table()',
+    )
+
+
+def _check_growth(ready: PreparedSweep, known: Mapping[str, str], folder: Path) -> None:
+    """Raise BadInputError where a folder has cells that a design lacks."""
+    if not known:
+        return
+    found = sum(cell.id in known for name in ready.backends for cell in ready.cells(name))
+    if found < len(known):
+        raise BadInputError(
+            f"{folder} has {len(known) - found} cells that are not of this design: a sweep grows "
+            "by values, seeds and backends that are added"
+        )
+
+
+def _batches(ready: PreparedSweep, known: Mapping[str, str], jobs: int) -> Iterator[Batch]:
+    """What is missing, in tasks of about a second, from all backends in turn."""
+
+    def of(backend: str) -> Iterator[Batch]:
+        most = math.ceil((len(ready) - len(known)) / (_TASKS * jobs * len(ready.backends)))
+        size = min(_MOST, max(1, int(_BATCH / max(1e-6, ready.cost.get(backend, _BATCH)))))
+        cells = (cell for cell in ready.cells(backend) if cell.id not in known)
+        while batch := list(itertools.islice(cells, max(1, min(size, most)))):
+            yield batch
+
+    turns = itertools.zip_longest(*(of(name) for name in ready.backends))
+    return (batch for turn in turns for batch in turn if batch is not None)
+
+
+def _results(rules: CellRules, batches: Iterator[Batch], jobs: int, client: Any) -> Results:
+    """The rows of all batches, as they are ready.
+
+    Where a worker dies, what was being run is run again apart from everything else, cell by cell
+    if need be, and the rest goes on with new workers.
+    """
+    if jobs == 1 and client is None:
+        yield from apart(rules, batches, 1)
+        return
+    feed = _Feed(batches)
+    while True:
+        try:
+            with closing(_parallel(rules, feed, jobs, client)) as found:
+                yield from found
+            return
+        except StateMachineError:
+            raise
+        except Exception as error:
+            if client is not None and client.status != "running":
+                raise BadInputError("the scheduler went away; what was done is kept") from error
+            lost = feed.lost()
+            if not lost:
+                raise
+            with closing(apart(rules, lost, min(jobs, len(lost)))) as found:
+                yield from found
+
+
+class _Feed:
+    """Batches for joblib, which takes them from threads of its own, and which of them are out."""
+
+    def __init__(self, batches: Iterator[Batch]) -> None:
+        self._batches, self._lock = enumerate(batches), threading.Lock()
+        self._out: dict[int, Batch] = {}
+        self._round = 0
+
+    def tasks(self, rules: CellRules, own: bool) -> Iterator[Any]:
+        """Calls of `_numbered`, until the batches end or are lost."""
+        delayed = require_joblib().delayed
+        now = self._round
+        while True:
+            with self._lock:
+                if now != self._round or (item := next(self._batches, None)) is None:
+                    return
+                number, batch = item
+                self._out[number] = batch
+            yield delayed(_numbered)(number, rules, batch, own)
+
+    def back(self, number: int) -> None:
+        """A batch has its rows."""
+        self._out.pop(number)
+
+    def lost(self) -> list[Batch]:
+        """The batches that are out, of which nothing more is expected."""
+        with self._lock:
+            self._round += 1
+            lost, self._out = list(self._out.values()), {}
+        return lost
+
+
+def _numbered(number: int, rules: CellRules, batch: Batch, own: bool) -> tuple[int, list[Row]]:
+    return number, run_batch(rules, batch, own)
+
+
+def _parallel(rules: CellRules, feed: _Feed, jobs: int, client: Any) -> Results:
+    """The rows of the batches of a feed, through joblib."""
+    joblib = require_joblib()
+    if client is None:
+        how = joblib.parallel_config(backend="loky", n_jobs=jobs, inner_max_num_threads=1)
+    else:
+        how = joblib.parallel_config(backend="dask", client=client)
+    with how, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a worker that ends is dealt with
+        parallel = joblib.Parallel(
+            return_as="generator_unordered", batch_size=1, pre_dispatch="2 * n_jobs"
+        )
+        with closing(parallel(feed.tasks(rules, client is None))) as found:
+            for number, rows in found:
+                feed.back(number)
+                yield rows
+
+
+@contextmanager
+def _connected(address: str, rules: CellRules) -> Iterator[Any]:
+    """A client of a Dask scheduler whose workers have what the sweep needs.
+
+    Raises:
+        MissingEngineError: The package distributed is not installed; the message names the extra.
+        BadInputError: Nobody answers, there is no worker, or one has other versions or files.
+    """
+    try:
+        distributed = importlib.import_module("distributed")
+    except ImportError as error:
+        raise MissingEngineError(
+            "--scheduler needs Dask: pip install 'statemachine-sim[cluster]'", engine="distributed"
+        ) from error
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            client = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            raise BadInputError(
+                f"no Dask scheduler answers at {address} ({type(error).__name__})"
+            ) from None
+    try:
+        with suppress(TimeoutError):
+            client.wait_for_workers(1, timeout=_PATIENCE)
+        found = client.run(probe, rules, on_error="return")
+        if not found:
+            raise BadInputError(f"the scheduler at {address} has no workers")
+        for worker, told in found.items():
+            if isinstance(told, BaseException):
+                raise BadInputError(f"the worker {worker} cannot run a sweep: {told}")
+            if wrong := differing(told, rules):
+                raise BadInputError(f"the worker {worker} has not the same {wrong} as this machine")
+        yield client
+    finally:
+        with suppress(Exception):
+            client.close(timeout=2)
+
+
+def _workers(client: Any) -> int:
+    return max(1, sum(client.nthreads().values()))

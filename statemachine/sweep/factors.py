@@ -1,0 +1,196 @@
+"""What a sweep varies, as it is typed: "timestep=0.001,0.005", "mass=0.8x:1.2x:5"."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..errors import BadInputError, shown, unknown_name
+
+Kind = Literal["model", "option", "state", "parameter"]
+Value = bool | float | str
+
+STATES = ("qpos", "qvel")
+MODEL = "model"
+_NAME = re.compile(r"([A-Za-z_]\w*)(?:\[([^\[\]]+)\])?")
+_SWITCHES = {"on": True, "off": False, "true": True, "false": False}
+_TIMES = ("x", "×")  # behind a number: times the model's own value
+_MOST = 10**6  # values of one factor
+_DIGITS = 12  # of the values of a grid, so that 0.6 is not 0.6000000000000001
+
+
+@dataclass(frozen=True)
+class Vary:
+    """One thing that a sweep varies.
+
+    Attributes:
+        name: As typed, without the place: "damping", "qpos", "model", "gain".
+        place: What of it: "elbow_flex" of qpos[elbow_flex]; "" for all.
+        kind: Whether it is a variant of the model, an option of `Model.replace`, a coordinate
+            of the start, or a parameter of the user's function.
+        values: Those of a list or a grid; empty where it is sampled.
+        bounds: Between which it is sampled; None for a list or a grid.
+        times: Whether the numbers are times the model's own value.
+    """
+
+    name: str
+    place: str = ""
+    kind: Kind = "option"
+    values: tuple[Value, ...] = ()
+    bounds: tuple[float, float] | None = None
+    times: bool = False
+
+    @property
+    def label(self) -> str:
+        """Name and place: "qpos[elbow_flex]"."""
+        return f"{self.name}[{self.place}]" if self.place else self.name
+
+    @property
+    def column(self) -> str:
+        """Its column in the dataset."""
+        return f"vary.{self.label}"
+
+    @property
+    def numeric(self) -> bool:
+        """Whether its values are numbers."""
+        return self.bounds is not None or is_number(self.values[0])
+
+    @property
+    def extremes(self) -> tuple[Value, ...]:
+        """The values that a check has to look at."""
+        return self.values if self.bounds is None else self.bounds
+
+    @property
+    def typed(self) -> str:
+        """The option that says it."""
+        if self.bounds is not None:
+            return f"{self.label}={':'.join(self._word(end) for end in self.bounds)}"
+        return f"{self.label}={','.join(self._word(value) for value in self.values)}"
+
+    def _word(self, value: Value) -> str:
+        if isinstance(value, bool):
+            return "on" if value else "off"
+        if isinstance(value, str):
+            return value
+        return f"{value:.15g}{'x' if self.times else ''}"
+
+
+def is_number(value: object) -> bool:
+    """Whether it is a number, and no switch."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def parse_vary(
+    words: Iterable[str], options: Collection[str], parameters: Collection[str] = ()
+) -> tuple[Vary, ...]:
+    """What words NAME=a,b,c, NAME=lo:hi:count and NAME=lo:hi say.
+
+    Args:
+        words: As typed behind `--vary`.
+        options: Names that `Model.replace` takes on the backends of the sweep.
+        parameters: Of the user's function.
+
+    Raises:
+        UnknownNameError: There is nothing of this name.
+        BadInputError: A word is none, or two of them vary the same.
+    """
+    found: dict[str, Vary] = {}
+    for word in words:
+        vary = _parsed(word, options, parameters)
+        if vary.label in found:
+            raise BadInputError(f"{vary.label} is varied twice")
+        found[vary.label] = vary
+    for vary in found.values():
+        if vary.place and vary.name in found:
+            raise BadInputError(f"{vary.name} and {vary.label} are both varied: name one of them")
+    return tuple(found.values())
+
+
+def _parsed(word: str, options: Collection[str], parameters: Collection[str]) -> Vary:
+    label, sign, text = word.partition("=")
+    match = _NAME.fullmatch(label.strip())
+    if not (sign and text and match):
+        raise BadInputError(
+            "--vary wants NAME=a,b,c, NAME=from:to:count or, with --samples, NAME=from:to; got "
+            f"{shown(word)}"
+        )
+    name, place = match[1], match[2] or ""
+    kind = _kind(name, place, options, parameters)
+    if kind == MODEL or ":" not in text:
+        words = [each.strip() for each in text.split(",")]
+        values, times = _values(label, words, kind)
+        return Vary(name, place, kind, values, None, times)
+    parts = text.split(":")
+    (low, high), times = _values(label, parts[:2], kind)
+    if not (is_number(low) and is_number(high)):
+        raise BadInputError(f"{label}={text} wants numbers on both sides of the colon")
+    assert isinstance(low, float)
+    assert isinstance(high, float)
+    if not low < high:
+        raise BadInputError(f"{label}={text} wants the smaller number first")
+    if len(parts) == 2:
+        return Vary(name, place, kind, (), (low, high), times)
+    if len(parts) > 3 or not parts[2].isdigit() or not 2 <= int(parts[2]) <= _MOST:
+        raise BadInputError(f"{label}={text} wants from:to:count, with a count from 2 to {_MOST:,}")
+    grid = tuple(float(f"{x:.{_DIGITS}g}") for x in np.linspace(low, high, int(parts[2])))
+    return Vary(name, place, kind, grid, None, times)
+
+
+def _kind(name: str, place: str, options: Collection[str], parameters: Collection[str]) -> Kind:
+    if name == MODEL or name in STATES:
+        if (name == MODEL) == bool(place):
+            raise BadInputError(
+                "model is varied as a whole: model=so101/scene,so101/scene_box"
+                if place
+                else f"{name} is varied one coordinate at a time: {name}[JOINT]=…"
+            )
+        return MODEL if name == MODEL else "state"
+    if name in options and name in parameters:
+        raise BadInputError(
+            f"{name} is an option of the model and a parameter of the function: give the "
+            "parameter another name"
+        )
+    if name in options:
+        return "option"
+    if name in parameters and not place:
+        return "parameter"
+    raise unknown_name("thing to vary", name, [*options, MODEL, *STATES, *parameters])
+
+
+def _values(label: str, words: list[str], kind: Kind) -> tuple[tuple[Value, ...], bool]:
+    """The values of words, and whether they are times the model's own."""
+    values: list[Value] = []
+    scaled = []
+    for word in words:
+        if not word:
+            raise BadInputError(f"{label} has an empty value")
+        value, times = (word, False) if kind == MODEL else _value(word)
+        values.append(value)
+        scaled.append(times)
+    if len({type(value) for value in values}) > 1 or len(set(scaled)) > 1:
+        raise BadInputError(
+            f"{label} mixes values of different kinds: {', '.join(words)}; numbers, numbers with "
+            "an x behind (times the model's own), on and off, or names"
+        )
+    if any(scaled) and kind != "option":
+        raise BadInputError(f"{label} has no value of the model's own: leave the x out")
+    if len(set(values)) < len(values):
+        raise BadInputError(f"{label} has a value twice: {', '.join(words)}")
+    return tuple(values), scaled[0]
+
+
+def _value(word: str) -> tuple[Value, bool]:
+    if word.lower() in _SWITCHES:
+        return _SWITCHES[word.lower()], False
+    times = word.endswith(_TIMES)
+    try:
+        number = float(word[:-1] if times else word)
+    except ValueError:
+        return word, False
+    if not np.isfinite(number):
+        raise BadInputError(f"{word} is no finite number")
+    return number + 0.0, times  # no negative zero
