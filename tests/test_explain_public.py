@@ -64,4 +64,4 @@ def test_public_robots(path):
     assert found.brought == 0.0
     assert found.is_explained
     if not found.is_rounding:
-        assert sum(each.share for each in found.shares) == pytest.approx(1.0, abs=0.02)
+        assert sum(each.share or 0.0 for each in found.shares) == pytest.approx(1.0, abs=0.02)
