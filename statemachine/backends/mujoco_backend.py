@@ -9,12 +9,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal, NoReturn, cast
+from typing import Any, Literal, cast
 
 import mujoco
 import numpy as np
 
-from ..errors import BadInputError, DivergedError, EngineError
+from ..errors import BadInputError
 from ..interface import (
     BEHAVIOURS,
     FORCES,
@@ -31,7 +31,7 @@ from ..interface import (
 )
 from ..interface.checks import HUGE, TINY, check_finite
 from ._delays import hold
-from ._mujoco_alarms import AlarmError, Alarms, pass_on
+from ._mujoco_alarms import AlarmError, Alarms, ended, gave_up, pass_on, resets_itself
 from .compiled import (
     check_numbers,
     compile_file,
@@ -98,7 +98,7 @@ def _capabilities(raw: mujoco.MjModel) -> Capabilities:
     behaviours = {name: _NOTES.get(name, _NATIVE) for name in BEHAVIOURS}
     if raw.opt.integrator == int(mujoco.mjtIntegrator.mjINT_RK4):
         behaviours["stale after a step"] = _WITH_RK4
-    if not raw.opt.disableflags & int(_DISABLE.mjDSBL_AUTORESET):
+    if resets_itself(raw):
         behaviours["no automatic reset"] = _WITH_RESET
     asleep = bool(raw.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP))
     if asleep:
@@ -163,13 +163,24 @@ class MujocoModel(Model):
         try:
             return MujocoData(self)
         except (MemoryError, mujoco.FatalError) as error:
-            raise _gave_up(error) from error
+            raise gave_up(error) from error
+
+    def _make_worlds(
+        self, n: int, workers: int, derived: tuple[str, ...], options: dict[str, Any]
+    ) -> Any:
+        from ._mujoco_worlds import MujocoWorlds
+
+        models = [
+            self._replace({name: values[world] for name, values in options.items()})
+            for world in range(n if options else 0)
+        ]
+        return MujocoWorlds(self, models, (n, workers), derived, _layout(self))
 
     def _replace(self, options: dict[str, Any]) -> MujocoModel:
         try:
             raw = edited(self.raw, options)
         except (MemoryError, mujoco.FatalError) as error:
-            raise _gave_up(error) from error
+            raise gave_up(error) from error
         if "integrator" in options:
             raw.opt.integrator = int(_INTEGRATORS[options["integrator"]])
         substeps = options.get("substeps", self.substeps)
@@ -288,33 +299,17 @@ class MujocoData(Data):
 
     def _failed(self, error: Exception) -> None:
         if isinstance(error, mujoco.FatalError):
-            gave_up = _gave_up(error)
-            self._give_up(str(gave_up))
-            raise gave_up from error
+            fatal = gave_up(error)
+            self._give_up(str(fatal))
+            raise fatal from error
         if isinstance(error, AlarmError):
-            self._raise(error.quantity, error.index, error.time)
-
-    def _raise(self, quantity: str, index: int, time: float) -> NoReturn:
-        """Give up, because of an entry that was no number at a time [s]."""
-        entry = f"{quantity}[{index}]{self._home._coordinate_name(quantity, index)}"
-        facts = {"quantity": quantity, "index": index, "time": time}
-        if quantity == "ctrl":
-            self._give_up(f"it was stepped with a bad {entry}")
-            raise BadInputError(
-                f"{entry} was no number at time {time:g} s: MuJoCo stepped as if ctrl were zero. "
-                "This Data now takes only reset and set_state",
-                **facts,
-            ) from None
-        self._give_up(f"{entry} was not finite at time {time:g} s")
-        raise DivergedError(
-            f"{entry} became NaN, infinite or huge at time {time:g} s. "
-            "This Data now takes only reset and set_state",
-            **facts,
-        ) from None
-
-
-def _gave_up(error: Exception) -> EngineError:
-    return EngineError(f"MuJoCo gave up: {' '.join(str(error).split()) or 'out of memory'}")
+            entry = f"{error.quantity}[{error.index}]"
+            entry += self._home._coordinate_name(error.quantity, error.index)
+            if error.quantity == "ctrl":
+                self._give_up(f"it was stepped with a bad {entry}")
+            else:
+                self._give_up(f"{entry} was not finite at time {error.time:g} s")
+            raise ended(self._home, error, "This Data") from None
 
 
 def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:
