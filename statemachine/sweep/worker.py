@@ -158,7 +158,7 @@ _loaded, _on_robot, _replaced = _Kept(8), _Kept(8), _Kept(4)
 
 
 class _OutOfTimeError(BaseException):
-    """The time is up: raised wherever the process is, and nobody takes it for an error of theirs."""
+    """The time is up: raised wherever the process is; nobody takes it for an error of theirs."""
 
 
 @contextmanager
