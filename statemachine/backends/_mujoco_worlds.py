@@ -7,7 +7,7 @@ by running it once more alone, from where the call began.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import mujoco
@@ -42,7 +42,9 @@ class MujocoWorlds(Worlds):
     """Rows of a Batch. Inputs and derived arrays are views of its memory."""
 
     _batch: Any  # Batch; None once closed
-    _models: Sequence[Model]  # one for each world where they differ, else none
+    _base: Model
+    _varied: bool
+    _history: Any  # (n, nhistory), or None
     _layout: tuple[str, tuple[tuple[str, int], ...]]
     _warned: Any  # (n, kinds, 2) the engine's counters: last index, number
     _told: Any  # what they were when they were last looked at
@@ -50,31 +52,38 @@ class MujocoWorlds(Worlds):
     def __init__(
         self,
         model: Model,
-        models: Sequence[Model],
+        base: Model,
         size: tuple[int, int],
         derived: tuple[str, ...],
+        varied: tuple[Mapping[str, Any], bool],
         layout: tuple[str, tuple[tuple[str, int], ...]],
     ) -> None:
         """Make the worlds.
 
         Args:
             model: The Model, of this engine.
-            models: One for each world where they differ, else none.
+            base: What the worlds share: `model`, with what is the same for all.
             size: Number of worlds and of threads.
             derived: Names of derived arrays.
+            varied: Arrays (n, ...) of the compiled model that each world has of its own, by
+                name, and whether constants of it follow from them.
             layout: Of the States, after their fingerprint.
         """
-        raw = model.raw
+        raw = base.raw
         try:
             batch = Batch(raw, *size, persistent=bool(raw.opt.enableflags & _SLEEP))
-            if models:
-                batch.set_models([each.raw for each in models])
+            for name, value in varied[0].items():
+                batch.expand(name)[:] = value
+            if varied[1]:
+                batch.set_const()
             arrays = {name: batch.bind(name) for name in (*WRITABLE, *derived)}
         except (MemoryError, mujoco.FatalError) as error:
             raise gave_up(error) from error
         except ValueError as error:  # what a Batch cannot do
             raise _unsupported(error) from error
-        self._batch, self._models, self._layout = batch, models, layout
+        self._batch, self._layout, self._base = batch, layout, base
+        self._varied = bool(varied[0])
+        self._history = batch.bind("history") if raw.nhistory else None
         self._warned, self._told = batch.warning, batch.warning.copy()
         # A copy of what a step changes in a row, to run a world again from there.
         whole = resets_itself(raw) or any(mujoco.mj_stateSize(raw, int(part)) for part in _LATE)
@@ -85,10 +94,13 @@ class MujocoWorlds(Worlds):
         listen_for(self)
 
     def model_of(self, world: int) -> Model:
-        return self._models[world] if self._models else self.model
+        if not self._varied:
+            return self._base
+        self._refuse_if_troubled()
+        return self._base.with_compiled(self._batch.get_model(world))
 
     def _close(self) -> None:
-        for name in ("_changing", "_before", "_warned", "_told", "_batch"):
+        for name in ("_changing", "_before", "_warned", "_told", "_history", "_batch"):
             setattr(self, name, None)
 
     def _step(self, ids: Ints, nstep: int) -> Mapping[int, Exception]:
@@ -107,10 +119,10 @@ class MujocoWorlds(Worlds):
         return self._call(ids, 0, self._batch.forward)
 
     def _engine_steps(self, nstep: int) -> int:
-        count = nstep * self.model.substeps
+        count = nstep * self._base.substeps
         if count >= 2**31:  # the engine counts in a C int
             raise BadInputError(
-                f"nstep {nstep} × {self.model.substeps} substeps is too large for one call"
+                f"nstep {nstep} × {self._base.substeps} substeps is too large for one call"
             )
         return count
 
@@ -185,11 +197,11 @@ class MujocoWorlds(Worlds):
     def _reset(self, ids: Ints, key: int | None) -> None:
         if len(ids):
             self._batch.reset(ids, -1 if key is None else key, _NO_STAGE)
+            if self._history is not None:  # as of a Data: the command before was that of the start
+                history = self._history[ids]
+                hold(self._base.raw, history, self.ctrl[ids])
+                self._history[ids] = history
             self._told[ids] = self._warned[ids]
-        if key is not None and self.model.raw.nhistory:
-            history = self._batch.bind("history")
-            for world in ids.tolist():
-                hold(self.model_of(world).raw, history[world], self.ctrl[world])
         listen()
 
     def _get_state(self, world: int) -> State:
@@ -202,7 +214,7 @@ class MujocoWorlds(Worlds):
         self._reset(self._numbers[world : world + 1], None)
         self._batch.state[world] = state.vector
 
-    def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
+    def _state_layout(self, world: int) -> tuple[str, tuple[tuple[str, int], ...]]:
         return self._layout
 
     def _record(

@@ -30,7 +30,8 @@ from ..interface import (
     State,
 )
 from ..interface.checks import HUGE, TINY, check_finite
-from ._delays import hold
+from ._delays import hold, needed
+from ._edits import CONSTANTS_FOLLOW, changes, put
 from ._mujoco_alarms import AlarmError, Alarms, ended, gave_up, pass_on, resets_itself
 from .compiled import (
     check_numbers,
@@ -170,11 +171,39 @@ class MujocoModel(Model):
     ) -> Any:
         from ._mujoco_worlds import MujocoWorlds
 
-        models = [
-            self._replace({name: values[world] for name, values in options.items()})
-            for world in range(n if options else 0)
-        ]
-        return MujocoWorlds(self, models, (n, workers), derived, _layout(self))
+        base, varied = self._varied(options) if options else (self, {})
+        follow = bool(CONSTANTS_FOLLOW & options.keys())
+        return MujocoWorlds(self, base, (n, workers), derived, (varied, follow), _layout(base))
+
+    def _varied(self, options: dict[str, Any]) -> tuple[MujocoModel, dict[str, Any]]:
+        """What worlds share, and the arrays of the compiled model that each has of its own.
+
+        Args:
+            options: Checked options of `replace`, each with a value for each world.
+
+        Returns:
+            A Model, and (n, ...) arrays by name; see `changes`.
+        """
+        given = {name: np.array(values) for name, values in options.items()}
+        substeps = given.pop("substeps", np.array([self.substeps]))
+        if (substeps != substeps[0]).any():
+            raise BadInputError("substeps must be the same in all worlds: they step together")
+        # As `_replace` would, so that a timestep is the same to the last bit.
+        base = self._replace({"substeps": int(substeps[0])})
+        varied = changes(base.raw, given)
+        if "integrator" in given:
+            codes = [int(_INTEGRATORS[name]) for name in options["integrator"]]
+            varied["opt.integrator"] = np.array(codes)
+        if "timestep" in given:
+            lengths = [step_length(length, base.substeps, {}) for length in options["timestep"]]
+            varied["opt.timestep"] = np.array(lengths)
+        raw = base.raw
+        for name in [name for name, value in varied.items() if not np.ndim(value)]:
+            put(raw, name, varied.pop(name))  # a flag that is the same for all
+        delay = varied.get("actuator_delay", raw.actuator_delay)
+        timestep = np.asarray(varied.get("opt.timestep", raw.opt.timestep))
+        steps = needed(delay, timestep[..., None]).reshape(-1, raw.nactuator)
+        return MujocoModel(with_room(raw, steps.max(axis=0)), self.path, base.substeps), varied
 
     def _replace(self, options: dict[str, Any]) -> MujocoModel:
         try:
