@@ -29,6 +29,7 @@ from ..interface import (
 from ..interface.checks import HUGE
 from ..interface.options import checked_options
 from . import _bullet_urdf as urdf
+from ._bullet_client import MOST_CLIENTS
 from ._bullet_driven import DrivenWorld
 from ._bullet_plan import Plan
 from ._bullet_scope import check, ignored, softness
@@ -111,6 +112,8 @@ def _capabilities(as_it_comes: bool, max_qvel: Array | None = None, soft: str = 
         behaviours={name: behaviours[name] for name in BEHAVIOURS},
         shared_model=False,
         exact_restore=False,
+        # A Model has two clients of its own: the still copy and the look-ahead.
+        data_per_process=MOST_CLIENTS // 3,
     )
 
 
