@@ -59,7 +59,7 @@ class Task(ABC):
     name: ClassVar[str]
     id: ClassVar[str]
     scene: ClassVar[str]
-    keyframe: ClassVar[str | None]
+    keyframe: ClassVar[str | None] = None
     episode: ClassVar[int]
     near: ClassVar[float]
 
@@ -103,7 +103,8 @@ class Task(ABC):
 
     def outside(self, observations: Array) -> NDArray[np.bool_]:
         """(n,) Which are no observations of this task: an engine has lost the scene there."""
-        return ~((observations >= self.low) & (observations <= self.high)).all(axis=1)
+        inside = (observations >= self.low) & (observations <= self.high)  # NaN is not
+        return np.logical_not(inside.all(axis=1))
 
     @abstractmethod
     def point(self, qpos: Array, tip: Array) -> Array:
@@ -140,7 +141,6 @@ class Reach(Task):
     name = "reach"
     id = "statemachine/Reach-v0"
     scene = "so101/scene"
-    keyframe = None
     episode = 100
     near = 0.01
 
@@ -190,7 +190,7 @@ class HeldBox(Task):
         super().__init__(backend, frame_skip)
         model = self.model
         self.box = int(model.jnt_qposadr[model.joint_id("box")])
-        keyframe = model.keyframes[model.key_id(self.keyframe)]
+        keyframe = model.keyframes[model.key_id("held")]
         self._middle, self._half = keyframe.ctrl, np.array(self.around)
         held = keyframe.qpos
         self._arm = held[: self.box]

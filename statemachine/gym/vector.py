@@ -84,22 +84,15 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         self.single_action_space = Box(-1, 1, (self.model.nu,), dtype=np.float32)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._draws = [seeding.np_random() for _ in range(self.num_envs)]
+        # One for each world: what `np_random` and `np_random_seed` of the base class give.
+        made = [seeding.np_random() for _ in range(self.num_envs)]
+        self._np_random: Any = [rng for rng, _ in made]
+        self._np_random_seed: Any = [drawn for _, drawn in made]
         self._targets = np.zeros((self.num_envs, 3))
         self._seen = np.zeros((self.num_envs, len(self.task.low)))
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
         self._ended = np.zeros(self.num_envs, dtype=np.bool_)
         self._begun = np.zeros(self.num_envs, dtype=np.bool_)
-
-    @property
-    def np_random(self) -> Any:
-        """The random numbers of each world."""
-        return tuple(rng for rng, _ in self._draws)
-
-    @property
-    def np_random_seed(self) -> Any:
-        """The seed of each world."""
-        return tuple(seed for _, seed in self._draws)
 
     def reset(
         self,
@@ -126,7 +119,7 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         seeds = self._seeds(seed)
         for world in np.flatnonzero(mask).tolist():
             if seeds[world] is not None:
-                self._draws[world] = seeding.np_random(seeds[world])
+                self._np_random[world], self._np_random_seed[world] = seeding.np_random(seeds[world])
         self._start(mask)
         return self._seen.copy(), self._infos(mask, np.zeros_like(mask))
 
@@ -193,7 +186,7 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         worlds, task = self.worlds, self.task
         reset(worlds, ids=which, keyframe=task.keyframe)
         for world in np.flatnonzero(which).tolist():
-            start = task.start(self._draws[world][0])
+            start = task.start(self._np_random[world])
             self._targets[world] = start.target
             if start.qpos is not None:
                 worlds.qpos[world] = start.qpos
