@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -17,6 +18,8 @@ from benchmarks.interleave import Ratio, interleaved
 from statemachine import __version__
 from statemachine.scenarios.runs import silent
 from statemachine.traces import recorder
+from statemachine.worlds import make_worlds
+from statemachine.worlds import step as step_worlds
 
 STEPS = 500
 
@@ -230,6 +233,26 @@ def _reading_emulated(name: str, rounds: int, where: str, target: list[float]) -
     return interleaved(steps(lambda _: None), others, rounds)
 
 
+def pooled(name: str, rounds: int) -> list[Ratio]:
+    """Worlds on PyBullet, in processes, against as many Data stepped one after the other."""
+    model, count, steps = sm.load(name, backend="pybullet"), 8, STEPS // 20
+    singles = [sm.make_data(model) for _ in range(count)]
+    pools = {
+        f"PyBullet, {count} worlds, {words}": make_worlds(model, count, workers=workers)
+        for workers, words in ((1, "a process"), (2, "two processes"))
+    }
+
+    def serial() -> None:
+        for data in singles:
+            sm.step(model, data, steps)
+
+    others = {words: partial(step_worlds, worlds, steps) for words, worlds in pools.items()}
+    ratios = interleaved(serial, others, max(1, rounds // 5))
+    for worlds in pools.values():
+        worlds.close()
+    return ratios
+
+
 def freshness(name: str, rounds: int) -> list[Ratio]:
     """What `sm.freshness` and a watch cost: nothing to a step when they are not in use.
 
@@ -304,6 +327,7 @@ BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None]] = [
     (kinematics, "so101", 0.8),
     (emulation, "so101/scene", 1.8),
     (reading_emulated, "so101/scene", 1.5),
+    (pooled, "so101/scene", None),
     (freshness, "so101", 1.02),
     (reading, "so101", None),
     (recording, "so101", 1.10),

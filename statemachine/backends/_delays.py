@@ -24,34 +24,34 @@ _SMALL = """<mujoco><worldbody><body><joint name="j"/><geom size="1"/></body></w
 def delay_steps(m: mujoco.MjModel) -> Ints:
     """Engine steps (nu,) by which each number of ctrl acts late."""
     owner = np.repeat(np.arange(m.nactuator), m.actuator_ctrlnum)
-    steps = np.minimum(_needed(m), m.actuator_history[:, 0])
-    return steps[owner]
+    steps = needed(m.actuator_delay, m.opt.timestep)
+    return np.minimum(steps, m.actuator_history[:, 0])[owner]
 
 
-def _needed(m: mujoco.MjModel) -> Ints:
-    """Commands (nactuator,) that have to be kept: the first in time is taken."""
-    return np.ceil(m.actuator_delay / m.opt.timestep - 1e-9).astype(np.int64)
+def needed(delay: Array, timestep: Array | float) -> Ints:
+    """Commands that have to be kept for delays [s], of any shape: the oldest acts."""
+    return np.ceil(delay / timestep - 1e-9).astype(np.int64)
 
 
-def with_room(m: mujoco.MjModel, least: int = 0) -> mujoco.MjModel:
+def with_room(m: mujoco.MjModel, least: Ints | int = 0) -> mujoco.MjModel:
     """The same model, with a buffer for the delay of every actuator; itself if it has them.
 
     Args:
         m: The compiled model, with its timestep and delays.
-        least: Commands to keep, if more than the delays need.
+        least: Commands to keep, (nactuator,), where more than the delays need.
     """
-    needed = np.maximum(_needed(m), least)
-    short = np.flatnonzero((needed > m.actuator_history[:, 0]) & (needed > 0))
+    kept = np.maximum(needed(m.actuator_delay, m.opt.timestep), least)
+    short = np.flatnonzero(kept > m.actuator_history[:, 0])
     if not len(short):
         return m
     # Two numbers of the buffer's own, and a time and a command for each that is kept.
-    sizes = 2 + needed[short] * (1 + m.actuator_ctrlnum[short])
+    sizes = 2 + kept[short] * (1 + m.actuator_ctrlnum[short])
     starts = m.nhistory + np.cumsum([0, *sizes])
     blob = _saved(m)
     at = _history_offset()
     blob[at : at + 8] = np.frombuffer(struct.pack("<q", int(starts[-1])), np.uint8)
     roomy = mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": blob.tobytes()})
-    roomy.actuator_history[short, 0] = needed[short]
+    roomy.actuator_history[short, 0] = kept[short]
     roomy.actuator_historyadr[short] = starts[:-1]
     return roomy
 
