@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ..errors import BadInputError, DivergedError, EngineError, unknown_name
 from ..installed import DEFAULT
 from ..interface import Array, forward, make_data, reset, step
+from .render import TaskPictures
 from .tasks import Task, make_task
 
 FRAME_SKIP = 4  # timesteps of 5 ms: 50 commands a second
@@ -65,6 +66,7 @@ class ArmEnv(gymnasium.Env[Array, ArrayLike]):
         self.metadata = metadata_of(self.task)
         self.observation_space = Box(self.task.low, self.task.high, dtype=np.float64)
         self.action_space = Box(-1, 1, (self.model.nu,), dtype=np.float32)
+        self._pictures = TaskPictures(self.task)
         self._target: Array | None = None
 
     def reset(
@@ -90,7 +92,7 @@ class ArmEnv(gymnasium.Env[Array, ArrayLike]):
         """
         if self._target is None:
             raise ResetNeeded("call reset before step: no episode has begun")
-        self.data.ctrl[:] = self.task.ctrl(action, (self.model.nu,))
+        self.data.ctrl = self.task.ctrl(action, (self.model.nu,))
         try:
             step(self.model, self.data, self.task.frame_skip)
             forward(self.model, self.data)
@@ -105,11 +107,14 @@ class ArmEnv(gymnasium.Env[Array, ArrayLike]):
 
     def render(self) -> Any:
         """A picture (height, width, 3) uint8 of the present moment; None without a render mode."""
-        return None
+        if self.render_mode is None:
+            return None
+        return self._pictures.of(self.data.qpos[None])[0]
 
     def close(self) -> None:
         """Give back what the engine holds. Idempotent."""
         self.data.close()
+        self._pictures.close()
 
     def _rows(self) -> tuple[Array, Array, Array, Array]:
         assert self._target is not None

@@ -25,7 +25,7 @@ _UNIT = 1 + 1e-9  # of a quaternion's number, which rounding may leave above 1
 _FAR = 10.0  # m; how far away a point may be in an observation
 
 
-class Start(NamedTuple):
+class EpisodeStart(NamedTuple):
     """Where an episode starts, beyond the task's keyframe: `qpos` (nq,) or None, `target` (3,)."""
 
     qpos: Array | None
@@ -33,7 +33,7 @@ class Start(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class StateWorth:
     """What a state is worth, each (n,): [m], [1], and whether it is so."""
 
     distance: Array
@@ -111,11 +111,11 @@ class Task(ABC):
         """(n, 3) what is to come to the target, of rows of qpos (n, nq) and fingertips (n, 3)."""
 
     @abstractmethod
-    def start(self, rng: np.random.Generator) -> Start:
+    def start(self, rng: np.random.Generator) -> EpisodeStart:
         """Draw an episode; the same numbers on every backend."""
 
     @abstractmethod
-    def outcome(self, observations: Array) -> Outcome:
+    def outcome(self, observations: Array) -> StateWorth:
         """What observations (n, k) are worth."""
 
     def _bounds(self) -> tuple[Array, Array]:
@@ -148,7 +148,7 @@ class Reach(Task):
         """The fingertip."""
         return tip
 
-    def start(self, rng: np.random.Generator) -> Start:
+    def start(self, rng: np.random.Generator) -> EpisodeStart:
         """Near the default pose; the target is the fingertip of another pose."""
         model = self.model
         qpos = rng.uniform(-0.05, 0.05, model.nq)
@@ -158,13 +158,13 @@ class Reach(Task):
             pose[-1] = 0.0
             tip, touching = self._poses(pose)[0], self._poses.touching
             if not touching and tip[2] > 0.03:
-                return Start(qpos, tip)
+                return EpisodeStart(qpos, tip)
 
-    def outcome(self, observations: Array) -> Outcome:
+    def outcome(self, observations: Array) -> StateWorth:
         """It never ends before its time, as the fingertip is to stay there."""
         distance = _length(observations[:, -3:])
         never = np.zeros(len(distance), dtype=np.bool_)
-        return Outcome(distance, -distance, distance < self.near, never)
+        return StateWorth(distance, -distance, distance < self.near, never)
 
 
 class HeldBox(Task):
@@ -202,23 +202,24 @@ class HeldBox(Task):
         """The middle of the box."""
         return qpos[:, self.box : self.box + 3]
 
-    def start(self, rng: np.random.Generator) -> Start:
+    def start(self, rng: np.random.Generator) -> EpisodeStart:
         """From the keyframe; the target is where the box would be in another pose."""
-        spread = np.array(self.spread)
+        spread, (low, high) = np.array(self.spread), self.model.jnt_range[: len(self.spread)].T
         while True:
-            tip, turn = self._poses(self._arm + rng.uniform(-spread, spread))
+            pose = np.clip(self._arm + rng.uniform(-spread, spread), low, high)
+            tip, turn = self._poses(pose)
             target = tip + turn @ self._in_hand
             far = np.linalg.norm(target - self._from)
             if not self._poses.touching and target[2] > self._from[2] and far > 2 * self.near:
-                return Start(None, target)
+                return EpisodeStart(None, target)
 
-    def outcome(self, observations: Array) -> Outcome:
+    def outcome(self, observations: Array) -> StateWorth:
         """It ends when the box is no longer between the jaws."""
         tip, way = observations[:, -9:-6], observations[:, -3:]
         away = observations[:, self.box : self.box + 3] - tip
         distance, dropped = _length(way), _length(away) > self.lost
         success = (distance < self.near) & ~dropped
-        return Outcome(distance, ~dropped - distance, success, dropped)
+        return StateWorth(distance, ~dropped - distance, success, dropped)
 
 
 TASKS: dict[str, type[Task]] = {task.name: task for task in (Reach, HeldBox)}

@@ -20,6 +20,7 @@ from ..interface import Array
 from ..interface.checks import as_count
 from ..worlds import forward, make_worlds, reset, step
 from .env import FRAME_SKIP, check_render_mode, metadata_of
+from .render import TaskPictures
 from .tasks import make_task
 
 _SEEN = "site_xpos"
@@ -88,6 +89,7 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         made = [seeding.np_random() for _ in range(self.num_envs)]
         self._np_random: Any = [rng for rng, _ in made]
         self._np_random_seed: Any = [drawn for _, drawn in made]
+        self._pictures = TaskPictures(self.task)
         self._targets = np.zeros((self.num_envs, 3))
         self._seen = np.zeros((self.num_envs, len(self.task.low)))
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
@@ -119,7 +121,9 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         seeds = self._seeds(seed)
         for world in np.flatnonzero(mask).tolist():
             if seeds[world] is not None:
-                self._np_random[world], self._np_random_seed[world] = seeding.np_random(seeds[world])
+                self._np_random[world], self._np_random_seed[world] = seeding.np_random(
+                    seeds[world]
+                )
         self._start(mask)
         return self._seen.copy(), self._infos(mask, np.zeros_like(mask))
 
@@ -161,9 +165,14 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         infos |= self._infos(np.ones(self.num_envs, dtype=np.bool_), diverged)
         return self._seen.copy(), rewards, terminated, truncated, infos
 
+    def render(self) -> Any:
+        """A picture (height, width, 3) uint8 of each world; None without a render mode."""
+        return None if self.render_mode is None else self._pictures.of(self.worlds.qpos)
+
     def close_extras(self, **kwargs: Any) -> None:
         """Give back threads, processes and memory."""
         self.worlds.close()
+        self._pictures.close()
 
     def _advance(self, going: Flags, ctrl: Array) -> Flags:
         """Step worlds, and see where they are; which diverged. Of these the last is kept."""
