@@ -169,7 +169,8 @@ def compare(
     trees = [GroupTree(renamed(robots[0], rename or {})), GroupTree(robots[1])]
     found = diff(trees[0], trees[1], frames, digits, seed, own_ways(*engines))
     skipped = list[str]()
-    if engines == (None, None) and any(robot.format != "URDF" for robot in robots):
+    compiled = all(engine in (None, DEFAULT) for engine in engines)
+    if compiled and any(robot.format != "URDF" for robot in robots):
         rows, skipped = one_list(
             found.differences,
             [resolve(m, menagerie) for m in (one, two)],
