@@ -155,7 +155,7 @@ def test_the_box_is_held_by_the_action_0_and_dropped_by_open_jaws(backend: str) 
             assert not terminated
             assert not truncated
             assert reward == 1 - info["distance"]
-        steps = 0
+        steps, terminated, reward, info = 0, False, 0.0, {}
         while not terminated:
             _, reward, terminated, truncated, info = env.step(np.eye(6, dtype=np.float32)[5])
             steps += 1
@@ -199,13 +199,11 @@ def test_what_was_before_decides_nothing(backend: str) -> None:
         assert runs[0].tobytes() == runs[1].tobytes()
 
 
-def _against_single(
-    task: str, backend: str, mode: AutoresetMode, workers: int, steps: int, n: int = 3
-) -> int:
+def _against_single(task: str, backend: str, mode: AutoresetMode, workers: int, steps: int) -> int:
     """Ours against Gymnasium's own loop over single ones; how many episodes ended."""
     ours = _make_vec(task, backend, n, workers=workers, autoreset_mode=mode, max_episode_steps=9)
     theirs = _make_vec(
-        task, backend, n, vectorization_mode="sync", max_episode_steps=9,
+        task, backend, 3, vectorization_mode="sync", max_episode_steps=9,
         vector_kwargs={"autoreset_mode": mode},
     )  # fmt: skip
     assert isinstance(ours, ArmVectorEnv)
@@ -224,11 +222,11 @@ def _against_single(
             over = one[2] | one[3]
             ended += int(over.sum())
             if mode is AutoresetMode.DISABLED and over.any():
-                seeds = [7, None, 2][:n]
-                again = [each.reset(seed=seeds, options={"reset_mask": over.copy()})
+                again = [each.reset(seed=[7, None, 2], options={"reset_mask": over.copy()})
                          for each in (ours, theirs)]  # fmt: skip
                 _same(*again)
-        assert tuple(ours.np_random_seed) == theirs.np_random_seed
+        seeds: Any = ours.np_random_seed
+        assert tuple(seeds) == theirs.np_random_seed
         _same(ours.reset(), theirs.reset())
     return ended
 
@@ -297,7 +295,7 @@ def test_what_leaves_the_observation_space_has_diverged() -> None:
 def test_no_command_within_the_ranges_leaves_the_space(task: str, backend: str) -> None:
     """The hardest ones: from end to end of every joint."""
     with _make(task, backend) as env:
-        rng = np.random.default_rng(0)
+        rng, action = np.random.default_rng(0), np.zeros(6, dtype=np.float32)
         for seed in range(6):
             env.reset(seed=seed)
             for k in range(60):
