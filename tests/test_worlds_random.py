@@ -121,6 +121,19 @@ def test_no_world_has_a_compiled_model_of_its_own(box: Any) -> None:
     assert f"{mujoco.mj_sizeModel(box.raw) / 1e6:.1f} MB" in page
 
 
+def test_a_model_without_actuators(tmp_path: Any) -> None:
+    path = tmp_path / "ball.xml"
+    path.write_text(
+        "<mujoco><option><flag gravity='disable'/></option><worldbody><body><freejoint/>"
+        "<geom size='.1'/></body></worldbody></mujoco>"
+    )
+    model = sm.load(path)
+    gravity = [[0, 0, -9.81], [0, 0, -1.62]]
+    with make_worlds(model, 2, gravity=gravity, timestep=[0.01, 0.02]) as many:
+        worlds.step(many, 10)
+        np.testing.assert_allclose(many.qvel[:, 2], [-0.981, -0.324], rtol=1e-12)
+
+
 def test_a_state_moves_to_a_data_of_the_worlds_model(box: Any) -> None:
     """Commands on their way, too, of which each world has room for as many as the slowest."""
     options: dict[str, Any] = {"latency": [0.0, 0.03, 0.1], "kp": [500.0, 900.0, 998.0]}
