@@ -155,6 +155,11 @@ PRINTS = {
     "docs/robots.md": ("True {}",),
     "docs/sweeps.md": ("2 done, 0 missing",),
     "docs/traces.md": ("101 (101, 6)",),
+    "docs/worlds.md": (
+        "(64, 13) (64, 2, 3)",
+        "\nTrue\n(64, 10, 13)\n1 of 64 worlds diverged and is left out",
+        "[0.05 0.05 0.02]",
+    ),
 }
 
 
