@@ -20,13 +20,13 @@ import numpy as np
 
 from .. import backends
 from ..errors import BusyDataError, EngineError, StateMachineError, UnsupportedError
-from ..interface import INPUTS, Array, Ints, Model, State
+from ..interface import Array, Ints, Model, State
 from ..interface.data import alone
 from ..interface.worlds import Worlds
 from ..processes import free_memory
 from ._process import WorldsProcess, end_all, lost_worlds
 from ._protocol import ANSWER_MOST, Verb
-from ._shared import Layout, Shapes, SharedBlock, arrays_in, laid_out
+from ._shared import SharedBlock, arrays_in, laid_out, shapes_of
 
 _PATIENCE = 2.0  # seconds in which a process has to end a step that was interrupted
 _SCRATCH = 1 << 24  # bytes for what belongs to a command, at least
@@ -79,7 +79,7 @@ class PoolWorlds(Worlds):
             "options": dict(options),
             "model": _pickled(model),
         }
-        shapes = _shapes(model, n, derived)
+        shapes = shapes_of(model, n, derived)
         row = sum(8 * int(np.prod(shape)) for shape, _ in shapes.values())
         self._scratch = max(_SCRATCH, 2 * _WORDS + 2 * row, _WORDS + len(pickle.dumps(job)))
         self._answers = -(-self._scratch // _WORDS) * _WORDS
@@ -306,7 +306,8 @@ class PoolWorlds(Worlds):
         most = max(1, (self._scratch - 2 * _WORDS) // max(1, row))
         while start < rows and len(ids):
             count = min(most, rows - start)
-            layout = _record_layout(sources, count)
+            sizes = {name: (self.n, count, *array.shape[2:]) for name, array in sources.items()}
+            layout, _ = laid_out({name: (size, "f8") for name, size in sizes.items()}, _WORDS)
             shared = arrays_in(self._block.memory, layout)
             part = slice(start, start + count)
             if ctrl is not None:
@@ -322,22 +323,6 @@ class PoolWorlds(Worlds):
             ids = ids[~np.isin(ids, list(ended))]
             start += count
         return errors
-
-
-def _shapes(model: Model, n: int, derived: Sequence[str]) -> Shapes:
-    sizes = {"qpos": (model.nq,), "ctrl": (model.nu,), "time": ()}
-    sizes |= {"xpos": (model.nbody, 3), "xquat": (model.nbody, 4)}
-    sizes |= {"site_xpos": (model.nsite, 3), "site_xmat": (model.nsite, 9)}
-    floats = {name: (n, *sizes.get(name, (model.nv,))) for name in (*INPUTS, "time", *derived)}
-    shapes = {name: (shape, "f8") for name, shape in floats.items()}
-    return {**shapes, "ids": ((n,), "u1"), "rows": ((n,), "i8")}
-
-
-def _record_layout(sources: Mapping[str, Array], rows: int) -> Layout:
-    shapes = {
-        name: ((array.shape[0], rows, *array.shape[2:]), "f8") for name, array in sources.items()
-    }
-    return laid_out(shapes, _WORDS)[0]
 
 
 def _pickled(model: Model) -> bytes:

@@ -6,7 +6,7 @@
   engine's own is the part `reading` of its room
 - `diff`: every difference with its size, entered into a `ledger`; by subject in `_places`,
   `_joints`, `_solids`, `_shapes`, `_settings`
-- `_one_list`: joins that with the list of compiled models that `..why` explains a gap with
+- `_one_list`, `_told`: joins that with the list of compiled models that `..why` explains a gap with
 - `engines`: what engines do of themselves
 """
 
