@@ -201,7 +201,7 @@ def test_what_was_before_decides_nothing(backend: str) -> None:
 
 def _against_single(task: str, backend: str, mode: AutoresetMode, workers: int, steps: int) -> int:
     """Ours against Gymnasium's own loop over single ones; how many episodes ended."""
-    ours = _make_vec(task, backend, n, workers=workers, autoreset_mode=mode, max_episode_steps=9)
+    ours = _make_vec(task, backend, 3, workers=workers, autoreset_mode=mode, max_episode_steps=9)
     theirs = _make_vec(
         task, backend, 3, vectorization_mode="sync", max_episode_steps=9,
         vector_kwargs={"autoreset_mode": mode},
