@@ -835,3 +835,16 @@ def test_an_option_that_would_be_ignored_or_is_none_is_refused(
     assert done.returncode == 2
     assert not done.stdout
     assert said in done.stderr
+
+
+def test_pictures_of_a_lesson(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("matplotlib")
+    file = tmp_path / "hold.svg"
+    assert main(["lesson", "hold", "--no-questions", "--plot", str(file)]) == 0
+    assert "distance to the goal" in file.read_text(encoding="utf-8")
+    before = file.read_bytes()
+    assert main(["lesson", "hold", "--no-questions", "--plot", str(file)]) == 0
+    assert file.read_bytes() == before
+    capsys.readouterr()
+    assert main(["lesson", "hold", "--no-questions", "--plot", str(tmp_path / "hold.txt")]) == 2
+    assert ".svg" in capsys.readouterr().err

@@ -100,6 +100,9 @@ def _add_lesson(named: Any, lesson: Lesson) -> None:
             metavar=None if option.choices else "X,X,…" if option.many else option.key.upper(),
             help=option.help + default,
         )
+    parser.add_argument(
+        "--plot", default=None, metavar="FILE", help="write its pictures: .svg, .png or .pdf"
+    )
     parser.set_defaults(run=run, lesson=lesson)
 
 
@@ -153,7 +156,15 @@ def run(options: argparse.Namespace) -> int:
         raise BadInputError(f"--further goes with the whole path: {PROGRAM} lesson --further")
     values = {option.key: getattr(options, option.key) for option in lesson.options}
     reader = _reader(options, lesson)
+    if options.plot is not None:
+        from ..report.plot import check_suffix
+
+        check_suffix(Path(options.plot))
     page, results = _compute(options, lesson, options.model, values)
+    if options.plot is not None:
+        from ..report.figures import write_pictures
+
+        write_pictures(page.blocks, Path(options.plot))
     names = list(LESSONS)
     later = names[names.index(lesson.name) + 1 :]
     following = f"{PROGRAM} lesson {later[0]}" if later else "python exercises/step_loop.py"

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..backends import load as load_model
-from ..comparison.text import capital, count, duration, listed
+from ..comparison.text import count, duration, listed
 from ..interface import Data, Model, make_data
 from ..interface import reset as reset_data
 from ..interface import step as step_data
@@ -275,16 +275,15 @@ def _shared(results: Mapping[str, WorldsSpeed]) -> str:
 
 def _told(result: WorldsSpeed) -> str:
     """The most that many worlds save, in a sentence."""
-    best = max(result.costs, key=lambda cost: cost.faster.median)
     some = [k for k in range(len(result.costs)) if all(c.faster.low > 1 for c in result.costs[k:])]
-    pays = result.costs[some[0]] if some else None
-    text = (
-        f"best with {count(best.n, 'world')}: a step of one takes {duration(best.step)}, and "
-        f"{best.faster.median:.2f} times as many steps are taken as with one Data in bulk. "
+    if not some:
+        return "A gain beyond the noise was not seen, now and on this machine."
+    best = max(result.costs[some[0] :], key=lambda cost: cost.faster.median)
+    return (
+        f"From {count(result.costs[some[0]].n, 'world')} on the gain is beyond the noise. The most "
+        f"is seen with {count(best.n, 'world')}: a step of one takes {duration(best.step)}, and "
+        f"{best.faster.median:.2f} times as many steps are taken as with one Data in bulk."
     )
-    if pays is None:
-        return capital(f"{text}A gain beyond the noise was not seen.")
-    return capital(f"{text}From {count(pays.n, 'world')} on the gain is beyond the noise.")
 
 
 def _spread(cost: WorldsCost) -> str:

@@ -3,42 +3,77 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
-from ..errors import MissingEngineError
-from ..page import Pipeline, Slots, Traces
+from ..errors import BadInputError, MissingEngineError
+from ..page import Block, Pipeline, Slots, Traces
+from ..traces.whole import replace_file
 from .log_axis import LogAxis
 
 _COLOURS = ("#1f5fa8", "#c2571a", "#2f8f4e", "#8a4fa0", "#b03a48", "#6b6b6b", "#3aa6a6")
 _INK, _PAPER, _BELOW = "#222222", "#ffffff", "#f0f0f0"  # the last: behind the level of zero
+_DOTS = 200  # a PNG has to an inch
 _POWERS = 8  # that a log axis names, at most
 
+Figure = Traces | Slots | Pipeline
 
-def svg(picture: Traces | Slots | Pipeline) -> str:
+
+def svg(picture: Figure) -> str:
     """A picture as SVG; the same figures give the same text.
 
     Raises:
         MissingEngineError: matplotlib is not installed.
     """
+    return _drawn([picture], "svg").decode()
+
+
+def write_pictures(blocks: Sequence[Block], path: Path) -> int:
+    """Write all pictures among these blocks into one file, one below the other; how many.
+
+    Args:
+        blocks: Of a page.
+        path: A file .svg, .png or .pdf, written whole or not at all.
+
+    Raises:
+        BadInputError: There is no picture among them.
+        MissingEngineError: matplotlib is not installed.
+    """
+    pictures = [block for block in blocks if isinstance(block, Traces | Slots | Pipeline)]
+    if not pictures:
+        raise BadInputError("this lesson has no picture to write")
+    content = _drawn(pictures, path.suffix.lower().lstrip("."))
+    replace_file(path, lambda out: out.write(content))
+    return len(pictures)
+
+
+def _drawn(pictures: Sequence[Figure], form: str) -> bytes:
     try:
         import matplotlib
-        from matplotlib.figure import Figure
+        from matplotlib.figure import Figure as Sheet
     except ImportError as error:
         raise MissingEngineError(
             "pictures need matplotlib: pip install 'statemachine-sim[docs]'", engine="matplotlib"
         ) from error
+    sizes = [_SIZES[type(picture)](picture) for picture in pictures]
     # Text as paths would be twice as large; without a salt and a date each run differs.
     with matplotlib.rc_context(
         {"svg.fonttype": "none", "svg.hashsalt": "statemachine", "text.parse_math": False}
     ):
-        figure = Figure(figsize=_SIZES[type(picture)](picture), facecolor=_PAPER)
-        axes = figure.add_subplot()
-        cast("Callable[[Any, Any], None]", _DRAW[type(picture)])(axes, picture)
-        out = io.StringIO()
-        figure.savefig(out, format="svg", bbox_inches="tight", metadata={"Date": None})
+        size = max(width for width, _ in sizes), sum(height for _, height in sizes)
+        sheet = Sheet(figsize=size, facecolor=_PAPER, layout=None if len(sizes) == 1 else "tight")
+        ratios = {"height_ratios": [height for _, height in sizes]}
+        every = sheet.subplots(len(sizes), squeeze=False, gridspec_kw=ratios)
+        for axes, picture in zip(every[:, 0], pictures, strict=True):
+            cast("Callable[[Any, Any], None]", _DRAW[type(picture)])(axes, picture)
+            if len(sizes) > 1:
+                axes.set_title(picture.title, loc="left", fontsize="medium")
+        out = io.BytesIO()
+        date = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form)
+        sheet.savefig(out, format=form, dpi=_DOTS, bbox_inches="tight", metadata=date)
     return out.getvalue()
 
 
