@@ -51,28 +51,29 @@ def step(name: str, rounds: int) -> list[Ratio]:
 def guards(name: str, rounds: int) -> list[Ratio]:
     """What of a step is the guard against a second thread, and the look at the warnings.
 
-    The baseline is the engine's step bound to its arguments; the others add one thing each.
+    The baseline is the engine's own step; the others add one thing each.
     """
     model = sm.load(name)
     bare, guarded, looking = (sm.make_data(model) for _ in range(3))
 
     def steps() -> None:
-        advance = bare._advance
+        advance, args = bare._advance, (bare._raw_model, bare._raw)
         for _ in range(STEPS):
-            advance()
+            advance(*args)
 
     def in_turn() -> None:
-        advance, turn = guarded._advance, guarded._turn
+        advance, args = guarded._advance, (guarded._raw_model, guarded._raw)
+        turn = guarded._turn
         for _ in range(STEPS):
             if turn.free is model:
                 del turn.free
-                advance()
+                advance(*args)
                 turn.free = model
 
     def watched() -> None:
-        advance = looking._advance
+        advance, args = looking._advance, (looking._raw_model, looking._raw)
         for _ in range(STEPS):
-            advance()
+            advance(*args)
             if looking._warned != looking._told:
                 looking._attend()
 

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 import statemachine as sm
 from statemachine.compare.why import Explanation, explain
 from statemachine.scenarios import Scenario
@@ -231,3 +233,60 @@ SERVO = """
 def servo(mass: float = 1.0, load: float = 1.0, kp: float = 200.0) -> str:
     """A slide that a servo holds against its weight: it sags by (mass + load) g / kp."""
     return SERVO.format(mass=mass, load=load, kp=kp, kv=2 * (kp * (mass + load)) ** 0.5)
+
+
+def mesh(size: float = 0.05, order: int | None = None, corners: int = 20, noise: float = 0) -> str:
+    """The arm with a ball that is a mesh, its corners drawn by a seed and in an order of choice."""
+    random = np.random.default_rng(0)
+    points = random.normal(size=(corners, 3))
+    points *= size / np.linalg.norm(points, axis=1)[:, None]
+    points += noise * random.normal(size=points.shape)
+    if order is not None:
+        points = np.random.default_rng(order).permutation(points)
+    text = " ".join(repr(float(each)) for each in points.ravel())
+    asset = f'<asset><mesh name="m" vertex="{text}"/></asset><worldbody>'
+    return ARM.replace("<worldbody>", asset).replace(
+        f'{_BALL} size="0.05"', f'{_BALL} type="mesh" mesh="m"'
+    )
+
+
+def hills(wave: float = 1.0, points: int = 9) -> str:
+    """The arm above a height field instead of a floor."""
+    heights = np.abs(np.sin(wave * np.arange(points * points)))
+    text = " ".join(f"{each:.4f}" for each in heights)
+    asset = (
+        f'<asset><hfield name="h" nrow="{points}" ncol="{points}" size="2 2 0.05 0.1" '
+        f'elevation="{text}"/></asset><worldbody>'
+    )
+    return ARM.replace("<worldbody>", asset).replace(
+        '<geom name="floor" type="plane" size="2 2 0.1"/>',
+        '<geom name="floor" type="hfield" hfield="h"/>',
+    )
+
+
+def equality(text: str) -> str:
+    """The arm with an equality."""
+    return ARM.replace("<actuator>", f"<equality>{text}</equality><actuator>")
+
+
+def ledge(words: str) -> str:
+    """The arm with a ledge under the ball, of a body that does not move."""
+    body = (
+        f'<body name="ledge" pos="0.6 0 0.02" {words}><geom name="ledge" type="box" '
+        'size="0.1 0.1 0.02"/></body><body name="ball"'
+    )
+    return ARM.replace('<body name="ball"', body)
+
+
+def lowered(text: str) -> str:
+    """The same arm with the frame of its second link put 5 cm down on it."""
+    for old, new in (
+        (f"{_LOWER}>", '<body name="lower" pos="0 0 -0.25">'),
+        ('<inertial mass="0.3" pos="0 0 -0.08"', '<inertial mass="0.3" pos="0 0 -0.03"'),
+        (_ELBOW, f'{_ELBOW} pos="0 0 0.05"'),
+        ('fromto="0 0 0 0 0 -0.15"', 'fromto="0 0 0.05 0 0 -0.1"'),
+        ('name="tip" pos="0 0 -0.15"', 'name="tip" pos="0 0 -0.1"'),
+    ):
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return text

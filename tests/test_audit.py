@@ -395,7 +395,7 @@ def bulk_is_one_long(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def faulty(model: Any, raw: Any) -> Callable[..., None]:
         step = right(model, raw)
-        return lambda nstep=1: step(nstep + (nstep > 1))
+        return lambda model, raw, nstep=1: step(model, raw, nstep + (nstep > 1))
 
     monkeypatch.setattr(mujoco_backend, "_transition", faulty)
 
@@ -420,11 +420,11 @@ def one_disturbs_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
     def faulty(model: Any, raw: Any) -> Callable[..., None]:
         step = right(model, raw)
 
-        def stepped(nstep: int = 1) -> None:
+        def stepped(*args: Any) -> None:
             if last[0] is not raw and raw.time > 0.21:  # neither is on its way to the start
                 nudge(raw)
             last[0] = raw
-            step(nstep)
+            step(*args)
 
         return stepped
 
@@ -452,7 +452,7 @@ FAULTS: dict[str, tuple[str, Patch, tuple[str, str]]] = {
     ),
     "forward takes a step": (
         "look",
-        before("_recompute", lambda data: data._advance()),
+        before("_recompute", lambda data: data._advance(data._raw_model, data._raw)),
         ("interface", "forward"),
     ),
     "a read perturbs": (

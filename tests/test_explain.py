@@ -13,7 +13,20 @@ from statemachine.compare.why.shapley import shapley
 from statemachine.scenarios import scenario
 
 from .conftest import ROOT, need_engine
-from .explained import ALONE, ARM, SWING, Case, changed, explained, servo
+from .explained import (
+    ALONE,
+    ARM,
+    SWING,
+    Case,
+    changed,
+    equality,
+    explained,
+    hills,
+    ledge,
+    lowered,
+    mesh,
+    servo,
+)
 
 HOME = replace(SWING, keyframe="home")
 STILL = replace(SWING, controller=lambda _model, _seed: lambda _time, _data: [0.0])
@@ -168,6 +181,64 @@ def test_another_way_of_saying_it_is_no_difference(name, tmp_path):
     )
     assert found.is_rounding
     assert found.is_explained
+
+
+EQUIVALENT = {
+    "mesh in another order": (mesh(), mesh(order=1)),
+    "connect swapped": (
+        equality('<connect body1="lower" body2="ball" anchor="0 0 -0.1"/>'),
+        equality('<connect body1="ball" body2="lower" anchor="-0.6 0 0"/>'),
+    ),
+    "weld swapped": (
+        equality('<weld body1="lower" body2="ball" anchor="-0.3 0 0.05"/>'),
+        equality('<weld body1="ball" body2="lower" anchor="0.3 0 -0.05"/>'),
+    ),
+    "weld in another frame": (
+        equality('<weld body1="ball" body2="lower" anchor="0 0 -0.1"/>'),
+        lowered(equality('<weld body1="ball" body2="lower" anchor="0 0 -0.05"/>')),
+    ),
+    "connect in another frame": (
+        equality('<connect body1="lower" body2="ball" anchor="0 0 -0.1"/>'),
+        lowered(equality('<connect body1="ball" body2="lower" anchor="-0.6 0 0"/>')),
+    ),
+    "mocap body fixed": (ledge('mocap="true"'), ledge("")),
+}
+
+
+@pytest.mark.parametrize("name", EQUIVALENT)
+def test_equivalent_meshes_equalities_and_still_bodies_are_no_difference(name, tmp_path):
+    left, right = EQUIVALENT[name]
+    found = explained(tmp_path, left, right, scenario=HOME, quantity="ball")
+    assert [each.name for each in found.shares if each.name != "start"] == []
+    assert found.is_explained
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "cause"),
+    [
+        (mesh(), mesh(size=0.055), "shape of ball_shape"),
+        (mesh(), mesh(noise=1e-4), "shape of ball_shape"),
+        (hills(), hills(2.0), "heights of floor"),
+        (
+            equality('<weld name="w" body1="lower" body2="ball" anchor="-0.3 0 0.05"/>'),
+            equality('<weld name="w" body1="ball" body2="lower" anchor="0.35 0 -0.05"/>'),
+            "what it keeps of w",
+        ),
+    ],
+)
+def test_a_mesh_a_height_field_and_a_swapped_weld_are_brought_over(left, right, cause, tmp_path):
+    found = explained(tmp_path, left, right, scenario=HOME, quantity="ball")
+    told = shares(found)
+    assert found.gap > 100 * found.negligible
+    assert told[cause] >= 0.95, told
+    assert found.brought is not None
+    assert found.brought <= 1e-9 * found.gap + 1e-12
+
+
+def test_another_size_of_a_mesh_or_of_a_height_field_is_refused_with_its_reason(tmp_path):
+    for left, right in ((mesh(), mesh(corners=30)), (hills(), hills(points=11))):
+        found = explained(tmp_path, left, right, scenario=HOME, quantity="ball")
+        assert [each.note.rpartition(" of ")[2] for each in found.shares] == ["another size"]
 
 
 def test_a_function_that_writes_by_number_meets_other_actuators(tmp_path):

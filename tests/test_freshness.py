@@ -539,7 +539,7 @@ def test_a_step_that_claims_to_be_fresh() -> None:
         data.ctrl[:] = 0.3
         bare = data._advance
         object.__setattr__(
-            data, "_advance", lambda *n: (bare(*n), mujoco.mj_forward(model.raw, data.raw))
+            data, "_advance", lambda *args: (bare(*args), mujoco.mj_forward(model.raw, data.raw))
         )
         sm.step(model, data, 20)
         assert sm.freshness(model, data)

@@ -47,10 +47,10 @@ class Gate:
         self.entered, self.leave = threading.Event(), threading.Event()
         advance = data._advance
 
-        def waiting(nstep: int = 1) -> None:
+        def waiting(*args: object) -> None:
             self.entered.set()
             assert self.leave.wait(30)
-            advance(nstep)
+            advance(*args)
 
         object.__setattr__(data, "_advance", waiting)
         self.thread = threading.Thread(target=sm.step, args=(model, data))
@@ -123,8 +123,8 @@ def test_a_hook_may_use_what_its_own_data_offers(monkeypatch: pytest.MonkeyPatch
     with sm.make_data(model) as data:
         advance = data._advance
 
-        def looking(nstep: int = 1) -> None:
-            advance(nstep)
+        def looking(*args: object) -> None:
+            advance(*args)
             seen.append(float(data.site_xpos[0, 0]) + sm.get_state(model, data).time)
 
         object.__setattr__(data, "_advance", looking)
@@ -323,7 +323,7 @@ model = sm.load("so101/scene_box")
 data, other = sm.make_data(model), sm.make_data(model)
 advance, begun, ended = data._advance, threading.Event(), threading.Event()
 
-def wait(*nstep):
+def wait(*args):
     begun.set()
     ended.wait(20)
 

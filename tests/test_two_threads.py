@@ -51,9 +51,9 @@ def _meanwhile(data: sm.Data, use: Callable[[], object]) -> list[Exception | Non
         else:
             raised.append(None)
 
-    def advance(*nstep: int) -> None:
+    def advance(*args: object) -> None:
         object.__setattr__(data, "_advance", right)
-        right(*nstep)
+        right(*args)
         thread = threading.Thread(target=work)
         thread.start()
         thread.join()

@@ -113,7 +113,7 @@ class Machine:
         self.world.command(self._ctrl)
         self._commanded = self._ctrl.tobytes()
 
-    def run(self, nstep: int = 1) -> None:
+    def run(self, _model: None, _data: None, nstep: int = 1) -> None:
         """Advance by `nstep` timesteps; all of it or, if anything is raised, nothing."""
         steps = nstep * self._substeps
         if steps >= 2**31:

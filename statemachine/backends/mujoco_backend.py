@@ -6,7 +6,6 @@ its own buffers, seen read-only.
 
 from __future__ import annotations
 
-import functools
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -167,7 +166,7 @@ class MujocoModel(Model):
 class MujocoData(Data):
     """An MjData. Inputs and derived arrays are views of its memory."""
 
-    __slots__ = ("_alarms", "_layout", "_raw", "_views")
+    __slots__ = ("_alarms", "_layout", "_views")
 
     _raw: mujoco.MjData | None
     _alarms: Any  # Alarms; None once closed
@@ -181,10 +180,16 @@ class MujocoData(Data):
         views = {name: getattr(raw, name).view() for name in (*POSES, "qacc", *FORCES)}
         for view in views.values():
             view.setflags(write=False)
-        self._raw, self._views, self._alarms = raw, views, alarms
+        self._views, self._alarms = views, alarms
         self._layout = _layout(model)
         inputs = {name: getattr(raw, name).view() for name in INPUTS}
-        super().__init__(model, _transition(model, raw), inputs, (alarms.now, alarms.seen))
+        super().__init__(
+            model,
+            _transition(model, raw),
+            inputs,
+            (alarms.now, alarms.seen),
+            (model.raw, raw),
+        )
 
     @property
     def raw(self) -> mujoco.MjData:
@@ -259,7 +264,7 @@ class MujocoData(Data):
         self.raw.time = time
 
     def _close(self) -> None:
-        self._raw = self._alarms = None
+        self._alarms = None
         self._views.clear()
 
     def _attend(self) -> None:
@@ -298,30 +303,37 @@ def _gave_up(error: Exception) -> EngineError:
 
 
 def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:
-    """The engine's step bound to its arguments; Python runs only where it must."""
-    mj_step, engine_model, substeps = mujoco.mj_step, model.raw, model.substeps
-    bare = functools.partial(mj_step, engine_model, raw)
+    """The engine's step, of (mjModel, mjData, nstep=1); Python runs only where it must."""
+    mj_step, substeps = mujoco.mj_step, model.substeps
 
-    def finer(nstep: int = 1) -> None:
+    def finer(engine_model: mujoco.MjModel, engine_data: mujoco.MjData, nstep: int = 1) -> None:
         if nstep * substeps >= 2**31:  # the engine counts in a C int
             raise BadInputError(f"nstep {nstep} × {substeps} substeps is too large for one call")
-        bare(nstep * substeps)
+        mj_step(engine_model, engine_data, nstep * substeps)
 
-    advance = bare if substeps == 1 else finer
+    advance = mj_step if substeps == 1 else finer
     qpos, low, high = memoryview(raw.qpos), -TINY, TINY
     starts = [start for _, start in model._quaternions]
     if not starts:
         return advance
+    only = starts[0]
 
-    def checked(nstep: int = 1) -> None:
-        # MuJoCo takes a zero quaternion for the identity without a word. One whose first
-        # number is not zero is none, which is the cheapest look; others are looked at again.
+    # MuJoCo takes a zero quaternion for the identity without a word. One whose first number
+    # is not zero is none, which is the cheapest look; others are looked at again.
+    def checked(engine_model: mujoco.MjModel, engine_data: mujoco.MjData, nstep: int = 1) -> None:
         for start in starts:
             if low < qpos[start] < high:
-                model._check_quaternions(raw.qpos)
-        advance(nstep)
+                model._check_quaternions(engine_data.qpos)
+        advance(engine_model, engine_data, nstep)
 
-    return checked
+    def checked_one(
+        engine_model: mujoco.MjModel, engine_data: mujoco.MjData, nstep: int = 1
+    ) -> None:
+        if qpos[only] < high and qpos[only] > low:
+            model._check_quaternions(engine_data.qpos)
+        advance(engine_model, engine_data, nstep)
+
+    return checked_one if len(starts) == 1 else checked
 
 
 def _layout(model: MujocoModel) -> tuple[str, tuple[tuple[str, int], ...]]:

@@ -299,7 +299,7 @@ class Counterparts(Protocol):
 
 
 # An array of a compiled model or an option, where in it, and what is to stand there.
-Edit = tuple[str, tuple[int, ...], Any]
+Edit = tuple[str, tuple[int | slice, ...], Any]
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,8 @@ from .turns import HOLDERS, Turn, in_use_here
 
 T = TypeVar("T")
 # By name, so that type checkers take the inputs for the descriptors below.
-_SLOTS = ("_home", "_turn", "_trouble", "_advance", "_warned", "_told", *INPUTS)
+_ENGINE = ("_advance", "_raw_model", "_raw", "_warned", "_told")
+_SLOTS = ("_home", "_turn", "_trouble", *_ENGINE, *INPUTS)
 
 if TYPE_CHECKING:
 
@@ -72,7 +73,9 @@ class Data(ABC):
     _home: Model  # the owner
     _turn: Turn
     _trouble: str  # why the Data refuses; "" if it does not
-    _advance: Any  # the engine's own step: (nstep=1); None once closed
+    _advance: Any  # the engine's own step: (_raw_model, _raw, nstep=1)
+    _raw_model: Any  # what that takes; all of `_ENGINE` is None once closed
+    _raw: Any
     _warned: Any  # differs from `_told` when the engine has something to say
     _told: Any
     if TYPE_CHECKING:
@@ -93,18 +96,21 @@ class Data(ABC):
         advance: Callable[..., None],
         inputs: Mapping[str, Array],
         warnings: tuple[Any, Any] = (None, None),
+        engine: tuple[Any, Any] = (None, None),
     ) -> None:
         """Fill the slots; a backend's own `__init__` calls this.
 
         Args:
             model: The Model that makes this Data.
-            advance: The engine's own step, called with a number of steps or, for
-                one, with nothing.
+            advance: The engine's own step, called with the two of `engine` and, for more
+                than one step, their number. (Bound to them it would cost 0.5 % of a step.)
             inputs: The arrays qpos, qvel and ctrl, the same for the whole life.
             warnings: Two things of the engine's; when they differ after a step, the verb
                 calls `_attend`.
+            engine: The engine's model and data, or whatever `advance` takes first.
         """
         self._home, self._advance, self._turn = model, advance, Turn(model)
+        self._raw_model, self._raw = engine
         self._warned, self._told = warnings
         for name in INPUTS:
             super().__setattr__(name, inputs[name])
@@ -206,7 +212,8 @@ class Data(ABC):
             view = getattr(self, name)
             super().__setattr__(name, read_only(view))
             view.setflags(write=False)
-        self._advance = self._warned = self._told = None
+        for name in _ENGINE:
+            super().__setattr__(name, None)
         self._close()
 
     def __enter__(self) -> Data:

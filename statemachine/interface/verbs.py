@@ -62,27 +62,30 @@ def step(model: Model, data: Data, nstep: int = 1) -> None:
             del turn.free
             held = True
             if nstep is _ONE:  # by identity, which True and 1.0 do not pass
-                data._advance()
+                data._advance(data._raw_model, data._raw)
             else:
-                data._advance(as_count(nstep, "nstep"))
+                nstep = as_count(nstep, "nstep")
+                data._advance(data._raw_model, data._raw, nstep)
             if data._warned != data._told:
                 data._attend()
+            turn.free = model
             return
-    except Exception as error:
+    except BaseException as error:
         if held:
-            data._failed(error)
+            try:
+                if isinstance(error, Exception):
+                    data._failed(error)
+            finally:
+                turn.free = data._trouble or model  # pyright: ignore[reportPossiblyUnboundVariable]
             raise
         if not isinstance(error, AttributeError):
             raise
-    finally:
-        if held:
-            turn.free = data._trouble or model  # pyright: ignore[reportPossiblyUnboundVariable]
     _admit(model, data)
     alone(data, _step, data, as_count(nstep, "nstep"))
 
 
 def _step(data: Data, nstep: int) -> None:
-    data._advance(nstep)
+    data._advance(data._raw_model, data._raw, nstep)
     data._attend()
 
 

@@ -200,8 +200,8 @@ class Watch:
                 yield f"{name}[{place}]{self._model._coordinate_name(name, place)}"
 
     def _advancing(self, advance: Callable[..., None]) -> Callable[..., None]:
-        def counted(*nstep: int) -> None:
-            advance(*nstep)
+        def counted(*args: Any) -> None:
+            advance(*args)
             self._begin(1, False, None)
 
         return counted

@@ -10,7 +10,7 @@ import numpy as np
 from ..parts import Counterparts, Edit, ModelDifference
 from . import _fields as fields
 from ._figures import differing
-from ._solid import Solids, name_of
+from ._solid import Solids, name_of, solids_of
 
 Pairs = Sequence[tuple[int, int]]
 
@@ -32,7 +32,7 @@ class ElementPairs:
             "joint": dict(pairs.joints),
             "site": dict(pairs.sites),
             "geom": dict(geoms),
-            "body": dict(_bodies((Solids(one), Solids(two)), pairs)),
+            "body": dict(_bodies(solids_of(one, two, pairs), pairs)),
             "tendon": dict(_by_name(one, two, "tendon", "ntendon")),
         }
 

@@ -1,4 +1,4 @@
-"""What joints, geoms, tendons and equalities of two compiled models are set to."""
+"""What joints, geoms and tendons of two compiled models are set to."""
 
 from __future__ import annotations
 
@@ -16,13 +16,12 @@ from ._solid import HINGE, SLIDE, name_of
 
 _DOFS = {0: 6, 1: 3}  # mjtJoint, where it is not 1
 _OF_A_SLIDE = {"rad": "m", "N·m/rad": "N/m", "N·m": "N", "kg m²": "kg", "N·m·s": "N·s/m"}
-_KEEPS = {1: "body", 3: "joint", 5: "geom", 6: "site", 18: "tendon"}  # mjtObj
 _NUMBERED = (1, 2)  # mjtWrap: a joint with its coefficient, a pulley with its divisor
 _NO_WRAP = {1: "joint", 3: "site", 4: "geom", 5: "geom"}  # mjtWrap, what an entry refers to
 
 
 class Elements(ElementPairs):
-    """Bodies, joints, geoms, tendons and equalities."""
+    """Bodies, joints, geoms and tendons."""
 
     def found(self) -> Iterator[ModelDifference]:
         """What they differ in."""
@@ -33,7 +32,6 @@ class Elements(ElementPairs):
         meeting = [(a, b) for a, b in self._geoms if touching[0][a] or touching[1][b]]
         yield from self._rows("geom", fields.GEOM, meeting)
         yield from self._tendons()
-        yield from self._equalities()
 
     def _bodies(self) -> Iterator[ModelDifference]:
         """The weight that is taken off bodies; of a model without any, nothing is kept."""
@@ -138,39 +136,6 @@ class Elements(ElementPairs):
                 number = self._ids["site"].get(int(number), -2)
             found.append((kind, thing, number))
         return found
-
-    def _equalities(self) -> Iterator[ModelDifference]:
-        one, two = self._one, self._two
-        pairs = sorted(self._match_equalities())
-        yield from self._rows("equality", fields.EQUALITY, pairs)
-        for side, raw in enumerate((one, two)):
-            matched = {pair[side] for pair in pairs}
-            for k in set(range(raw.neq)) - matched:
-                if raw.eq_active0[k]:
-                    edits: tuple[Edit, ...] = (("eq_active0", (k,), False),)
-                    yield switched_off(side, raw, "equality", k, edits)
-
-    def _match_equalities(self) -> Iterator[tuple[int, int]]:
-        one, two = self._one, self._two
-        left = list(range(two.neq))
-        for a in range(one.neq):
-            ours = self._keeps(one, a, True)
-            fits = [b for b in left if self._keeps(two, b, False) == ours]
-            if fits:
-                left.remove(fits[0])
-                yield a, fits[0]
-
-    def _keeps(self, raw: Any, k: int, ours: bool) -> tuple[int, ...]:
-        kind = int(raw.eq_objtype[k])
-        ids = [int(raw.eq_obj1id[k]), int(raw.eq_obj2id[k])]
-        target = _KEEPS.get(kind)
-        if int(raw.eq_type[k]) == 2:
-            target = "joint"
-        elif int(raw.eq_type[k]) == 3:
-            target = "tendon"
-        if ours and target is not None:
-            ids = [self._ids[target].get(each, -1) if each >= 0 else -1 for each in ids]
-        return int(raw.eq_type[k]), kind, *ids
 
 
 def _sleeps(raw: Any) -> bool:

@@ -11,15 +11,16 @@ from ...description.records import HERE, Placement
 from ...installed import require
 from ...interface import Array
 from ..parts import BodyPair, Counterparts, Edit, ModelDifference
+from . import _meshes as meshes
 from ._element_pairs import switched_off
 from ._figures import plain, same
+from ._meshes import VERTEX
 from ._solid import NEAR, SolidPairs, apart, name_of, quat_of
 
 _PLANE, _HFIELD, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(8)  # mjtGeom
 _SIZES = {_SPHERE: 1, _CAPSULE: 2, _ELLIPSOID: 3, _CYLINDER: 2, _BOX: 3}
 _ROUND = (_CAPSULE, _CYLINDER)
 _WRAPPED = (4, 5)  # mjtWrap: a sphere, a cylinder
-_VERTEX = 1e-6  # [m]: vertices are single precision
 
 
 class Geoms(SolidPairs):
@@ -89,8 +90,8 @@ class Geoms(SolidPairs):
             why = "one of them is no primitive, and cannot become the other"
             yield ModelDifference("shape", "geom", name, values, refused=why)
             return
-        if kinds[0] == _HFIELD and not _same_hfield(one, two, a, b):
-            yield ModelDifference("heights", "geom", name, (), refused="another height field")
+        if kinds[0] == _HFIELD:
+            yield from meshes.heights(one, two, a, b, name)
         copied = ("geom_type", "geom_size", "geom_rbound", "geom_aabb", "geom_fluid")
         values = []
         if kinds[0] != kinds[1]:
@@ -123,27 +124,38 @@ class Geoms(SolidPairs):
         return ModelDifference("place", "geom", name, tuple(values), "m", edits)
 
     def _mesh(self, pair: BodyPair, a: int, b: int, name: str) -> Iterator[ModelDifference]:
+        """A mesh acts by its convex hull, whatever the order of its vertices and faces."""
+        one, two = self._one, self._two
         ours = pair.align.pos + self._solids[0].vertices(a) @ pair.align.mat.T
         theirs = self._solids[1].vertices(b)
-        if ours.shape != theirs.shape:
-            values = (("vertices", len(ours), len(theirs)),)
-            yield ModelDifference("shape", "geom", name, values, refused="it is another mesh")
+        corners = meshes.corners(one, a, ours), meshes.corners(two, b, theirs)
+        off = meshes.apart(*corners)
+        if off <= VERTEX:
             return
-        hulls = _hull(self._one, a), _hull(self._two, b)
-        if all(each is not None for each in hulls) and not same(*hulls):
-            values = (("corners of its hull", int(hulls[0][0]), int(hulls[1][0])),)
-            why = "it has another convex hull"
-            yield ModelDifference("hull", "geom", name, values, refused=why)
-        if np.abs(ours - theirs).max() <= _VERTEX:
-            return
-        meshes = [int(raw.geom_dataid[g]) for raw, g in ((self._one, a), (self._two, b))]
-        own = [_own_vertices(*each) for each in ((self._one, meshes[0]), (self._two, meshes[1]))]
-        if np.abs(own[0] - own[1]).max() <= _VERTEX:
+        own = [meshes.corners(raw, g, meshes.vertices(raw, g)) for raw, g in ((one, a), (two, b))]
+        if meshes.apart(*own) <= VERTEX:
             wanted, there = pair.align @ self._solids[0].geom(a), self._solids[1].geom(b)
             yield self._moved(pair, a, b, wanted, there, name)
             return
-        values = (("farthest vertex", 0.0, float(np.abs(ours - theirs).max())),)
-        yield ModelDifference("shape", "geom", name, values, "m", refused="it is another mesh")
+        values: tuple[tuple[str, Any, Any], ...] = (("farthest corner", 0.0, off),)
+        if len(corners[0]) != len(corners[1]):
+            values = (("corners of its hull", len(corners[0]), len(corners[1])),)
+        subject = "hull" if meshes.apart(ours, theirs) <= VERTEX else "shape"
+        others = [c for c in self._users(b) if c != b]
+        edits, why = meshes.brought(one, two, a, b)
+        if others:
+            edits, why = (), "another geom has this mesh, too"
+        if edits:
+            wanted, there = pair.align @ self._solids[0].geom(a), self._solids[1].geom(b)
+            edits += self._moved(pair, a, b, wanted, there, name).edits
+        unit = "m" if values[0][0] == "farthest corner" else ""
+        yield ModelDifference(subject, "geom", name, values, unit, edits, (), why)
+
+    def _users(self, geom: int) -> list[int]:
+        """Geoms of the second model that have the same mesh, and act."""
+        two = self._two
+        same_mesh = (two.geom_type == _MESH) & (two.geom_dataid == two.geom_dataid[geom])
+        return [g for g in _acting(two) if same_mesh[g]]
 
     def _extra(self) -> Iterator[ModelDifference]:
         """Geoms that only one has are switched off there."""
@@ -199,26 +211,3 @@ def _kind(kind: int) -> str:
 
 def _copied(raw: Any, field: str, index: int) -> Any:
     return np.array(getattr(raw, field)[index])
-
-
-def _own_vertices(raw: Any, mesh: int) -> Array:
-    start = int(raw.mesh_vertadr[mesh])
-    return np.asarray(raw.mesh_vert[start : start + int(raw.mesh_vertnum[mesh])], dtype=float)
-
-
-def _hull(raw: Any, geom: int) -> Any:
-    """What the compiler made of the convex hull of a mesh geom; None without one."""
-    start = int(raw.mesh_graphadr[raw.geom_dataid[geom]])
-    if start < 0:
-        return None
-    corners, faces = raw.mesh_graph[start : start + 2].tolist()
-    return raw.mesh_graph[start : start + 2 + 3 * corners + 6 * faces]
-
-
-def _same_hfield(one: Any, two: Any, a: int, b: int) -> bool:
-    parts = []
-    for raw, geom in ((one, a), (two, b)):
-        h = int(raw.geom_dataid[geom])
-        start, size = int(raw.hfield_adr[h]), int(raw.hfield_nrow[h]) * int(raw.hfield_ncol[h])
-        parts.append((raw.hfield_size[h], raw.hfield_data[start : start + size]))
-    return all(same(x, y) for x, y in zip(*parts, strict=True))

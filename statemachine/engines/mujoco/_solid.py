@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,19 +18,26 @@ NEAR = 1e-10  # [m], and of entries of matrices: less is rounding
 
 
 class Solids:
-    """The rigid parts of a compiled model, each by the body that is its head."""
+    """The rigid parts of a compiled model, each by the body that is its head.
 
-    def __init__(self, raw: Any) -> None:
+    Args:
+        raw: An mjModel.
+        still: Mocap bodies that are taken for a part of the world.
+    """
+
+    def __init__(self, raw: Any, still: Sequence[int] = ()) -> None:
         self.raw = raw
+        self._heads = np.array(raw.body_weldid)
+        self._heads[np.isin(self._heads, still)] = 0
         self._places: dict[int, Placement] = {}
 
     def head(self, body: int) -> int:
         """The first body of the rigid part that a body is in."""
-        return int(self.raw.body_weldid[body])
+        return int(self._heads[body])
 
     def members(self, head: int) -> list[int]:
         """All bodies of a rigid part."""
-        return np.flatnonzero(self.raw.body_weldid == head).tolist()
+        return np.flatnonzero(self._heads == head).tolist()
 
     def place(self, body: int) -> Placement:
         """The frame of a body in that of its rigid part."""
@@ -126,12 +134,34 @@ def name_of(raw: Any, kind: str, index: int) -> str:
     return f"{kind} {index}" + (f" on {on}" if on else "")
 
 
+def solids_of(one: Any, two: Any, pairs: Counterparts) -> tuple[Solids, Solids]:
+    """The rigid parts of two models; a mocap body that only one has is a part of the world."""
+    led = {pair.one for pair in pairs.solids}, {pair.two for pair in pairs.solids}
+    return Solids(one, _still(one, led[0])), Solids(two, _still(two, led[1]))
+
+
+def _still(raw: Any, led: set[int]) -> list[int]:
+    """Mocap bodies without a counterpart that a body fixed to the world would stand for.
+
+    A part that moves on one is not: it never touches a mocap body that carries it.
+    """
+    found = []
+    for body in np.flatnonzero(raw.body_mocapid >= 0).tolist():
+        tree = np.flatnonzero(raw.body_rootid == body)
+        places = raw.key_mpos.reshape(raw.nkey, -1, 3)[:, raw.body_mocapid[body]]
+        turns = raw.key_mquat.reshape(raw.nkey, -1, 4)[:, raw.body_mocapid[body]]
+        stays = (places == raw.body_pos[body]).all() and (turns == raw.body_quat[body]).all()
+        if body not in led and stays and not raw.body_dofnum[tree].any():
+            found.append(body)
+    return found
+
+
 class SolidPairs:
     """What of two compiled models is compared in the frames of their rigid parts."""
 
     def __init__(self, one: Any, two: Any, pairs: Counterparts) -> None:
         self._one, self._two, self._pairs = one, two, pairs
-        self._solids = Solids(one), Solids(two)
+        self._solids = solids_of(one, two, pairs)
         self._by_one = {pair.one: pair for pair in pairs.solids}
 
     def _pair_of(self, body: int) -> BodyPair | None:

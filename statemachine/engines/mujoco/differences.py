@@ -20,6 +20,7 @@ from . import _fields as fields
 from ._contact_pairs import ContactPairs
 from ._drives import Drives
 from ._elements import Elements
+from ._equalities import Equalities
 from ._figures import plain, same
 from ._geoms import Geoms
 from ._places import Places
@@ -57,6 +58,7 @@ def differences(
         *Places(one, two, pairs).found(),
         *geoms.found(),
         *Elements(one, two, pairs, geoms.geoms).found(),
+        *Equalities(one, two, pairs, geoms.geoms).found(),
         *Drives(one, two, pairs, geoms.geoms).found(),
         *ContactPairs(one, two, pairs, geoms.geoms).found(),
         *_whole(one, two),
@@ -89,7 +91,7 @@ def edited(raw: Any, edits: Iterable[Edit]) -> Any:
     return made
 
 
-def _set_option(raw: Any, name: str, index: tuple[int, ...], value: Any) -> None:
+def _set_option(raw: Any, name: str, index: tuple[Any, ...], value: Any) -> None:
     holder, _, field = name.rpartition(".")
     owner = getattr(raw, holder)
     if index:  # a bit of a set of flags

@@ -82,7 +82,10 @@ def advancing(instead: Instead) -> Fault:
         right = Data.__init__
 
         def init(self: Data, model: Any, advance: Any, *rest: Any) -> None:
-            right(self, model, lambda nstep=1: instead(self, advance, nstep), *rest)
+            def step(raw_model: Any, raw: Any, nstep: int = 1) -> None:
+                instead(self, lambda n: advance(raw_model, raw, n), nstep)
+
+            right(self, model, step, *rest)
 
         patch.setattr(Data, "__init__", init)
 
@@ -177,7 +180,7 @@ def no_forward(_data: Data, _right: Callable[[], None]) -> None:
 @hook("_recompute")
 def forward_steps(data: Data, _right: Callable[[], None]) -> None:
     """Step, where nothing but the derived values should change."""
-    data._advance()
+    data._advance(data._raw_model, data._raw)
 
 
 @hook("_reset")
