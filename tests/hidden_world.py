@@ -101,8 +101,10 @@ class ExampleModel(HiddenModel):
     def __init__(self, inner: MujocoModel) -> None:
         timestep = float(inner.raw.opt.timestep)  # of the engine, not of our step
         engine = inner
-        if inner.substeps > 1:
-            engine = cast("MujocoModel", inner.replace(substeps=1, timestep=timestep))
+        if inner.substeps > 1 or inner.actuator_delay.any():
+            # A HiddenData delays commands itself; the world gets those that act.
+            told = inner.replace(substeps=1, timestep=timestep, latency=0)
+            engine = cast("MujocoModel", told)
         names = ("engine_version", "path", "raw", "capabilities", "timestep", "substeps")
         super().__init__(
             partial(ExampleWorld, engine),

@@ -26,6 +26,7 @@ from .explained import (
     lowered,
     mesh,
     servo,
+    write,
 )
 
 HOME = replace(SWING, keyframe="home")
@@ -486,8 +487,10 @@ EASILY_MISSED = {
 def test_what_is_easily_missed(name, tmp_path):
     both, other, cause, *quantity = EASILY_MISSED[name]
     left = _with(LED, both)
+    # A delay shows only where the command changes.
+    scenario = HOME if "delay" in name else HOME_LEAVE
     found = explained(
-        tmp_path, left, _with(left, other), scenario=HOME_LEAVE, quantity=(*quantity, None)[0]
+        tmp_path, left, _with(left, other), scenario=scenario, quantity=(*quantity, None)[0]
     )
     assert found.gap > 100 * found.negligible
     assert list(shares(found)) == [cause]
@@ -585,3 +588,74 @@ def test_how_a_floating_body_turns_is_measured(tmp_path):
     found = explained(tmp_path, ARM, right, scenario=fall, quantity="ball, rotation")
     assert found.unit == "rad"
     assert shares(found) == {"place of ball_shape": pytest.approx(1.0)}
+
+
+def test_a_finer_list_goes_down_to_single_entries(tmp_path):
+    """What each entry of a place, an inertia, a range, gravity or a servo explains by itself."""
+    right = ARM
+    for old, new in (
+        ('<body name="lower" pos="0 0 -0.2">', '<body name="lower" pos="0.01 0 -0.21">'),
+        ('diaginertia="0.001 0.001 0.0002"', 'diaginertia="0.001 0.0012 0.0004"'),
+        ('range="-2 2"', 'range="-1.9 0.4"'),
+        (
+            '<position name="shoulder" joint="shoulder" kp="20" kv="1"/>',
+            '<position name="shoulder" joint="shoulder" kp="24" kv="1.5"/>',
+        ),
+        ('timestep="0.002"', 'timestep="0.002" gravity="0.5 0 -9"'),
+    ):
+        assert right.count(old) == 1
+        right = right.replace(old, new)
+    found = explained(tmp_path, ARM, right, scenario=HOME, finer=True, budget=40, seconds=0.5)
+    assert set(shares(found)) == {
+        *("place (x) of lower", "place (z) of lower"),
+        *("inertia (diaginertia[1]) of lower", "inertia (diaginertia[2]) of lower"),
+        *("range (lower end) of shoulder", "range (upper end) of shoulder"),
+        *("gains (kp) of shoulder", "gains (biasprm[2]) of shoulder"),
+        *("gravity (x)", "gravity (z)"),
+    }
+    assert found.brought is not None
+    assert found.brought <= 1e-9 * found.gap + 1e-12
+    values = {each.name: each.values for each in found.shares}
+    assert values["range (upper end) of shoulder"] == (("upper end", 2.0, 0.4),)
+    assert values["gravity (z)"] == (("z", -9.81, -9.0),)
+    # An entry that no motion depends on explains nothing: a hinge about y feels one moment.
+    told = shares(found)
+    assert abs(told["inertia (diaginertia[2]) of lower"]) < 1e-9
+    assert abs(told["inertia (diaginertia[1]) of lower"]) > 1e-6
+
+
+def test_entries_of_every_case_bring_the_right_to_the_left(tmp_path):
+    from statemachine.compare.matching import match_models
+    from statemachine.engines.mujoco._figures import same
+    from statemachine.engines.mujoco.differences import differences, edited, entries
+
+    for name, case in ALONE.items():
+        texts = (ARM, changed(ARM, case))
+        left, right = (sm.load(write(tmp_path, f"{k}.xml", text)) for k, text in enumerate(texts))
+        pairs = match_models(left, right)
+        found = differences(left.compiled, right.compiled, pairs)
+        parts = [part for each in found for part in entries(right.compiled, each)]
+        ways = [
+            edited(right.compiled, [edit for each in those for edit in each.edits])
+            for those in (found, parts)
+        ]
+        arrays = [n for n in dir(ways[0]) if isinstance(getattr(ways[0], n), np.ndarray)]
+        assert [n for n in arrays if not same(*(getattr(way, n) for way in ways))] == [], name
+
+
+def test_no_command_leaves_ctrl_as_it_is_on_both_sides(tmp_path):
+    """As in a run of two sides: what the left was told last holds, and each begins with its own."""
+    once = replace(
+        HOME, controller=lambda _m, _s: lambda time, _d: [0.8, -0.5] if time < 0.1 else None
+    )
+    found = explained(tmp_path, ARM, ARM.replace('kp="20"', 'kp="20.0"'), scenario=once)
+    assert found.is_rounding
+    silent = replace(HOME, controller=lambda _m, _s: lambda _time, _data: None)
+    right = ARM.replace('0.6 0 0.2 1 0 0 0  0" ctrl="0 0"', '0.6 0 0.2 1 0 0 0  0" ctrl="0.3 0"')
+    assert right != ARM
+    assert shares(explained(tmp_path, ARM, right, scenario=silent)) == {
+        "ctrl of the start": pytest.approx(1.0)
+    }
+    nothing = ARM[: ARM.index("<keyframe>")] + "</mujoco>"  # it starts in the left's
+    left = right
+    assert explained(tmp_path, left, nothing, scenario=silent).is_rounding

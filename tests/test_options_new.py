@@ -1,4 +1,4 @@
-"""Mass, friction and gains of `Model.replace`: values, errors, and what follows from them.
+"""Mass, friction, gains and latency of `Model.replace`: values, errors, and what follows from them.
 
 What they do to a motion is checked by `statemachine.conformance.options`, on every backend.
 """
@@ -124,10 +124,107 @@ def test_pybullet_says_which_frictions_it_cannot_have() -> None:
     assert caught[0].filename == __file__
 
 
+DELAYED = CART.format(
+    actuators='<motor joint="rail" delay=".007" nsample="{kept}" interp="{interp}"/>'
+    '<motor joint="other"/>'
+)
+
+
+def delayed(tmp_path: Path, backend: str, kept: int = 9, interp: str = "zoh") -> Any:
+    path = tmp_path / "delayed.xml"
+    path.write_text(DELAYED.format(kept=kept, interp=interp))
+    return sm.load(path, backend=backend)
+
+
+@pytest.mark.parametrize(("kept", "late"), [(9, 4), (2, 2)])
+def test_a_delay_of_the_file_is_kept(tmp_path: Path, backend: str, kept: int, late: int) -> None:
+    """7 ms are 4 steps of 2 ms; where the file keeps two commands, the older of them acts."""
+    model = delayed(tmp_path, backend, kept)
+    np.testing.assert_allclose(model.actuator_delay, [late * 0.002, 0])
+    with sm.make_data(model) as data:
+        data.ctrl[:] = 1
+        moved = []
+        for _ in range(6):
+            sm.step(model, data)
+            moved.append(data.qvel.copy() > 0)
+    assert [bool(rail) for rail, _ in moved] == [False] * late + [True] * (6 - late)
+    assert all(other for _, other in moved)
+
+
+def test_an_interpolated_delay_is_refused_on_pybullet(tmp_path: Path) -> None:
+    need_engine("pybullet")
+    with pytest.raises(UnsupportedError, match="interpolated latency"):
+        delayed(tmp_path, "pybullet", interp="linear")
+
+
+def test_latency_follows_the_timestep(backend: str) -> None:
+    model = sm.load("so101", backend=backend)
+    orders = (
+        model.replace(latency=0.03).replace(timestep=0.001),
+        model.replace(timestep=0.001).replace(latency=0.03),
+        model.replace(latency=0.03, timestep=0.001),
+        model.replace(timestep=0.01, latency=0.5).replace(timestep=0.001, latency=0.03),
+    )
+    for each in orders:
+        np.testing.assert_allclose(each.actuator_delay, 0.03, rtol=1e-12)
+    assert orders[0].timestep == 0.001
+    again = orders[0].replace(latency=orders[0].actuator_delay)
+    np.testing.assert_array_equal(again.actuator_delay, orders[0].actuator_delay)
+
+
+def test_a_latency_of_whole_steps_is_that_many_at_any_time(tmp_path: Path) -> None:
+    """MuJoCo's own delay of 70 ms at 10 ms a step is 7 steps or 8, by the rounding of time."""
+    model = cart(tmp_path, MOTOR).replace(timestep=0.01, latency=0.1).replace(latency=0.07)
+    literal = model.raw
+    late = {}
+    for name, delay in (("ours", literal.actuator_delay[0]), ("literal", 0.07)):
+        literal.actuator_delay[:] = delay
+        data = mujoco.MjData(literal)
+        found = set()
+        for k in range(3000):
+            data.ctrl[0] = k
+            mujoco.mj_step(literal, data)
+            if k > 10:
+                found.add(k - int(data.actuator_force[0]))
+        late[name] = found
+    assert late == {"ours": {7}, "literal": {7, 8}}
+
+
+def test_room_for_commands_changes_nothing_else() -> None:
+    """The compiled model goes through MuJoCo's own binary format."""
+    model = sm.load("so101/scene_box")
+    late = model.replace(latency=0.02)
+    changed = set()
+    for name in dir(model.raw):
+        value = getattr(model.raw, name) if not name.startswith("_") else None
+        if isinstance(value, (np.ndarray, int)):
+            other = getattr(late.raw, name)
+            if not np.array_equal(value, other, equal_nan=not isinstance(value, int)):
+                changed.add(name)
+    changed -= {"signature"}  # a digest of the sizes
+    assert changed == {"nhistory", "actuator_history", "actuator_historyadr", "actuator_delay"}
+    assert late.raw.names == model.raw.names
+
+
+def test_states_with_other_latencies_are_foreign(backend: str) -> None:
+    model = sm.load("so101", backend=backend)
+    late = model.replace(latency=0.02)
+    with sm.make_data(model) as data, sm.make_data(late) as other:
+        state = sm.get_state(model, data)
+        with pytest.raises(sm.errors.ForeignStateError):
+            sm.set_state(late, other, state)
+
+
+@pytest.mark.parametrize("value", [-0.1, 11.0, [0.1], np.nan, "long"])
+def test_latencies_that_are_none(backend: str, value: Any) -> None:
+    with pytest.raises(BadInputError, match="latency"):
+        sm.load("so101", backend=backend).replace(latency=value)
+
+
 def test_pybullet_as_it_comes_has_none_of_them() -> None:
     need_engine("pybullet")
     model = sm.load("so101", backend="pybullet", defaults="engine")
-    for name in ("mass", "friction", "kp", "kv"):
+    for name in ("mass", "friction", "kp", "kv", "latency"):
         with pytest.raises(UnsupportedError):
             model.replace(**{name: 1.0})
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from statemachine import conformance
-from statemachine.backends import _edits
+from statemachine.backends import _edits, mujoco_backend
 from statemachine.backends._mujoco_alarms import Alarms
 from statemachine.backends.mujoco_backend import MujocoData, MujocoModel
 from statemachine.grading.mutants import faults as mutants
@@ -75,6 +75,17 @@ def reset_computes(self: MujocoData, right: Callable[..., None], key: int | None
 def keyframe_forgets_ctrl(self: MujocoData, right: Callable[..., None], key: int | None) -> None:
     right(key)
     self.raw.ctrl[:] = 0
+
+
+def keyframe_forgets_the_commands_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mujoco_backend, "hold", lambda raw, history, ctrl: None)
+
+
+@replaced(MujocoData, "_set_state")
+def state_forgets_the_commands(self: MujocoData, right: Callable[..., None], state: State) -> None:
+    kept = self.raw.history.copy()
+    right(state)
+    self.raw.history[:] = kept
 
 
 @replaced(MujocoData, "_set_state")
@@ -242,6 +253,15 @@ FAULTS: dict[str, tuple[Patch, set[str]]] = {
     "kp without its other half": (
         changes_with("actuator_biasprm"),
         {"gains_are_those_of_the_servo"},
+    ),
+    "latency is ignored": (changes_with("actuator_delay"), {"latency_delays_a_command"}),
+    "before a keyframe there was no command": (
+        keyframe_forgets_the_commands_before,
+        {"a_keyframe_holds_under_latency"},
+    ),
+    "state forgets the commands on their way": (
+        state_forgets_the_commands,
+        {"a_state_has_the_commands_on_their_way"},
     ),
     "inputs are new arrays": (fresh_arrays_each_time, {"inputs_are_the_same_arrays_for_life"}),
     "acceleration negated": (

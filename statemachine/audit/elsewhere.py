@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import pickle
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from ..engines.auditing import Driver, ReferenceRun
 from ..engines.futures import gap
 from ..errors import EngineError
 from ..interface import Array, Model, State
+from ..processes import fresh_python
 from .findings import AuditFinding, finding_of
 from .interface_driver import InterfaceDriver
 
@@ -50,18 +50,15 @@ def run(job: Job) -> ChildRuns:
     Raises:
         EngineError: The process did not come to its end.
     """
-    package = Path(__file__).resolve().parents[2]
-    paths = [os.fspath(package), *(path for path in sys.path if path)]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "PYTHONHASHSEED": "1"}
     with tempfile.TemporaryDirectory() as folder:
         asked, answered = Path(folder) / "job", Path(folder) / "answer"
         asked.write_bytes(pickle.dumps(job))
-        child = f"{__package__}._child"
-        command = [sys.executable, "-P", "-m", child, os.fspath(asked), os.fspath(answered)]
+        files = os.fspath(asked), os.fspath(answered)
+        command, environment = fresh_python(f"{__package__}._child", *files)
         try:
             done = subprocess.run(
                 command,
-                env=environment,
+                env={**environment, "PYTHONHASHSEED": "1"},
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,  # engines greet there
                 stderr=subprocess.PIPE,

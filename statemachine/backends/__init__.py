@@ -30,6 +30,7 @@ __all__ = [
     "backend_engine",
     "backend_names",
     "load",
+    "loaders",
     "register",
 ]
 
@@ -94,6 +95,11 @@ def register(name: str, loader: str) -> None:
     if _BACKENDS.get(name, Backend(loader)) != Backend(loader):
         raise BadInputError(f"there is a backend named {name!r} already; choose another name")
     _BACKENDS[name] = Backend(loader)
+
+
+def loaders() -> dict[str, str]:
+    """The backends of other packages that are known so far, as `register` takes them."""
+    return {name: entry.loader for name, entry in _BACKENDS.items() if entry.engine is None}
 
 
 def load(

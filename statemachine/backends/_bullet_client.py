@@ -13,10 +13,12 @@ from typing import Any
 
 from ..errors import EngineError
 from ..installed import require
+from ..processes import free_memory
 
 pb: Any = require("pybullet")
 
 
+MOST_CLIENTS = 1024  # in one process
 _WORLD = 35  # [MB] that a client takes, nearly all of it for messages to the engine
 
 
@@ -48,17 +50,17 @@ def connect() -> int:
 
 def _room() -> int:
     """Megabytes that this process may still take, as far as Linux tells; else many."""
+    room = free_memory()
+    if room is None:
+        return 1 << 20
     try:
         import resource
 
-        with open("/proc/meminfo", encoding="ascii") as file:
-            lines = dict(line.split(":", 1) for line in file)
-        room = int(lines["MemAvailable"].split()[0]) << 10
         limit = resource.getrlimit(resource.RLIMIT_AS)[0]
         if limit != resource.RLIM_INFINITY:
             with open("/proc/self/statm", encoding="ascii") as file:
                 room = min(room, limit - int(file.read().split()[0]) * resource.getpagesize())
-    except (ImportError, OSError, KeyError):  # not Linux
+    except (ImportError, OSError):
         return 1 << 20
     return room >> 20
 

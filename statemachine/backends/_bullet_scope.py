@@ -238,11 +238,10 @@ def _actuators(raw: mujoco.MjModel) -> Found:
             yield "actuator transmission", f"actuator {name} does not drive a joint"
         elif raw.jnt_type[joint] in (_FREE, _BALL):
             yield "actuator of a free joint", f"actuator {name} is one"
-        if (
-            raw.actuator_dyntype[a] != int(mujoco.mjtDyn.mjDYN_NONE)
-            or raw.actuator_history[a].any()
-        ):
+        if raw.actuator_dyntype[a] != int(mujoco.mjtDyn.mjDYN_NONE):
             yield "actuator dynamics", f"actuator {name} has a state of its own"
+        if raw.actuator_delay[a] and raw.actuator_history[a, 1]:
+            yield "interpolated latency", f"that of actuator {name} is between two commands"
         affine = raw.actuator_biastype[a] in (int(bias.mjBIAS_NONE), int(bias.mjBIAS_AFFINE))
         if raw.actuator_gaintype[a] != int(gain.mjGAIN_FIXED) or not affine:
             kind = gain(raw.actuator_gaintype[a]) if affine else bias(raw.actuator_biastype[a])

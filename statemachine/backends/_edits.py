@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..interface import Array, Ints
+from ._delays import SHORTER
 
 _DISABLE = mujoco.mjtDisableBit
 _SWITCHES = {  # option of `replace` -> the flag that turns it off
@@ -39,8 +40,9 @@ def changes(raw: mujoco.MjModel, options: Mapping[str, Any]) -> dict[str, Any]:
         raw: The compiled model; stays as it is.
         options: actuation, contacts, limits: bool; gravity: (3,) [m/s²]; armature [kg·m² or
             kg], damping [N·m·s/rad or N·s/m], frictionloss [N·m or N]: (nv,); mass: (nbody,)
-            [kg]; friction: (ngeom,); kp, kv: (nu,), NaN of what is no position servo. All may
-            have one more axis in front, with a value for each world. Others are ignored.
+            [kg]; friction: (ngeom,); kp, kv: (nu,), NaN of what is no position servo;
+            latency: (nu,) [s]. All may have one more axis in front, with a value for each
+            world. Others are ignored.
 
     Returns:
         Arrays by their names in MjModel, and as "opt.gravity" in MjOption; with that axis in
@@ -66,6 +68,10 @@ def changes(raw: mujoco.MjModel, options: Mapping[str, Any]) -> dict[str, Any]:
         elif name == "friction":
             found["geom_friction"] = friction = _rows(raw.geom_friction, value)
             friction[..., 0] = value
+        elif name == "latency":
+            owner, _ = servos(raw)
+            found["actuator_delay"] = delay = np.zeros((*value.shape[:-1], raw.nactuator))
+            delay[..., owner] = SHORTER * value
         elif name in ("kp", "kv"):
             owner, servo = servos(raw)
             bias = found.setdefault("actuator_biasprm", _rows(raw.actuator_biasprm, value))
@@ -105,7 +111,7 @@ def edited(raw: mujoco.MjModel, options: dict[str, Any]) -> mujoco.MjModel:
     Args:
         raw: Stays as it is.
         options: Those of `changes`. Others, `timestep`, `substeps` and `integrator` among
-            them, are left to the backend.
+            them, are left to the backend; when the timestep is set, so is `with_room`.
     """
     written = changes(raw, options)
     raw = copy.copy(raw)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInputError, DivergedError, EngineError
-from ..interface import DERIVED, INPUTS, POSES, Array, Contacts, Data, Model, State
+from ..interface import DERIVED, INPUTS, POSES, Array, Contacts, Data, Ints, Model, State
 from ..interface.checks import HUGE, check_entries, check_writable
 from ..interface.options import unsupported
 from ._hidden_world import HiddenWorld, LookAhead, Moment, bounded
@@ -54,6 +54,8 @@ class Machine:
     Attributes:
         qpos, qvel, ctrl: The Data's arrays.
         time: Simulated time [s].
+        given: (steps, nu) the commands of the last engine steps, the newest last: as many as
+            the longest latency takes.
         world: Where the engine is; another one after some resets.
         moment: What is derived belongs to it; None on a fresh or reset Data.
         derived: What was read of that so far, by name.
@@ -66,6 +68,8 @@ class Machine:
         self.world = self._told(model._open_world())
         self.qpos, self.qvel = np.zeros(model.nq), np.zeros(model.nv)
         self.ctrl = np.zeros(model.nu)
+        self._late = np.rint(model.actuator_delay / self.world.timestep).astype(np.int64)
+        self._longest = int(self._late.max(initial=0))
         self._used = False
         self.reset(None)
 
@@ -84,13 +88,20 @@ class Machine:
             start = Moment(frame.qpos, frame.qvel, frame.ctrl, self.world.blank)
             self.restart(frame.time, start)
 
-    def restart(self, time: float, start: Moment) -> None:
-        """Take a state whole; nothing of before has any part in what follows."""
+    def restart(self, time: float, start: Moment, given: Array | None = None) -> None:
+        """Take a state whole; nothing of before has any part in what follows.
+
+        Args:
+            time: Of the state [s].
+            start: The state; its ctrl is that of the Data.
+            given: The commands before it; by default they were that of the state.
+        """
         if self._used:
             self.world = self._told(self.world.renewed())
             self._used = False
         self.time = time
         self.qpos[:], self.qvel[:], self.ctrl[:] = start.qpos, start.qvel, start.ctrl
+        self.given = np.tile(start.ctrl, (self._longest, 1)) if given is None else given
         self._place(start.memory)
         self._command()
         self.moment: Moment | None = None
@@ -107,11 +118,16 @@ class Machine:
         self._astray = False
 
     def _command(self) -> None:
-        """Pass the command on as it is now."""
+        """Take the command as it is now, and pass on what acts."""
         self._commanded = b"?"  # until the world has taken it
         self._ctrl = self.ctrl.copy()
-        self.world.command(self._ctrl)
+        self._pass_on(self.given)
         self._commanded = self._ctrl.tobytes()
+
+    def _pass_on(self, given: Array) -> None:
+        """Tell the world the command that acts in its next step."""
+        self._acting = acting(self._ctrl, given, self._late)
+        self.world.command(self._acting)
 
     def run(self, _model: None, _data: None, nstep: int = 1) -> None:
         """Advance by `nstep` timesteps; all of it or, if anything is raised, nothing."""
@@ -136,33 +152,42 @@ class Machine:
         self._used, start = True, world.memory
         kept = self.moment, self.derived
         try:
-            time = self._several(steps - 1, self.time)
+            time, given = self._several(steps - 1, self.time, self.given)
             before = world.read() if steps > 1 else self._left[:2]
             memory = start if steps == 1 else world.memory
-            moment = Moment(*before, self._ctrl, memory)
-            time = self._several(1, time)
+            time, given = self._several(1, time, given)
+            moment = Moment(*before, self._acting, memory)
             qpos, qvel = world.read()
             if not world.looks_at_all and not bounded(qpos, qvel, self._fastest):
                 self._diverge(time)
             left = qpos, qvel, qpos.tobytes(), qvel.tobytes()
             self.moment, self._lives, self.derived = moment, True, {}
             # Nothing can interrupt this line, and no other moves the Data.
-            self.qpos[:], self.qvel[:], self.time, self._left = qpos, qvel, time, left
+            self.qpos[:], self.qvel[:], self.time, self._left, self.given = (
+                qpos,
+                qvel,
+                time,
+                left,
+                given,
+            )
         except BaseException:
             # The engine is elsewhere now; the arrays are not, nor is what else is known.
             self._astray, self._lives, self._memory = True, False, start
             self.moment, self.derived = kept
             raise
 
-    def _several(self, steps: int, time: float) -> float:
-        """Take engine steps; returns the time after them."""
+    def _several(self, steps: int, time: float, given: Array) -> tuple[float, Array]:
+        """Take engine steps; returns the time after them, and the commands until then."""
         world = self.world
         for _ in range(steps):
+            if self._longest:
+                self._pass_on(given)
+                given = np.concatenate([given[1:], self._ctrl[None]])
             world.step()
             time += world.timestep
             if world.diverging():
                 self._diverge(time)
-        return time
+        return time, given
 
     def _diverge(self, time: float) -> None:
         """Raise DivergedError for the first coordinate that is not finite, or beyond its bound."""
@@ -188,12 +213,13 @@ class Machine:
         return self._left[2:] != (self.qpos.tobytes(), self.qvel.tobytes())
 
     def present(self) -> Moment:
-        """All that decides the future but the time."""
+        """All that decides the next engine step, with the command that acts in it."""
         if self._written:  # what the world remembers belongs to another state
             memory = self.world.blank
         else:
             memory = self._memory if self._astray else self.world.memory
-        return Moment(self.qpos.copy(), self.qvel.copy(), self.ctrl.copy(), memory)
+        ctrl = acting(self.ctrl, self.given, self._late)
+        return Moment(self.qpos.copy(), self.qvel.copy(), ctrl, memory)
 
     def forward(self) -> None:
         """Let everything derived belong to the present."""
@@ -220,6 +246,20 @@ class Machine:
         return self._model._look_ahead.at(moment)
 
 
+def acting(ctrl: Array, given: Array, late: Ints) -> Array:
+    """The command (nu,) that acts in a step: of each number that of so many steps before.
+
+    Args:
+        ctrl: (nu,) of the step.
+        given: (steps, nu) of the steps before, the newest last.
+        late: (nu,) steps by which each number acts late, at most as many as `given`.
+    """
+    if not len(given):
+        return ctrl.copy()
+    commands = np.concatenate([given, ctrl[None]])
+    return commands[len(given) - late, np.arange(len(ctrl))]
+
+
 class HiddenData(Data):
     """A Machine as a Data."""
 
@@ -231,7 +271,10 @@ class HiddenData(Data):
     def __init__(self, model: HiddenModel) -> None:
         self._machine = machine = Machine(model)
         sizes = {"time": 1, "qpos": model.nq, "qvel": model.nv, "ctrl": model.nu}
-        self._layout = model._with_fingerprint((*sizes.items(), *machine.world.memory_layout))
+        layout = (*sizes.items(), *machine.world.memory_layout)
+        if machine.given.size:
+            layout = (*layout, ("given", machine.given.size))
+        self._layout = model._with_fingerprint(layout)
         inputs = {name: getattr(machine, name) for name in INPUTS}
         super().__init__(model, machine.run, inputs)
 
@@ -273,7 +316,8 @@ class HiddenData(Data):
 
     def _get_state(self) -> State:
         now, world = self._machine.present(), self._machine.world
-        parts = [[self._machine.time], now.qpos, now.qvel, now.ctrl, *world.packed(now.memory)]
+        inputs = [self._machine.time], now.qpos, now.qvel, self._machine.ctrl
+        parts = [*inputs, *world.packed(now.memory), self._machine.given.ravel()]
         blob = np.concatenate(parts).tobytes()
         model, (fingerprint, layout) = self._home, self._layout
         return State(model.backend, model.engine_version, fingerprint, layout, blob)
@@ -285,7 +329,10 @@ class HiddenData(Data):
         world = self._machine.world
         memory = world.unpacked([state[name] for name, _ in world.memory_layout])
         start = Moment(state["qpos"], state["qvel"], state["ctrl"], memory)
-        self._machine.restart(state.time, start)
+        given = self._machine.given
+        if given.size:
+            given = state["given"].reshape(given.shape)
+        self._machine.restart(state.time, start, given)
 
     def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
         return self._layout

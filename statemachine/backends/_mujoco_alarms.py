@@ -19,12 +19,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ..errors import EngineWarning
+from ..errors import BadInputError, DivergedError, EngineError, EngineWarning
+from ..interface import Model
 from ..interface.checks import HUGE
 
 _KIND = mujoco.mjtWarning
-# What makes a Data useless, in the order in which a step looks for it.
-_FATAL = {
+# Warnings that make a Data useless, in the order in which a step looks for it.
+FATAL = {
     "qpos": int(_KIND.mjWARN_BADQPOS),
     "qvel": int(_KIND.mjWARN_BADQVEL),
     "ctrl": int(_KIND.mjWARN_BADCTRL),
@@ -69,13 +70,13 @@ def listen() -> bool:
         return known
 
 
-def listen_for(raw: mujoco.MjData) -> None:
-    """Listen for as long as an MjData lives."""
+def listen_for(user: object) -> None:
+    """Listen for as long as an MjData, or whatever else runs the engine, lives."""
     global _users  # noqa: PLW0603
     with _LOCK:
         _users += 1
         listen()
-    weakref.finalize(raw, _end)
+    weakref.finalize(user, _end)
 
 
 def _end() -> None:
@@ -99,6 +100,36 @@ class AlarmError(Exception):
     def __init__(self, quantity: str, index: int, time: float) -> None:
         super().__init__(quantity, index, time)
         self.quantity, self.index, self.time = quantity, index, time
+
+
+def ended(model: Model, alarm: AlarmError, who: str) -> BadInputError | DivergedError:
+    """The error for what is useless from now on: a Data or a world, as `who` names it."""
+    quantity, index, time = alarm.quantity, alarm.index, alarm.time
+    entry = f"{quantity}[{index}]{model._coordinate_name(quantity, index)}"
+    now = f"{who} now takes only reset and set_state"
+    if quantity == "ctrl":
+        return BadInputError(
+            f"{entry} was no number at time {time:g} s: MuJoCo stepped as if ctrl were zero. {now}",
+            quantity=quantity,
+            index=index,
+            time=time,
+        )
+    return DivergedError(
+        f"{entry} became NaN, infinite or huge at time {time:g} s. {now}",
+        quantity=quantity,
+        index=index,
+        time=time,
+    )
+
+
+def gave_up(error: object) -> EngineError:
+    """The error for one of MuJoCo's own, or for a memory that is full."""
+    return EngineError(f"MuJoCo gave up: {' '.join(str(error).split()) or 'out of memory'}")
+
+
+def resets_itself(model: mujoco.MjModel) -> bool:
+    """Whether MuJoCo resets what diverges, without a word but the warning."""
+    return not model.opt.disableflags & _AUTORESET
 
 
 class Alarms:
@@ -134,7 +165,7 @@ class Alarms:
         trusted = listen()
         counts = (self._now - self._seen)[:, 1]
         self._seen[:] = self._now
-        fatal = {name: int(counts[kind]) for name, kind in _FATAL.items() if counts[kind] > 0}
+        fatal = {name: int(counts[kind]) for name, kind in FATAL.items() if counts[kind] > 0}
         if fatal:
             raise self._first(fatal, trusted)
         # MuJoCo says a thing only the first time after a reset, and so do we.
@@ -143,14 +174,13 @@ class Alarms:
         pass_on(texts, stacklevel=5)
 
     def _first(self, fatal: dict[str, int], trusted: bool) -> AlarmError:
-        raw, opt = self._raw, self._model.opt
-        resets = not opt.disableflags & _AUTORESET
+        raw, resets = self._raw, resets_itself(self._model)
         # Without a reset what is bad stays bad: each step since the first has counted.
         steps = 1 if resets else max(fatal.values())
         quantity = next(name for name in fatal if resets or fatal[name] == steps)
         # Without the last digits, which are those of a long sum.
-        time = float(raw.time) if resets else round(raw.time - steps * opt.timestep, 9)
-        index = int(self._now[_FATAL[quantity], 0])
+        time = float(raw.time) if resets else round(raw.time - steps * self._model.opt.timestep, 9)
+        index = int(self._now[FATAL[quantity], 0])
         if trusted and (resets or steps > 1):
             for text in reversed(list(_TEXTS)):
                 match = _BAD.search(text)

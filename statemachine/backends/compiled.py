@@ -7,7 +7,8 @@ an `mjModel`, and give its Model the facts that every other backend gives:
         raw = compile_file(path)
     model = MyModel(raw=..., backend="mine", ..., **facts(raw))
 
-`replace` edits a copy (`edited`), and gives the engine's timestep (`step_length`).
+`replace` edits a copy (`edited`), gives the engine's timestep (`step_length`), and then room for
+what a latency needs (`with_room`).
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from ..errors import ModelError
 from ..interface import Array, JointType, Keyframe
 from ..interface.checks import HUGE, TINY
 from ..models import mesh_file
+from ._delays import delay_steps, with_room
 from ._edits import edited, servos, step_length
 from ._mjb import check_binary
 
@@ -39,6 +41,7 @@ __all__ = [
     "fastest",
     "gravity",
     "step_length",
+    "with_room",
 ]
 
 # For `fastest`: in a step [rad, or the model's extent]; at least [rad/s or m/s]; about a day [s].
@@ -249,6 +252,7 @@ def facts(m: mujoco.MjModel) -> dict[str, Any]:
         "actuator_kp": np.where(servo, gain, np.nan),
         "actuator_kv": np.where(servo, -bias[:, 2], np.nan),
         "actuator_gain": np.where(fixed & unbiased & direct, gain, np.nan),
+        "actuator_delay": delay_steps(m) * m.opt.timestep,
         "actuator_gear": m.actuator_gear[m.actuator_outadr[owner], 0],
         "dof_armature": m.dof_armature,
         "dof_damping": m.dof_damping,

@@ -9,12 +9,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal, NoReturn, cast
+from typing import Any, Literal, cast
 
 import mujoco
 import numpy as np
 
-from ..errors import BadInputError, DivergedError, EngineError
+from ..errors import BadInputError
 from ..interface import (
     BEHAVIOURS,
     FORCES,
@@ -30,8 +30,18 @@ from ..interface import (
     State,
 )
 from ..interface.checks import HUGE, TINY, check_finite
-from ._mujoco_alarms import AlarmError, Alarms, pass_on
-from .compiled import check_numbers, compile_file, compiler_warnings, edited, facts, step_length
+from ._delays import hold, needed
+from ._edits import CONSTANTS_FOLLOW, changes, put
+from ._mujoco_alarms import AlarmError, Alarms, ended, gave_up, pass_on, resets_itself
+from .compiled import (
+    check_numbers,
+    compile_file,
+    compiler_warnings,
+    edited,
+    facts,
+    step_length,
+    with_room,
+)
 
 _DISABLE = mujoco.mjtDisableBit
 # Not RK4: after its step the derived values are neither of the state before nor after.
@@ -64,6 +74,11 @@ _NOTES = {
     "position servo": Behaviour(
         "native", "the engine's own; an infinite ctrl is clamped to its range, or refused"
     ),
+    "latency": Behaviour(
+        "native",
+        "the engine's own delay of an actuator, in whole engine steps; before a keyframe the "
+        "command was that of the keyframe, where the engine has zero",
+    ),
     "forces by part": Behaviour("native", "rows of the constraint solver, by their type"),
     "exact restore": Behaviour("native", "mjSTATE_INTEGRATION, warm start included"),
     "no automatic reset": Behaviour(
@@ -84,7 +99,7 @@ def _capabilities(raw: mujoco.MjModel) -> Capabilities:
     behaviours = {name: _NOTES.get(name, _NATIVE) for name in BEHAVIOURS}
     if raw.opt.integrator == int(mujoco.mjtIntegrator.mjINT_RK4):
         behaviours["stale after a step"] = _WITH_RK4
-    if not raw.opt.disableflags & int(_DISABLE.mjDSBL_AUTORESET):
+    if resets_itself(raw):
         behaviours["no automatic reset"] = _WITH_RESET
     asleep = bool(raw.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP))
     if asleep:
@@ -149,18 +164,57 @@ class MujocoModel(Model):
         try:
             return MujocoData(self)
         except (MemoryError, mujoco.FatalError) as error:
-            raise _gave_up(error) from error
+            raise gave_up(error) from error
+
+    def _make_worlds(
+        self, n: int, workers: int, derived: tuple[str, ...], options: dict[str, Any]
+    ) -> Any:
+        from ._mujoco_worlds import MujocoWorlds
+
+        base, varied = self._varied(options) if options else (self, {})
+        follow = bool(CONSTANTS_FOLLOW & options.keys())
+        return MujocoWorlds(self, base, (n, workers), derived, (varied, follow), _layout(base))
+
+    def _varied(self, options: dict[str, Any]) -> tuple[MujocoModel, dict[str, Any]]:
+        """What worlds share, and the arrays of the compiled model that each has of its own.
+
+        Args:
+            options: Checked options of `replace`, each with a value for each world.
+
+        Returns:
+            A Model, and (n, ...) arrays by name; see `changes`.
+        """
+        given = {name: np.array(values) for name, values in options.items()}
+        substeps = given.pop("substeps", np.array([self.substeps]))
+        if (substeps != substeps[0]).any():
+            raise BadInputError("substeps must be the same in all worlds: they step together")
+        # As `_replace` would, so that a timestep is the same to the last bit.
+        base = self._replace({"substeps": int(substeps[0])})
+        varied = changes(base.raw, given)
+        if "integrator" in given:
+            codes = [int(_INTEGRATORS[name]) for name in options["integrator"]]
+            varied["opt.integrator"] = np.array(codes)
+        if "timestep" in given:
+            lengths = [step_length(length, base.substeps, {}) for length in options["timestep"]]
+            varied["opt.timestep"] = np.array(lengths)
+        raw = base.raw
+        for name in [name for name, value in varied.items() if not np.ndim(value)]:
+            put(raw, name, varied.pop(name))  # a flag that is the same for all
+        delay = varied.get("actuator_delay", raw.actuator_delay)
+        timestep = np.asarray(varied.get("opt.timestep", raw.opt.timestep))
+        steps = needed(delay, timestep[..., None]).reshape(-1, raw.nactuator)
+        return MujocoModel(with_room(raw, steps.max(axis=0)), self.path, base.substeps), varied
 
     def _replace(self, options: dict[str, Any]) -> MujocoModel:
         try:
             raw = edited(self.raw, options)
         except (MemoryError, mujoco.FatalError) as error:
-            raise _gave_up(error) from error
+            raise gave_up(error) from error
         if "integrator" in options:
             raw.opt.integrator = int(_INTEGRATORS[options["integrator"]])
         substeps = options.get("substeps", self.substeps)
         raw.opt.timestep = step_length(self.timestep, substeps, options)
-        return MujocoModel(raw, self.path, substeps)
+        return MujocoModel(with_room(raw), self.path, substeps)
 
 
 class MujocoData(Data):
@@ -237,6 +291,7 @@ class MujocoData(Data):
             mujoco.mj_resetData(self._home.raw, self.raw)
         else:
             mujoco.mj_resetDataKeyframe(self._home.raw, self.raw, key)
+            hold(self._home.raw, self.raw.history, self.raw.ctrl)
         self._alarms.clear()
 
     def _get_state(self) -> State:
@@ -273,33 +328,17 @@ class MujocoData(Data):
 
     def _failed(self, error: Exception) -> None:
         if isinstance(error, mujoco.FatalError):
-            gave_up = _gave_up(error)
-            self._give_up(str(gave_up))
-            raise gave_up from error
+            fatal = gave_up(error)
+            self._give_up(str(fatal))
+            raise fatal from error
         if isinstance(error, AlarmError):
-            self._raise(error.quantity, error.index, error.time)
-
-    def _raise(self, quantity: str, index: int, time: float) -> NoReturn:
-        """Give up, because of an entry that was no number at a time [s]."""
-        entry = f"{quantity}[{index}]{self._home._coordinate_name(quantity, index)}"
-        facts = {"quantity": quantity, "index": index, "time": time}
-        if quantity == "ctrl":
-            self._give_up(f"it was stepped with a bad {entry}")
-            raise BadInputError(
-                f"{entry} was no number at time {time:g} s: MuJoCo stepped as if ctrl were zero. "
-                "This Data now takes only reset and set_state",
-                **facts,
-            ) from None
-        self._give_up(f"{entry} was not finite at time {time:g} s")
-        raise DivergedError(
-            f"{entry} became NaN, infinite or huge at time {time:g} s. "
-            "This Data now takes only reset and set_state",
-            **facts,
-        ) from None
-
-
-def _gave_up(error: Exception) -> EngineError:
-    return EngineError(f"MuJoCo gave up: {' '.join(str(error).split()) or 'out of memory'}")
+            entry = f"{error.quantity}[{error.index}]"
+            entry += self._home._coordinate_name(error.quantity, error.index)
+            if error.quantity == "ctrl":
+                self._give_up(f"it was stepped with a bad {entry}")
+            else:
+                self._give_up(f"{entry} was not finite at time {error.time:g} s")
+            raise ended(self._home, error, "This Data") from None
 
 
 def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:

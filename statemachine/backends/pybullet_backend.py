@@ -29,6 +29,7 @@ from ..interface import (
 from ..interface.checks import HUGE
 from ..interface.options import checked_options
 from . import _bullet_urdf as urdf
+from ._bullet_client import MOST_CLIENTS
 from ._bullet_driven import DrivenWorld
 from ._bullet_plan import Plan
 from ._bullet_scope import check, ignored, softness
@@ -43,6 +44,7 @@ from .compiled import (
     facts,
     fastest,
     step_length,
+    with_room,
 )
 
 _EMULATED = {
@@ -51,6 +53,7 @@ _EMULATED = {
     "zeros when fresh": "by the adapter; the engine has poses from the first moment",
     "position servo": "the adapter solves the model's servo and sends torques; the engine's own "
     "way is POSITION_CONTROL; an infinite ctrl is clamped to its range, or refused",
+    "latency": "by the adapter, which keeps the last commands, in whole engine steps",
     "armature": "the engine has none: the adapter reckons with it, and gives the engine's links a "
     "part of it as inertia",
     "joint damping": "by the adapter, as the file's integrator treats it (RK4 as Euler); the "
@@ -109,6 +112,8 @@ def _capabilities(as_it_comes: bool, max_qvel: Array | None = None, soft: str = 
         behaviours={name: behaviours[name] for name in BEHAVIOURS},
         shared_model=False,
         exact_restore=False,
+        # A Model has two clients of its own: the still copy and the look-ahead.
+        data_per_process=MOST_CLIENTS // 3,
     )
 
 
@@ -155,6 +160,7 @@ def load(
     if checked:
         raw = edited(raw, checked)
         raw.opt.timestep = step_length(float(raw.opt.timestep), substeps, checked)
+        raw = with_room(raw)
     plan = Plan(raw)
     check(plan, "pybullet")
     model = PybulletModel(plan, Path(path), substeps, defaults, checked.get("max_qvel"))
@@ -238,7 +244,7 @@ class PybulletModel(HiddenModel):
         raw = edited(self.plan.raw, options)
         substeps = options.get("substeps", self.substeps)
         raw.opt.timestep = step_length(self.timestep, substeps, options)
-        model = self._of(raw, substeps, options.get("max_qvel", self._asked))
+        model = self._of(with_room(raw), substeps, options.get("max_qvel", self._asked))
         if "friction" in options:
             _tell(model.plan.surfaces.differences, stacklevel=4)
         return model

@@ -26,7 +26,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="which figure of it, of two sides (worst)",
     )
     group.add_argument(
-        "--finer", action="store_true", help="every difference of two sides by itself"
+        "--finer", action="store_true", help="every difference of two sides by its entries"
     )
     group.add_argument(
         "--budget",

@@ -6,7 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from ..interface import Array, Model
+import numpy as np
+
+from ..interface import Array, Data, Model
+from ..scenarios import Controller
 from ..traces import Header, Trace
 from ..traces.recorder import layout_of
 from .matching import Matched, Pairs
@@ -88,3 +91,34 @@ def _renamed(ours: Sequence[str], theirs: Sequence[str], pairs: Pairs) -> tuple[
     for one, two in pairs:
         names[two] = ours[one]
     return tuple(names)
+
+
+def retold(controller: Controller, matched: Matched, start: Array) -> Controller:
+    """What a controller tells the left, told to the right.
+
+    Where it gives no command ctrl stays as it is, as it does on the left.
+
+    Args:
+        controller: Of the left, or one that writes in the order of the left.
+        matched: What of the left is what of the right.
+        start: (nu,) ctrl of the right, for the actuators that have no counterpart.
+    """
+
+    def told(time: float, data: Data) -> Any:
+        wanted = controller(time, data)
+        return None if wanted is None else matched.ctrl(np.asarray(wanted, np.float64), start)
+
+    return told
+
+
+def beginning_with(ctrl: Array, controller: Controller) -> Controller:
+    """A controller that begins with some ctrl (nu,), where it gives none of its own."""
+    begun = False
+
+    def told(time: float, data: Data) -> Any:
+        nonlocal begun
+        wanted = controller(time, data)
+        first, begun = not begun, True
+        return ctrl if first and wanted is None else wanted
+
+    return told

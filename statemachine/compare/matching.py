@@ -16,7 +16,8 @@ from ..description.match import Matching, Pair, match, renamed
 from ..description.records import HERE, Robot
 from ..description.tree import GroupTree
 from ..engines import needed_part
-from ..engines.parts import BodyPair, CompilerPart
+from ..engines.model_differences import BodyPair
+from ..engines.parts import CompilerPart
 from ..errors import BadInputError, unknown_name
 from ..installed import DEFAULT
 from ..interface import Array, Model, make_data, reset

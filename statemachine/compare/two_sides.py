@@ -12,12 +12,12 @@ from ..backends import load
 from ..comparison import common_moments
 from ..comparison.text import milliseconds
 from ..errors import BadInputError, StateMachineError, TraceError
-from ..interface import Array, Data, Model
+from ..interface import Array, Model
 from ..scenarios import Controller, Scenario
 from ..scenarios.runs import Progress, check_length, part_of, silent, steps_in
 from ..traces import Trace, model_file, play, read
 from ..traces.recorder import layout_of
-from .alike import replace_layout, told_alike, translated
+from .alike import beginning_with, replace_layout, retold, told_alike, translated
 from .labels import files_apart, labels_of
 from .matching import Matched, match_models, start_of
 from .perturbed import Rerun
@@ -204,8 +204,8 @@ def _reruns(
     def theirs(model: Model) -> Controller:
         told = own(model if scenario.own else left)
         if matched and not scenario.own:
-            told = _retold(told, matched, ctrl)
-        return told if begin is None else _after(begin[2], told)
+            told = retold(told, matched, ctrl)
+        return told if begin is None else beginning_with(begin[2], told)
 
     one, two = request.sides
     return (
@@ -281,29 +281,6 @@ def _same_commands(theirs: Trace, right: Trace) -> bool:
     rows = np.searchsorted(times - early, since, side="right") - 1
     used = since < times[-1] - early  # the command of a last row is never carried out
     return np.array_equal(theirs.ctrl[rows[used]], right.ctrl[used])
-
-
-def _retold(controller: Controller, matched: Matched, start: Array) -> Controller:
-    """What a controller tells the left, told to the right; what is the right's alone stays."""
-
-    def retold(time: float, data: Data) -> Any:
-        told = controller(time, data)
-        return None if told is None else matched.ctrl(np.asarray(told), start)
-
-    return retold
-
-
-def _after(ctrl: Array, controller: Controller) -> Controller:
-    """A controller that begins with some ctrl, where it gives none of its own."""
-    begun = False
-
-    def after(time: float, data: Data) -> Any:
-        nonlocal begun
-        told = controller(time, data)
-        first, begun = not begun, True
-        return ctrl if first and told is None else told
-
-    return after
 
 
 def _told_apart(left: Side, right: Side, traces: tuple[Trace, ...]) -> list[Trace]:

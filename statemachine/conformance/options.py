@@ -1,11 +1,11 @@
-"""What a user varies of a robot: mass, friction and gains, each against a closed form."""
+"""What a user varies of a robot: mass, friction, gains and latency, each against a closed form."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..interface import Data, Model, forward, make_data, step
-from ._lab import Lab, require, require_close
+from ..interface import Array, Data, Model, forward, get_state, make_data, reset, set_state, step
+from ._lab import Lab, require, require_close, require_equal, run_ctrl
 
 _G = 9.81
 
@@ -85,3 +85,78 @@ def check_gains_are_those_of_the_servo(lab: Lab) -> None:
         forward(model, data)
         force = 10.0 * 0.05 - np.arange(1.0, 7.0) * 0.1
         require_close(data.qfrc_actuator, force, 1e-9, "qfrc_actuator with a kv of each")
+
+
+def check_latency_delays_a_command(lab: Lab) -> None:
+    """Under a latency of k steps the arm does what it does without, k steps later.
+
+    Weightless and at rest nothing else tells the moments apart. A latency is rounded up.
+    """
+    lab.rests_on("latency", "gravity", "position servo")
+    arm = lab.arm.replace(gravity=[0, 0, 0])
+    random = np.random.default_rng(3)
+    commands = random.uniform(-0.1, 0.1, (40, arm.nu))
+    h = arm.timestep
+
+    def poses(model: Model) -> Array:
+        found = []
+        with make_data(model) as data:
+            for command in commands:
+                data.ctrl[:] = command
+                step(model, data)
+                found.append(data.qpos.copy())
+        return np.array(found)
+
+    prompt = poses(arm)
+    for latency, late in ((h, 1), (0.03, 6), (2.5 * h, 3), (0.0, 0)):
+        model = arm.replace(latency=latency)
+        require_close(model.actuator_delay, np.full(arm.nu, late * h), 1e-12, "actuator_delay")
+        found = poses(model)
+        require_close(found[:late], np.zeros((late, arm.nq)), 1e-9, f"before {latency} s")
+        require_close(found[late:], prompt[: 40 - late], 1e-9, f"{late} steps late")
+    finer = arm.replace(latency=h, substeps=5)
+    require_close(finer.actuator_delay, np.full(arm.nu, h), 1e-12, "actuator_delay of substeps")
+    require_close(poses(finer)[1:], poses(arm.replace(substeps=5))[:-1], 1e-9, "5 substeps late")
+    one = np.zeros(arm.nu)
+    one[2] = 2 * h
+    found = poses(arm.replace(latency=one, contacts=False))
+    require(bool(np.abs(found[0, [0, 1, 3, 4, 5]]).min() > 1e-6), "all joints were late")
+
+
+def check_a_state_has_the_commands_on_their_way(lab: Lab) -> None:
+    """With a latency, two restores have one future, whatever was commanded after the State."""
+    lab.rests_on("latency", "position servo")
+    model = lab.arm.replace(latency=0.04)
+    data, other = lab.data(model), lab.data(model)
+    run_ctrl(model, data, 20, seed=1)
+    state = get_state(model, data)
+    expected = None
+    for each, seed in ((data, 2), (other, 3), (data, 4)):
+        run_ctrl(model, each, 12, seed=seed)
+        set_state(model, each, state)
+        future = run_ctrl(model, each, 12, seed=5)
+        expected = future if expected is None else expected
+        require_equal(future, expected, "qpos after a restore")
+    # The command on its way, not the one that was written last, moves the arm at first.
+    start = state["qpos"]
+    paths = []
+    for ctrl in (0.3, -0.3):
+        set_state(model, data, state)
+        data.ctrl[:] = ctrl
+        step(model, data, 8)
+        paths.append(data.qpos.copy())
+    require_equal(paths[0], paths[1], "8 steps under commands that come after 8")
+    require(bool(np.abs(paths[0] - start).max() > 1e-6), "nothing was on its way")
+
+
+def check_a_keyframe_holds_under_latency(lab: Lab) -> None:
+    """Before a reset the command was that of the keyframe: the held box stays held."""
+    lab.rests_on("latency", "position servo")
+    model = lab.box.replace(latency=0.1)
+    with make_data(model) as data:
+        reset(model, data, keyframe=0)
+        start = data.qpos.copy()
+        step(model, data, 20)
+        arm = model.jnt_qposadr[model.actuator_jntid]
+        require_close(data.qpos[arm], start[arm], 0.01, "the arm in the first 0.1 s")
+        require(len(data.contacts) > 0, "the box is no longer held")

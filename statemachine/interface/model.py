@@ -44,6 +44,7 @@ class Model(ABC):
         actuator_gain: (nu,) force of a motor for a ctrl of 1, NaN if it is none.
         actuator_gear: (nu,) what that force is multiplied by on the joint, and the joint's
             position where a servo compares it with ctrl.
+        actuator_delay: (nu,) how late each number of ctrl acts [s], in whole engine steps.
         dof_armature, dof_damping, dof_frictionloss: (nv,) of each degree of freedom.
         body_mass: (nbody,) [kg], zero of a body without mass, as the world is.
         geom_friction: (ngeom, 3) sliding, torsional [m] and rolling [m] friction of each geom.
@@ -85,6 +86,7 @@ class Model(ABC):
     actuator_kv: Array
     actuator_gain: Array
     actuator_gear: Array
+    actuator_delay: Array
     dof_armature: Array
     dof_damping: Array
     dof_frictionloss: Array
@@ -184,6 +186,8 @@ class Model(ABC):
                 have their own, which stays;
                 kp > 0, kv ≥ 0: gains of the position servos, (nu,) with NaN where there is
                 none, or one number for every servo;
+                latency: ≥ 0 [s], (nu,) or one number: how late a command acts, rounded up to
+                whole engine steps. Before a reset the command was that of the reset;
                 integrator: a name of `capabilities.integrators`;
                 max_qvel: > 0 [rad/s or m/s], (nv,) or one number: beyond it a step raises
                 DivergedError. By default it is computed for each Model.

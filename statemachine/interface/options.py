@@ -13,6 +13,7 @@ from .records import Array, Capabilities, Ints, JointType
 
 # One number for each degree of freedom.
 PER_DOF = ("armature", "damping", "frictionloss")
+LONGEST = 10.0  # latency [s]: a State has every command of that time
 _SWITCHES = ("actuation", "contacts", "limits")
 OPTIONS = (
     "actuation",
@@ -25,6 +26,7 @@ OPTIONS = (
     "friction",
     "kp",
     "kv",
+    "latency",
     "limits",
     "integrator",
     "max_qvel",
@@ -120,6 +122,14 @@ def _friction(of: Optioned, name: str, value: Any) -> Array:
     return np.array(np.broadcast_to(_not_negative(name, value, of.ngeom), (of.ngeom,)))
 
 
+def _latency(of: Optioned, name: str, value: Any) -> Array:
+    """How late each number of ctrl acts [s], one number or (nu,), as a new array (nu,)."""
+    given = _not_negative(name, value, of.nu)
+    if (given > LONGEST).any():
+        raise BadInputError(f"{name} is at most {LONGEST:g} s; got {shown(value)}")
+    return np.array(np.broadcast_to(given, (of.nu,)))
+
+
 def _gain(of: Optioned, name: str, value: Any) -> Array:
     """A gain, one number or (nu,), as a new array (nu,) with NaN where there is no servo."""
     servo = ~np.isnan(of.actuator_kp)
@@ -174,6 +184,7 @@ _OF_MODELS = {
     "friction": _friction,
     "kp": _gain,
     "kv": _gain,
+    "latency": _latency,
     "max_qvel": _fastest,
 }
 

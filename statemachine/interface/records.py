@@ -54,6 +54,7 @@ BEHAVIOURS = (
     "stale after a step",
     "zeros when fresh",
     "position servo",
+    "latency",
     "armature",
     "joint damping",
     "dry friction",
@@ -85,6 +86,8 @@ class Capabilities:
         shared_model: Whether several Data share one compiled model in memory.
         exact_restore: Whether `set_state` continues bit-exactly from any State,
             mid-contact too; otherwise two restores of one State agree bit by bit.
+        data_per_process: How many Data one process can hold, each of a Model of its own; None
+            for as many as there is memory for.
     """
 
     options: tuple[str, ...]
@@ -92,12 +95,15 @@ class Capabilities:
     behaviours: Mapping[str, Behaviour]
     shared_model: bool
     exact_restore: bool
+    data_per_process: int | None = None
 
     def __str__(self) -> str:
         lines = [f"options of replace: {', '.join(self.options)}"]
         lines.append(f"integrators: {', '.join(self.integrators) or 'as in the file'}")
         alone = "share the compiled model" if self.shared_model else "share its description only"
         lines.append(f"several Data of a Model {alone}")
+        if self.data_per_process is not None:
+            lines.append(f"Data that one process can hold: {self.data_per_process}")
         for name, behaviour in self.behaviours.items():
             lines.append(f"{name}: {behaviour.support}; {behaviour.note}")
         return "\n".join(lines)

@@ -132,7 +132,7 @@ class Worlds(ABC):
         own = vars(self)
         own["_trouble"] = "closed"
         for name in self.derived:
-            del own[name]
+            own.pop(name, None)
         for name in WRITABLE:
             view = own[name]
             own[name] = read_only(view)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import platform
-import sys
 import tempfile
 import threading
 import time
@@ -21,6 +20,7 @@ from ..grading import sandbox
 from ..grading.parallel import checked_jobs, in_parallel
 from ..grading.unwinding import unwinding
 from ..installed import DEFAULT, ENGINES, engine_version, require
+from ..processes import fresh_python
 from ..scenarios.runs import Progress, silent
 from . import table as tables
 from .files import ModelFile
@@ -126,13 +126,6 @@ def _examined(
     """A model's row, from a process of its own, which fills an empty one; None if stopped."""
     if stop.is_set():
         return None
-    package = Path(__file__).resolve().parents[2]
-    paths = [os.fspath(package), *(path for path in sys.path if path)]
-    environment = {
-        **os.environ,
-        **dict.fromkeys(_ALONE, "1"),
-        "PYTHONPATH": os.pathsep.join(paths),
-    }
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="statemachine-", ignore_cleanup_errors=True) as folder:
         job, answer = Path(folder) / "job", Path(folder) / "answer"
@@ -145,13 +138,14 @@ def _examined(
             "seed": seed,
         }
         job.write_text(json.dumps(asked), encoding="utf-8")
-        child = f"{__package__}._child"
+        files = os.fspath(job), os.fspath(answer)
+        command, environment = fresh_python(f"{__package__}._child", *files)
         outcome = sandbox.run(
-            [sys.executable, "-P", "-m", child, os.fspath(job), os.fspath(answer)],
+            command,
             cpu=4 * seconds + 60,
             wall=seconds,
             cwd=folder,  # engines leave logs where they run
-            env=environment,
+            env={**environment, **dict.fromkeys(_ALONE, "1")},
             memory_most=_MEMORY,
             stop=stop,
         )

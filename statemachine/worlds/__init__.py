@@ -10,11 +10,15 @@ step(worlds, 100)                              # time passes in all of them
 from __future__ import annotations
 
 from ..interface.worlds import BATCHED, Worlds
+from .draws import LogUniform, Uniform, draw
 from .verbs import forward, get_state, make_worlds, record, reset, set_state, step
 
 __all__ = [
     "BATCHED",
+    "LogUniform",
+    "Uniform",
     "Worlds",
+    "draw",
     "forward",
     "get_state",
     "make_worlds",

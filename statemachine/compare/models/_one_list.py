@@ -18,7 +18,7 @@ import numpy as np
 
 from ...backends import load
 from ...comparison.text import few, rounded
-from ...engines.parts import ModelDifference
+from ...engines.model_differences import ModelDifference
 from ...errors import StateMachineError
 from ...interface import Model
 from ..matching import Matched, match_models

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from ...engines import needed_part
-from ...engines.parts import DifferencesPart, Edit, ModelDifference
+from ...engines.model_differences import DifferencesPart, Edit, ModelDifference
 from ...installed import DEFAULT
 from ...interface import Model
 from ..matching import Matched
@@ -38,7 +38,7 @@ class Cause:
 
 
 def differences_of(
-    one: Model, two: Model, matched: Matched, world: bool = True
+    one: Model, two: Model, matched: Matched, world: bool = True, finer: bool = False
 ) -> tuple[ModelDifference, ...]:
     """All that two Models differ in by their compiled models.
 
@@ -47,9 +47,12 @@ def differences_of(
         two: The other.
         matched: What of one is what of the other.
         world: Whether gravity and timestep count; not where they are an engine's own.
+        finer: By single entries, where they can be brought over one by one.
     """
     room: DifferencesPart = needed_part(DEFAULT, "differences")
     found = list(room.differences(one.compiled, two.compiled, matched, world=world))
+    if finer:
+        found = [part for each in found for part in room.entries(two.compiled, each)]
     for side, only in enumerate(matched.only):
         for name in only.get("joint", ()):
             values = (("joint", "there", None) if side == 0 else ("joint", None, "there"),)

@@ -146,7 +146,7 @@ def explain(
         names: Joints, bodies, sites and actuators of `one` that go by other names in `two`.
         quantity: What the gap is measured in; None for the first that differs.
         measure: Which figure of it.
-        finer: Every difference by itself, however many there are.
+        finer: Every difference by its single entries, however many there are.
         budget: How many sets of causes may be run, as far as orders are drawn.
         labels: What the sides are called.
         uncertain: What is not known of the start, for the chaos floor; None for no floor.
@@ -186,7 +186,10 @@ def explain(
         quantity = next(more, quantity)
     gap = _figure(first[quantity], measure)
     world = not any(_is_as_it_comes(model) for model in models)
-    differences = (*differences_of(models[0], models[1], matched, world), *trials.of_the_run())
+    differences = (
+        *differences_of(models[0], models[1], matched, world, finer),
+        *trials.of_the_run(),
+    )
     listed = causes(differences, finer)
     trials.know(listed)
     able = [cause.name for cause in listed if not cause.refused]

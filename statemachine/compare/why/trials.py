@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from ...backends import load
-from ...engines.parts import ModelDifference
+from ...engines.model_differences import ModelDifference
 from ...errors import DivergedError, EngineError, ModelError, UnsupportedError
 from ...installed import DEFAULT
-from ...interface import Array, Data, Model
+from ...interface import Array, Model
 from ...scenarios import Controller, Scenario
 from ...traces import Trace, record
+from ..alike import beginning_with, retold
 from ..matching import Matched, start_of
 from ..perturbed import Rerun, Uncertainty, perturbed_runs
 from .causes import Cause, built
@@ -207,34 +208,15 @@ class Trials:
 
         It is that of the left as it comes, whatever is edited.
         """
-        if self._scenario.own:
-            own = self._scenario.controller(model, self.seed)
-            return self._ordered(own) if ORDER in brought else own
-        told = self._scenario.controller(self._models[0], self.seed)
-        return told if side == 0 else self._lefts(told)
-
-    def _lefts(self, own: Controller) -> Controller:
-        """The commands of the first side, to the second."""
-        one, two = self._starts
-
-        def controller(time: float, data: Data) -> Array:
-            wanted = own(time, data)
-            full = one.ctrl if wanted is None else np.asarray(wanted, dtype=np.float64)
-            return self._matched.ctrl(full, two.ctrl)
-
-        return controller
-
-    def _ordered(self, own: Controller) -> Controller:
-        """What a function writes in the order of the first side, by the names of the second."""
+        own = self._scenario.own
+        told = self._scenario.controller(model if own else self._models[0], self.seed)
+        if side == 0:
+            return told
         start = self._starts[1].ctrl
-
-        def controller(time: float, data: Data) -> Any:
-            wanted = own(time, data)
-            if wanted is None:
-                return None
-            return self._matched.ctrl(np.asarray(wanted, dtype=np.float64), start)
-
-        return controller
+        if not own or ORDER in brought:
+            told = retold(told, self._matched, start)
+        # Without a keyframe of its own it starts with the commands of the left, too.
+        return told if self._keyframes[0] == self._keyframes[1] else beginning_with(start, told)
 
     def floor(self, uncertain: Uncertainty) -> dict[str, Deviation]:
         """The chaos floor of each quantity: a gap that is no larger says nothing."""

@@ -10,7 +10,7 @@ import numpy as np
 from ...description.records import HERE, Placement
 from ...installed import require
 from ...interface import Array
-from ..parts import BodyPair, Counterparts, Edit, ModelDifference
+from ..model_differences import BodyPair, Counterparts, Edit, ModelDifference
 from . import _meshes as meshes
 from ._element_pairs import switched_off
 from ._figures import plain, same

@@ -15,18 +15,19 @@ from typing import Any
 import numpy as np
 
 from ...installed import require
-from ..parts import Counterparts, Edit, ModelDifference
+from ..model_differences import Counterparts, Edit, ModelDifference
 from . import _fields as fields
 from ._contact_pairs import ContactPairs
 from ._drives import Drives
 from ._elements import Elements
+from ._entries import entries
 from ._equalities import Equalities
 from ._figures import plain, same
 from ._geoms import Geoms
 from ._places import Places
 from ._weights import Weights
 
-__all__ = ["differences", "edited"]
+__all__ = ["differences", "edited", "entries"]
 
 # After these the boxes around the geoms of a body are no longer where they were.
 _MOVES = {
@@ -94,7 +95,9 @@ def edited(raw: Any, edits: Iterable[Edit]) -> Any:
 def _set_option(raw: Any, name: str, index: tuple[Any, ...], value: Any) -> None:
     holder, _, field = name.rpartition(".")
     owner = getattr(raw, holder)
-    if index:  # a bit of a set of flags
+    if index and np.ndim(getattr(owner, field)):
+        getattr(owner, field)[index] = value
+    elif index:  # a bit of a set of flags
         flags = int(getattr(owner, field))
         setattr(owner, field, flags | index[0] if value else flags & ~index[0])
     elif np.ndim(getattr(owner, field)):

@@ -1,0 +1,289 @@
+"""Many worlds on MuJoCo: its own `mujoco.batch`, behind the contract of `Worlds`.
+
+A world is a row of mjSTATE_INTEGRATION; a few MjData, one a thread, serve all rows. The engine
+counts the warnings of each world, as it does those of an MjData. What ended a world is found
+by running it once more alone, from where the call began.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch, SimulationError
+
+from ..errors import BadInputError, UnsupportedError
+from ..interface import Array, Ints, Model, State
+from ..interface.checks import check_finite
+from ..interface.worlds import WRITABLE, Worlds
+from ._delays import hold
+from ._mujoco_alarms import (
+    FATAL,
+    AlarmError,
+    Alarms,
+    ended,
+    gave_up,
+    listen,
+    listen_for,
+    pass_on,
+    resets_itself,
+)
+
+_STATE = mujoco.mjtState
+_NO_STAGE = int(mujoco.mjtStage.mjSTAGE_NONE)
+_SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+# What a step may change behind ctrl in a row; what else is there only the caller writes.
+_LATE = (_STATE.mjSTATE_PLUGIN, _STATE.mjSTATE_PLASTIC)
+
+
+class MujocoWorlds(Worlds):
+    """Rows of a Batch. Inputs and derived arrays are views of its memory."""
+
+    _batch: Any  # Batch; None once closed
+    _base: Model
+    _varied: bool
+    _history: Any  # (n, nhistory), or None
+    _layout: tuple[str, tuple[tuple[str, int], ...]]
+    _warned: Any  # (n, kinds, 2) the engine's counters: last index, number
+    _told: Any  # what they were when they were last looked at
+
+    def __init__(
+        self,
+        model: Model,
+        base: Model,
+        size: tuple[int, int],
+        derived: tuple[str, ...],
+        varied: tuple[Mapping[str, Any], bool],
+        layout: tuple[str, tuple[tuple[str, int], ...]],
+    ) -> None:
+        """Make the worlds.
+
+        Args:
+            model: The Model, of this engine.
+            base: What the worlds share: `model`, with what is the same for all.
+            size: Number of worlds and of threads.
+            derived: Names of derived arrays.
+            varied: Arrays (n, ...) of the compiled model that each world has of its own, by
+                name, and whether constants of it follow from them.
+            layout: Of the States, after their fingerprint.
+        """
+        raw = base.raw
+        try:
+            batch = Batch(raw, *size, persistent=bool(raw.opt.enableflags & _SLEEP))
+            for name, value in varied[0].items():
+                batch.expand(name)[:] = value
+            if varied[1]:
+                batch.set_const()
+            arrays = {name: batch.bind(name) for name in (*WRITABLE, *derived)}
+        except (MemoryError, mujoco.FatalError) as error:
+            raise gave_up(error) from error
+        except ValueError as error:  # what a Batch cannot do
+            raise _unsupported(error) from error
+        self._batch, self._layout, self._base = batch, layout, base
+        self._varied = bool(varied[0])
+        self._history = batch.bind("history") if raw.nhistory else None
+        self._warned, self._told = batch.warning, batch.warning.copy()
+        # A copy of what a step changes in a row, to run a world again from there.
+        whole = resets_itself(raw) or any(mujoco.mj_stateSize(raw, int(part)) for part in _LATE)
+        end = batch.nstate if whole else batch._component(_STATE.mjSTATE_CTRL)[0]
+        self._changing = batch.state[:, :end]
+        self._before = np.empty_like(self._changing)
+        super().__init__(model, *size, derived, arrays)
+        listen_for(self)
+
+    def model_of(self, world: int) -> Model:
+        if not self._varied:
+            return self._base
+        self._refuse_if_troubled()
+        return self._base.with_compiled(self._batch.get_model(world))
+
+    def _close(self) -> None:
+        for name in ("_changing", "_before", "_warned", "_told", "_history", "_batch"):
+            setattr(self, name, None)
+
+    def _step(self, ids: Ints, nstep: int) -> Mapping[int, Exception]:
+        count = self._engine_steps(nstep)
+        errors: dict[int, Exception] = {}
+        if self.model._quaternions:
+            qpos = self.qpos if len(ids) == self.n else self.qpos[ids]
+            errors.update(self._zero_quaternions(qpos, ids))
+            if errors:
+                ids = ids[~np.isin(ids, list(errors))]
+        self._before[:] = self._changing
+        return errors | self._call(ids, count, lambda some: self._batch.step(some, count))
+
+    def _forward(self, ids: Ints) -> Mapping[int, Exception]:
+        self._before[:] = self._changing
+        return self._call(ids, 0, self._batch.forward)
+
+    def _engine_steps(self, nstep: int) -> int:
+        count = nstep * self._base.substeps
+        if count >= 2**31:  # the engine counts in a C int
+            raise BadInputError(
+                f"nstep {nstep} × {self._base.substeps} substeps is too large for one call"
+            )
+        return count
+
+    def _call(
+        self, ids: Ints, count: int, call: Callable[[Ints | None], object]
+    ) -> dict[int, Exception]:
+        """Run some worlds and look at what the engine warned of.
+
+        Args:
+            ids: The worlds.
+            count: Engine steps of the call, 0 for none.
+            call: Runs the worlds that it is given, None for all.
+
+        Returns:
+            The error of each world that ended.
+        """
+        errors: dict[int, Exception] = {}
+        if not len(ids):
+            return errors
+        try:
+            call(None if len(ids) == self.n else ids)
+        except SimulationError as error:  # the others ran to their end
+            for world in error.ids.tolist():
+                errors[world] = gave_up(self._batch.error(world))
+        except ValueError as error:  # a callback in Python
+            raise _unsupported(error) from error
+        if (self._warned != self._told).any():
+            errors.update(self._attend(count))
+        return errors
+
+    def _attend(self, count: int) -> dict[int, Exception]:
+        """Look at the counters that differ: the errors, and what else was warned of."""
+        listen()
+        counts = (self._warned - self._told)[:, :, 1]
+        worlds = np.flatnonzero((counts > 0).any(axis=1))
+        fatal = worlds[(counts[worlds][:, list(FATAL.values())] > 0).any(axis=1)]
+        errors = self._causes(fatal, count)
+        # MuJoCo says a thing only the first time after a reset, and so do we.
+        texts = {
+            mujoco.mju_warningText(kind, int(self._warned[world, kind, 0])): None
+            for world in np.setdiff1d(worlds, fatal).tolist()
+            for kind in np.flatnonzero(counts[world] == self._warned[world, :, 1]).tolist()
+            if counts[world, kind]
+        }
+        self._told[:] = self._warned
+        pass_on(list(texts), stacklevel=7)
+        return errors
+
+    def _causes(self, worlds: Ints, count: int) -> dict[int, Exception]:
+        """What ended each of these worlds, from running it again alone."""
+        errors: dict[int, Exception] = {}
+        raw = data = None
+        for world in worlds.tolist():
+            raw = self._batch.get_model(world, raw)
+            data = data or mujoco.MjData(raw)
+            mujoco.mj_resetData(raw, data)
+            alarms = Alarms(raw, data)
+            row = self._batch.state[world].copy()
+            row[: self._before.shape[1]] = self._before[world]
+            mujoco.mj_setState(raw, data, row, int(_STATE.mjSTATE_INTEGRATION))
+            try:
+                if count:
+                    mujoco.mj_step(raw, data, count)
+                else:
+                    mujoco.mj_forward(raw, data)
+                alarms.attend()
+                raise AlarmError("qpos", 0, float(self.time[world]))  # it did not happen again
+            except AlarmError as alarm:
+                errors[world] = ended(self.model, alarm, f"World {world}")
+        return errors
+
+    def _reset(self, ids: Ints, key: int | None) -> None:
+        if len(ids):
+            self._batch.reset(ids, -1 if key is None else key, _NO_STAGE)
+            if self._history is not None:  # as of a Data: the command before was that of the start
+                history = self._history[ids]
+                hold(self._base.raw, history, self.ctrl[ids])
+                self._history[ids] = history
+            self._told[ids] = self._warned[ids]
+        listen()
+
+    def _get_state(self, world: int) -> State:
+        fingerprint, layout = self._layout
+        row = self._batch.state[world]
+        check_finite(row, "state")
+        return State("mujoco", mujoco.__version__, fingerprint, layout, row.tobytes())
+
+    def _set_state(self, world: int, state: State) -> None:
+        self._reset(self._numbers[world : world + 1], None)
+        self._batch.state[world] = state.vector
+
+    def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
+        return self._layout
+
+    def _record(
+        self, ids: Ints, nstep: int, every: int, arrays: Mapping[str, Array], ctrl: Array | None
+    ) -> Mapping[int, Exception]:
+        errors: dict[int, Exception] = {}
+        if self._engine_steps(every) == 1 and len(ids):
+            ids = self._roll_out(ids, nstep, arrays, ctrl)
+        for k in range(nstep // every if len(ids) else 0):
+            if ctrl is not None:
+                self.ctrl[ids] = ctrl[ids, k]
+            errors.update(self._step(ids, every))
+            if errors:
+                ids = ids[~np.isin(ids, list(errors))]
+            for name, array in arrays.items():
+                array[ids, k] = getattr(self, name)[ids]
+        return errors
+
+    def _roll_out(
+        self, ids: Ints, nstep: int, arrays: Mapping[str, Array], ctrl: Array | None
+    ) -> Ints:
+        """Advance and record in one call of the engine.
+
+        Returns:
+            The worlds that it did not do: the engine stops each at its first warning, whatever
+            it is of. These are back where they were.
+        """
+        zero = list(self._zero_quaternions(self.qpos[ids], ids))
+        able = ids[~np.isin(ids, zero)]
+        if not len(able):
+            return ids
+        every_one = len(able) == self.n
+        rows = arrays if every_one else {name: array[able] for name, array in arrays.items()}
+        out: dict[Any, Array] = {name: array for name, array in rows.items() if name != "time"}
+        if "time" in rows:  # no array of an MjData: it is asked for as a part of the state
+            out[_STATE.mjSTATE_TIME] = rows["time"][..., None]
+        self._before[:] = self._changing
+        ctrl_before = None if ctrl is None else self.ctrl.copy()
+        commands = None if ctrl is None else ctrl[able]
+        redo = np.zeros(self.n, dtype=bool)
+        redo[zero] = True
+        try:
+            some = None if every_one else able
+            self._batch.rollout(nstep, commands, record=list(out), ids=some, out=out)
+        except SimulationError as error:
+            redo[error.ids] = True
+        except ValueError as error:  # a callback in Python
+            raise _unsupported(error) from error
+        redo |= (self._warned != self._told).any(axis=(1, 2))
+        if not every_one:
+            for name, array in arrays.items():
+                array[able] = rows[name]
+        again = np.flatnonzero(redo)
+        if len(again):
+            self._changing[again] = self._before[again]
+            self._warned[again] = self._told[again]
+            if ctrl_before is not None:
+                self.ctrl[again] = ctrl_before[again]
+            for array in arrays.values():
+                array[again] = np.nan
+        return again
+
+
+def _unsupported(error: ValueError) -> UnsupportedError:
+    """The error for what a Batch refuses."""
+    reason = " ".join(str(error).split())
+    return UnsupportedError(
+        f"backend 'mujoco' cannot step many worlds of this model: {reason}",
+        backend="mujoco",
+        feature="worlds",
+        reason=reason,
+    )

@@ -1,0 +1,79 @@
+"""Fresh processes of Python, and how much memory is left for them."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+
+def fresh_python(module: str, *arguments: str) -> tuple[list[str], dict[str, str]]:
+    """Command and environment that run a module in a fresh Python, which finds what this one does.
+
+    Args:
+        module: A module of this package, by its full name.
+        *arguments: What it reads in `sys.argv`.
+    """
+    package = Path(__file__).resolve().parents[1]
+    paths = [os.fspath(package), *(path or os.getcwd() for path in sys.path)]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(dict.fromkeys(paths))}
+    return [sys.executable, "-P", "-m", module, *arguments], environment
+
+
+def free_memory() -> int | None:
+    """Bytes that processes may still take before the kernel ends one; None where unknown.
+
+    What Linux calls available, and what is left to the control groups (containers) of this
+    process.
+    """
+    if sys.platform == "win32":
+        return None
+    try:
+        with open("/proc/meminfo", encoding="ascii") as file:
+            lines = dict(line.split(":", 1) for line in file)
+        free = int(lines["MemAvailable"].split()[0]) << 10
+    except (OSError, KeyError):  # nor on macOS
+        return None
+    return max(min([free, *_left_to_groups()]), 0)
+
+
+# Of a control group: where it is mounted, its limit, what it uses, and what of that the kernel
+# gives up first; of the first and the second version.
+_VERSIONS = {
+    "memory": ("memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
+    "": ("", "memory.max", "memory.current", "inactive_file"),
+}
+
+
+def _left_to_groups() -> Iterator[int]:
+    """Bytes that each control group with a limit, of those that this process is in, has left."""
+    lines: list[str] = []
+    if sys.platform == "win32":
+        return
+    with suppress(OSError):
+        lines = Path("/proc/self/cgroup").read_text(encoding="utf-8").splitlines()
+    for line in lines:
+        _, controllers, group = line.split(":", 2)
+        if controllers not in _VERSIONS:
+            continue
+        mount, limit, used, kept = _VERSIONS[controllers]
+        root = Path("/sys/fs/cgroup") / mount
+        place = root / group.strip("/")
+        for folder in (place, *place.parents[: len(place.parts) - len(root.parts)]):
+            with suppress(OSError, ValueError):  # no such file, or no limit: "max"
+                most, now = (
+                    int((folder / name).read_text(encoding="ascii")) for name in (limit, used)
+                )
+                stat = (folder / "memory.stat").read_text(encoding="ascii").split()
+                yield most - now + int(stat[stat.index(kept) + 1])
+
+
+def resident_memory() -> int:
+    """Bytes of memory that this process holds; 0 where it is not told."""
+    try:
+        with open("/proc/self/statm", encoding="ascii") as file:
+            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, AttributeError):  # not Linux
+        return 0

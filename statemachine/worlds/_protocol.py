@@ -1,0 +1,51 @@
+"""What a process that holds worlds is told, and what it answers.
+
+A command and an answer are a few bytes in a pipe, so that each is written and read whole or
+not at all, also where a signal falls in between. All else lies in shared memory: the arrays,
+what belongs to a command (the same for all processes), and a place for each one's answer.
+"""
+
+from __future__ import annotations
+
+import pickle
+import struct
+from enum import IntEnum
+from typing import Any
+
+from ..errors import EngineError, shown
+
+COMMAND = struct.Struct("<qqqqq")  # number of the command, `Verb`, argument, bytes, whether of ids
+ANSWER = struct.Struct("<qq")  # number of the command, bytes
+ANSWER_MOST = 1 << 22  # bytes of an answer
+
+
+class Verb(IntEnum):
+    """What a process is asked for."""
+
+    START = 0  # take the Model, and make two Data
+    FILL = 1  # make the others
+    STEP = 2
+    FORWARD = 3
+    RESET = 4
+    GET_STATE = 5
+    SET_STATE = 6
+    RECORD = 7
+    DERIVE = 8
+    STOP = 9  # end what was asked before
+
+
+def packed(answer: dict[str, Any]) -> bytes:
+    """An answer as bytes."""
+    blob = pickle.dumps(answer)
+    if len(blob) <= ANSWER_MOST:
+        return blob
+    return pickle.dumps({"error": EngineError(f"an answer of {len(blob)} bytes is too large")})
+
+
+def portable(error: Exception) -> Exception:
+    """An error that another process can read: itself, or its text."""
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        return EngineError(f"{type(error).__name__}: {shown(str(error))}")
+    return error

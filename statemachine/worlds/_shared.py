@@ -1,0 +1,92 @@
+"""Memory that several processes map, without a name that could be left behind.
+
+It is a file without a place in any folder, which goes with the last process that holds it,
+however that ends. A process of ours inherits its descriptor. (Windows has a mapping by name,
+which goes with its last holder, too.)
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import secrets
+import sys
+import tempfile
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+_PAGE = 4096
+
+# Of each array its shape and its type.
+Shapes = Mapping[str, tuple[tuple[int, ...], str]]
+# Of each array where it starts, its shape and its type.
+Layout = dict[str, tuple[int, tuple[int, ...], str]]
+
+
+class SharedBlock:
+    """A block of memory, zero at first. What nobody has written to takes no memory.
+
+    Attributes:
+        handle: What `open_block` in another process wants: a descriptor that is to be
+            inherited, or on Windows a name.
+        size: Bytes.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+        if sys.platform == "win32":
+            self.handle = f"statemachine-{os.getpid()}-{secrets.token_hex(8)}"
+            self.memory = mmap.mmap(-1, size, tagname=self.handle)
+            return
+        if hasattr(os, "memfd_create"):
+            self._file = os.memfd_create("worlds")
+        else:
+            with tempfile.TemporaryFile() as file:
+                self._file = os.dup(file.fileno())
+        os.ftruncate(self._file, size)
+        self.handle = str(self._file)
+        self.memory = mmap.mmap(self._file, size)
+
+    @property
+    def inherited(self) -> dict[str, Any]:
+        """What `subprocess.Popen` is to be told."""
+        if sys.platform == "win32":
+            return {}
+        return {"pass_fds": (self._file,)}
+
+    def close(self) -> None:
+        """Let go of it; who still has an array of it keeps that."""
+        if sys.platform != "win32":
+            os.close(self._file)
+        del self.memory
+
+
+def open_block(handle: str, size: int) -> mmap.mmap:
+    """The memory of another process's `SharedBlock`."""
+    if sys.platform == "win32":
+        return mmap.mmap(-1, size, tagname=handle)
+    file = int(handle)
+    memory = mmap.mmap(file, size)
+    os.close(file)
+    return memory
+
+
+def laid_out(shapes: Shapes, start: int) -> tuple[Layout, int]:
+    """Places for arrays one after the other, each on a page of its own, and where they end."""
+    layout: Layout = {}
+    for name, (shape, kind) in shapes.items():
+        layout[name] = (start, shape, kind)
+        size = int(np.prod(shape)) * np.dtype(kind).itemsize
+        start += -(-size // _PAGE) * _PAGE
+    return layout, start
+
+
+def arrays_in(memory: mmap.mmap, layout: Layout) -> dict[str, NDArray[Any]]:
+    """The arrays of a layout."""
+    return {
+        name: np.frombuffer(memory, kind, int(np.prod(shape)), start).reshape(shape)
+        for name, (start, shape, kind) in layout.items()
+    }

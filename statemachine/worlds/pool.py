@@ -1,0 +1,363 @@
+"""Worlds of engines that step one world at a time: processes that hold some Data each.
+
+The arrays lie in memory that all of them share, so that a call passes a few bytes. The worlds
+are dealt out like cards: world i is in process i modulo their number.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import sys
+import time
+import warnings
+import weakref
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from .. import backends
+from ..errors import BusyDataError, EngineError, StateMachineError, UnsupportedError
+from ..interface import INPUTS, Array, Ints, Model, State
+from ..interface.data import alone
+from ..interface.worlds import Worlds
+from ..processes import free_memory
+from ._process import WorldsProcess, end_all, lost_worlds
+from ._protocol import ANSWER_MOST, Verb
+from ._shared import Layout, Shapes, SharedBlock, arrays_in, laid_out
+
+_PATIENCE = 1.0  # seconds in which a process has to end a step that was interrupted
+_SCRATCH = 1 << 24  # bytes for what belongs to a command, at least
+_WORDS = 1 << 16  # of these, for what is no array of a record
+_SPARE = 0.95  # of the memory that is free, what worlds may take
+
+Answers = list[dict[str, Any]]
+
+
+class PoolWorlds(Worlds):
+    """Worlds in processes of their own.
+
+    A derived array is fetched from the processes when it is read for the first time after a
+    call: what nobody reads is not computed.
+
+    A process that ends by itself takes its worlds with it: the call raises EngineError, which
+    names them, and they are left out until `reset` or `set_state`, which start another. After
+    Ctrl-C each world has done all of the call or nothing of it, as its `time` tells.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        n: int,
+        workers: int,
+        derived: tuple[str, ...],
+        options: Mapping[str, Sequence[Any]],
+    ) -> None:
+        """Start the processes, and have them make their Data.
+
+        Args:
+            model: The Model.
+            n: Number of worlds.
+            workers: Processes. There are more where one cannot hold its part of the worlds, and
+                no more than worlds.
+            derived: Names of the derived arrays.
+            options: Checked options of `Model.replace`, each with a value for each world.
+
+        Raises:
+            EngineError: A process does not start, or there is not the memory for all worlds.
+            UnsupportedError: The Model cannot be read in another process.
+        """
+        most = model.capabilities.data_per_process
+        workers = max(min(workers, n), 1 if most is None else -(-n // most))
+        job = {
+            "path": [path or os.getcwd() for path in sys.path],
+            "loaders": backends.loaders(),
+            "workers": workers,
+            "n": n,
+            "options": dict(options),
+            "model": _pickled(model),
+        }
+        shapes = _shapes(model, n, derived)
+        row = sum(8 * int(np.prod(shape)) for shape, _ in shapes.values())
+        self._scratch = max(_SCRATCH, 2 * _WORDS + 2 * row, _WORDS + len(pickle.dumps(job)))
+        self._answers = -(-self._scratch // _WORDS) * _WORDS
+        job["layout"], end = laid_out(shapes, self._answers + workers * ANSWER_MOST)
+        self._block = SharedBlock(end)
+        arrays = arrays_in(self._block.memory, job["layout"])
+        self._options, self._job, self._replaced = options, job, dict[int, Model]()
+        self._chosen: Any = arrays.pop("ids")
+        self._rows: Any = arrays.pop("rows")
+        self._count, self._warned = 0, set[tuple[Any, str]]()
+        self._processes: list[WorldsProcess] = []
+        self._end = weakref.finalize(self, end_all, self._processes, os.getpid())
+        super().__init__(model, n, workers, derived, arrays)
+        self._kept = {name: vars(self)[name] for name in derived}
+        try:
+            for number in range(workers):
+                self._processes.append(self._process_of(number))
+            self._fill(self._processes)
+        except BaseException:
+            self._end()
+            raise
+
+    def model_of(self, world: int) -> Model:
+        if not self._options:
+            return self.model
+        if world not in self._replaced:
+            options = {name: values[world] for name, values in self._options.items()}
+            self._replaced[world] = self.model.replace(**options)
+        return self._replaced[world]
+
+    def _process_of(self, number: int) -> WorldsProcess:
+        worlds = range(number, self.n, self._job["workers"])
+        return WorldsProcess(number, worlds, self._block, self._answers)
+
+    def _fill(self, processes: list[WorldsProcess]) -> None:
+        """Let processes that have just been started make their Data."""
+        answers = self._exchange(processes, Verb.START, self._answers, self._job)
+        self._check(processes, answers)
+        _check_memory(self.n, [answer["value"] for answer in answers])
+        answers = self._exchange(processes, Verb.FILL)
+        self._check(processes, answers)
+        self._fingerprint = answers[0]["value"]
+        for process in processes:
+            process.started()
+
+    def _check(self, processes: list[WorldsProcess], answers: Answers) -> None:
+        """Raise what keeps processes from starting."""
+        for process, answer in zip(processes, answers, strict=True):
+            if process.lost:
+                raise EngineError(f"a process for worlds does not start: {process.how_it_ended()}")
+            error = answer.get("error")
+            if isinstance(error, StateMachineError):
+                raise error
+            if error is not None:
+                raise _unreadable(self.model, error)
+
+    def _close(self) -> None:
+        self._end()
+        self._kept.clear()
+        self._chosen = self._rows = np.zeros(0)
+        self._block.close()
+
+    def _exchange(
+        self,
+        processes: list[WorldsProcess],
+        verb: Verb,
+        argument: int = 0,
+        payload: Any = None,
+        of_ids: bool = False,
+    ) -> Answers:
+        """Tell processes something, and wait for their answers: empty of one that is lost."""
+        size = 0
+        if payload is not None:
+            blob = pickle.dumps(payload)
+            size = len(blob)
+            self._block.memory[:size] = blob
+        self._count += 1
+        number = self._count
+        try:
+            for process in processes:
+                process.send(number, verb, argument, size, of_ids)
+            return [process.receive(number) or {} for process in processes]
+        except BaseException:  # Ctrl-C, mostly
+            self._halt(processes)
+            raise
+
+    def _halt(self, processes: list[WorldsProcess]) -> None:
+        """Let processes end what they are at; kill those that do not."""
+        self._count += 1
+        deadline = time.monotonic() + _PATIENCE
+        try:
+            for process in processes:
+                process.send(self._count, Verb.STOP)
+            for process in processes:
+                process.stop(self._count, deadline)
+        except BaseException:  # a second Ctrl-C
+            for process in processes:
+                process.give_up("it was interrupted twice")
+            raise
+        finally:
+            self._find_lost(processes)
+
+    def _find_lost(self, processes: list[WorldsProcess]) -> EngineError | None:
+        """List the worlds that are gone with their processes, and what to raise for them."""
+        lost = [process for process in processes if process.lost]
+        if not lost:
+            return None
+        error = lost_worlds(lost)
+        for process in lost:
+            self._errors.update(dict.fromkeys(process.worlds, error))
+        return error
+
+    def _ask(
+        self, ids: Ints, verb: Verb, argument: int = 0, payload: Any = None
+    ) -> tuple[dict[int, Exception], Any]:
+        """Let the processes of some worlds do something; the errors, and the last value."""
+        processes, of_ids = self._processes, len(ids) < self.n
+        if of_ids:
+            self._chosen[:] = 0
+            self._chosen[ids] = 1
+            processes = [processes[k] for k in np.unique(ids % len(processes)).tolist()]
+        answers = self._exchange(processes, verb, argument, payload, of_ids)
+        errors: dict[int, Exception] = {}
+        raised: Exception | None = None
+        value: Any = None
+        for answer in answers:
+            if answer:
+                errors |= answer.get("errors", {})
+                raised, value = raised or answer.get("error"), answer.get("value")
+                for kind, text in answer.get("warnings", ()):
+                    self._warn(kind, text)
+        raised = self._find_lost(processes) or raised
+        if raised:
+            self._errors.update(errors)
+            raise raised
+        return errors, value
+
+    def _warn(self, kind: type[Warning], text: str) -> None:
+        """Say what an engine warned of, once for all worlds."""
+        if (kind, text) not in self._warned:
+            self._warned.add((kind, text))
+            warnings.warn(text, kind, stacklevel=8)
+
+    def _renew(self, ids: Ints) -> None:
+        """Start the processes anew that these worlds were in, if they are lost."""
+        if not any(process.lost for process in self._processes):
+            return
+        for number in np.unique(ids % len(self._processes)).tolist():
+            if self._processes[number].lost:
+                self._processes[number].leave()
+                self._processes[number].wait()
+                self._processes[number] = process = self._process_of(number)
+                try:
+                    self._fill([process])
+                except BaseException:
+                    process.give_up("it was not started")
+                    raise
+
+    def _forget(self) -> None:
+        """What is derived is another from now on."""
+        own = vars(self)
+        for name in self.derived:
+            own.pop(name, None)
+
+    def __getattr__(self, name: str) -> Any:  # only for what is not there
+        own = vars(self)
+        if name not in own.get("_kept", ()):
+            return super().__getattr__(name)
+        self._refuse_if_troubled()
+        if self._process != os.getpid():
+            raise BusyDataError(f"{name!r} of these Worlds is known to the process that made them")
+        return alone(self, self._fetched, name)
+
+    def _fetched(self, name: str) -> Array:
+        """A derived array as it is now; the rows of worlds that have diverged stay."""
+        ids = self._numbers
+        if self._errors:
+            ids = ids[~np.isin(ids, list(self._errors))]
+        if len(ids):
+            self._ask(ids, Verb.DERIVE, payload=name)
+        vars(self)[name] = self._kept[name]
+        return self._kept[name]
+
+    def _step(self, ids: Ints, nstep: int) -> Mapping[int, Exception]:
+        self._forget()
+        return self._ask(ids, Verb.STEP, nstep)[0]
+
+    def _forward(self, ids: Ints) -> Mapping[int, Exception]:
+        self._forget()
+        return self._ask(ids, Verb.FORWARD)[0]
+
+    def _reset(self, ids: Ints, key: int | None) -> None:
+        self._forget()
+        self._renew(ids)
+        self._ask(ids, Verb.RESET, -1 if key is None else key)
+
+    def _get_state(self, world: int) -> State:
+        return self._ask(self._numbers[world : world + 1], Verb.GET_STATE, world)[1]
+
+    def _set_state(self, world: int, state: State) -> None:
+        ids = self._numbers[world : world + 1]
+        self._forget()
+        self._renew(ids)
+        self._ask(ids, Verb.SET_STATE, world, state)
+
+    def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
+        return self._fingerprint
+
+    def _record(
+        self, ids: Ints, nstep: int, every: int, arrays: Mapping[str, Array], ctrl: Array | None
+    ) -> Mapping[int, Exception]:
+        self._forget()
+        errors: dict[int, Exception] = {}
+        rows, start = nstep // every, 0
+        sources = {**arrays, **({} if ctrl is None else {"commands": ctrl})}
+        row = sum(8 * int(np.prod(array.shape)) // rows for array in sources.values())
+        most = max(1, (self._scratch - 2 * _WORDS) // max(1, row))
+        while start < rows and len(ids):
+            count = min(most, rows - start)
+            layout = _record_layout(sources, count)
+            shared = arrays_in(self._block.memory, layout)
+            part = slice(start, start + count)
+            if ctrl is not None:
+                shared["commands"][:] = ctrl[:, part]
+            self._rows[ids] = 0
+            ended = self._ask(ids, Verb.RECORD, every, layout)[0]
+            done = self._rows[ids]
+            for name, array in arrays.items():
+                array[ids[done == count], part] = shared[name][ids[done == count]]
+                for world, k in zip(ids[done < count], done[done < count], strict=True):
+                    array[world, start : start + k] = shared[name][world, :k]
+            errors |= ended
+            ids = ids[~np.isin(ids, list(ended))]
+            start += count
+        return errors
+
+
+def _shapes(model: Model, n: int, derived: Sequence[str]) -> Shapes:
+    sizes = {"qpos": (model.nq,), "ctrl": (model.nu,), "time": ()}
+    sizes |= {"xpos": (model.nbody, 3), "xquat": (model.nbody, 4)}
+    sizes |= {"site_xpos": (model.nsite, 3), "site_xmat": (model.nsite, 9)}
+    floats = {name: (n, *sizes.get(name, (model.nv,))) for name in (*INPUTS, "time", *derived)}
+    shapes = {name: (shape, "f8") for name, shape in floats.items()}
+    return {**shapes, "ids": ((n,), "u1"), "rows": ((n,), "i8")}
+
+
+def _record_layout(sources: Mapping[str, Array], rows: int) -> Layout:
+    shapes = {
+        name: ((array.shape[0], rows, *array.shape[2:]), "f8") for name, array in sources.items()
+    }
+    return laid_out(shapes, _WORDS)[0]
+
+
+def _pickled(model: Model) -> bytes:
+    try:
+        return pickle.dumps(model)
+    except Exception as error:
+        raise _unreadable(model, error) from error
+
+
+def _unreadable(model: Model, error: Exception) -> UnsupportedError:
+    reason = f"{type(error).__name__}: {error}"
+    return UnsupportedError(
+        f"worlds of {model.backend} are in processes of their own, which cannot read this Model "
+        f"({reason}): it has to pickle, and its class to be in a module that can be imported",
+        backend=model.backend,
+        feature="worlds",
+        reason=reason,
+    )
+
+
+def _check_memory(n: int, processes: Sequence[Mapping[str, int]]) -> None:
+    """Raise EngineError where the worlds that are still to be made would not fit."""
+    free, left = free_memory(), sum(process["left"] for process in processes)
+    each = max(process["each"] for process in processes)
+    if free is None or left * each <= _SPARE * free:
+        return
+    fit = n - left + int(_SPARE * free / each)
+    raise EngineError(
+        f"{n} worlds do not fit into memory: one takes {each / 1e6:.0f} MB, and "
+        f"{free / 1e9:.1f} GB are free: make {fit} at most"
+    )

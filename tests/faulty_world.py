@@ -1,0 +1,81 @@
+"""A backend whose steps can be told to fail: the first number of ctrl says how."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+import warnings
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from statemachine.backends import HiddenModel, mujoco_backend
+from statemachine.backends.mujoco_backend import MujocoModel
+from statemachine.errors import EngineError, EngineWarning
+
+from .hidden_world import ExampleModel, ExampleWorld
+
+RAISE, CRASH, NOISE, SLOW, STUCK, DIVERGE = (0.101, 0.102, 0.103, 0.104, 0.105, 0.106)
+MOST = 6  # worlds that a process can hold: two Data of a Model of their own each, with a look-ahead
+
+
+class FaultyError(Exception):
+    """What the engine raises; no other process can read it, for it wants two arguments."""
+
+    def __init__(self, what: str, where: str) -> None:
+        super().__init__(f"{what} {where}")
+
+
+class FaultyWorld(ExampleWorld):
+    """An example that does what it is told."""
+
+    engine = "Faulty"
+    errors = (FaultyError,)
+    alive = 0
+
+    def __init__(self, model: MujocoModel) -> None:
+        if FaultyWorld.alive >= MOST:
+            raise EngineError(f"{MOST} worlds at most")
+        FaultyWorld.alive += 1
+        super().__init__(model)
+
+    def step(self) -> None:
+        what = float(self._ctrl[0])
+        if what == RAISE:
+            raise FaultyError("it broke", "here")
+        if what == CRASH:
+            os.kill(os.getpid(), signal.SIGKILL)
+        elif what == NOISE:
+            os.write(1, b"noise on 1\n")
+            os.write(2, b"noise on 2\n")
+            warnings.warn("it creaks", EngineWarning, stacklevel=1)
+        elif what == SLOW:
+            time.sleep(0.001)
+        elif what == STUCK:
+            threading.Lock().acquire()
+            threading.Event().wait(60)
+        elif what == DIVERGE:
+            self.raw.qpos[1] = float("nan")
+        super().step()
+
+    def close(self) -> None:
+        FaultyWorld.alive -= 1
+        super().close()
+
+
+def load(path: Any, defaults: str = "model") -> HiddenModel:
+    """Compile a file."""
+    return FaultyModel(mujoco_backend.load(Path(path)))
+
+
+class FaultyModel(ExampleModel):
+    """A Model of such worlds."""
+
+    def __init__(self, inner: MujocoModel) -> None:
+        super().__init__(inner)
+        vars(self)["_open_world"] = partial(FaultyWorld, inner)
+
+    def _replace(self, options: dict[str, Any]) -> FaultyModel:
+        return FaultyModel(self.inner._replace(options))

@@ -1,0 +1,621 @@
+"""Many worlds: each what one Data would be, bit for bit, on every backend."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import pickle
+import subprocess
+import sys
+import threading
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine import worlds as many
+from statemachine.errors import (
+    BadInputError,
+    BusyDataError,
+    ClosedDataError,
+    DivergedError,
+    DivergedWarning,
+    ForeignStateError,
+    ReadOnlyError,
+    StateMachineError,
+    UnknownNameError,
+    UnsupportedError,
+)
+from statemachine.interface.worlds import WRITABLE
+
+from .conftest import ROOT, SHARED, need_engine
+
+N = 4
+# Activation, mocap, an equality, a tendon, a ball joint, two substeps of a free body.
+RICH = """
+<mujoco><option timestep="0.002"/><worldbody><geom type="plane" size="2 2 .1"/>
+  <body name="target" mocap="true" pos="0 0 1"/>
+  <body name="free" pos="0 0 .3"><freejoint/><geom size=".1"/></body>
+  <body name="arm" pos="1 0 1"><joint name="ball" type="ball"/><geom size=".05" pos=".1 0 0"/>
+    <body pos=".2 0 0"><joint name="a" damping=".1"/><geom size=".05" pos=".1 0 0"/>
+      <body pos=".2 0 0"><joint name="b" axis="0 1 0"/><geom size=".05" pos=".1 0 0"/>
+        <site name="tip" pos=".1 0 0"/></body></body></body></worldbody>
+  <tendon><fixed name="t"><joint joint="a" coef="1"/><joint joint="b" coef="-1"/></fixed></tendon>
+  <equality><connect body1="arm" body2="target" anchor="0 0 0"/></equality>
+  <actuator><general name="filtered" tendon="t" dyntype="filter" dynprm=".1" gainprm="2"/>
+    <motor name="m" joint="a"/></actuator>
+  <keyframe><key name="up" time="2" ctrl="1 .5" act=".25" mpos="0 .1 1.1"/></keyframe></mujoco>
+"""
+
+
+def worlds_of(model: sm.Model, n: int = N, **options: Any) -> many.Worlds:
+    if model.backend != "mujoco":
+        pytest.importorskip("statemachine.worlds.pool")
+    return many.make_worlds(model, n, workers=options.pop("workers", 2), **options)
+
+
+@pytest.fixture(params=["so101", "so101/scene_box"])
+def model(request: pytest.FixtureRequest, backend: str) -> sm.Model:
+    return sm.load(request.param, backend=backend)
+
+
+@pytest.fixture
+def box(backend: str) -> sm.Model:
+    return sm.load("so101/scene_box", backend=backend)
+
+
+@pytest.fixture
+def worlds(box: sm.Model) -> Iterator[many.Worlds]:
+    with worlds_of(box) as worlds:
+        yield worlds
+
+
+def equal(worlds: many.Worlds, data: list[sm.Data], ids: Any = None) -> None:
+    """Assert that each world is what its Data is."""
+    for i in range(worlds.n) if ids is None else ids:
+        for name in (*WRITABLE, *worlds.derived):
+            ours, single = getattr(worlds, name)[i], np.asarray(getattr(data[i], name))
+            assert ours.shape == single.shape
+            assert np.array_equal(ours, single, equal_nan=True), (i, name)
+
+
+def commands(model: sm.Model, *shape: int) -> np.ndarray:
+    return np.random.default_rng(1).uniform(-0.8, 0.8, (*shape, model.nu))
+
+
+def follow(model: sm.Model, worlds: many.Worlds, rounds: int = 12) -> None:
+    """Drive worlds and as many single Data through the same life, and compare all along."""
+    data = [sm.make_data(model) for _ in range(worlds.n)]
+    equal(worlds, data)
+    if model.keyframes:
+        many.reset(worlds, keyframe=0)
+        for each in data:
+            sm.reset(model, each, 0)
+        equal(worlds, data)
+    for k, ctrl in enumerate(commands(model, rounds, worlds.n)):
+        worlds.ctrl = ctrl
+        for i, each in enumerate(data):
+            each.ctrl = ctrl[i]
+            sm.step(model, each, 3)
+            if k:
+                sm.step(model, each, k)
+        if k % 2:
+            many.step(worlds, 3 + k)
+        else:  # some, out of order, and the others; in two pieces
+            mask = np.arange(worlds.n) % 2 == 0
+            many.step(worlds, 3, ids=np.flatnonzero(~mask)[::-1])
+            many.step(worlds, 3, ids=mask)
+            if k:
+                many.step(worlds, k)
+        equal(worlds, data)
+    many.forward(worlds, ids=[0, 2])
+    for each in data[0:3:2]:
+        sm.forward(model, each)
+    equal(worlds, data)
+    many.step(worlds, 2)
+    for each in data:
+        sm.step(model, each, 2)
+    equal(worlds, data)
+    many.reset(worlds, ids=[1])
+    sm.reset(model, data[1])
+    equal(worlds, data)
+    for each in data:
+        each.close()
+
+
+def test_a_world_is_what_one_data_is(model: sm.Model) -> None:
+    with worlds_of(model) as worlds:
+        assert not worlds.xpos.any()
+        follow(model, worlds)
+        many.reset(worlds, ids=[1])
+        assert not worlds.xpos[1].any()
+        assert worlds.xpos[2].any()
+
+
+def test_with_substeps_a_timestep_and_latency(box: sm.Model) -> None:
+    model = box.replace(substeps=3, timestep=0.004, latency=0.02)
+    with worlds_of(model, 3) as worlds:
+        follow(model, worlds, 4)
+
+
+@pytest.mark.parametrize("workers", [1, 2, 3])
+def test_no_result_depends_on_the_workers(box: sm.Model, workers: int) -> None:
+    ctrl = commands(box, N)
+    rows = []
+    for count in (1, workers):
+        with worlds_of(box, workers=count, derived=("qacc",)) as worlds:
+            many.reset(worlds, keyframe=0)
+            worlds.ctrl = ctrl
+            many.step(worlds, 40)
+            rows.append(np.hstack([worlds.qpos, worlds.qvel, worlds.qacc]))
+    assert np.array_equal(*rows)
+    assert not np.array_equal(rows[0][0], rows[0][1])
+
+
+def test_states_move_between_worlds_and_data(worlds: many.Worlds) -> None:
+    model = worlds.model
+    data = sm.make_data(model)
+    sm.reset(model, data, 0)
+    sm.step(model, data, 60)  # in contact
+    many.set_state(worlds, 2, sm.get_state(model, data))
+    again = sm.make_data(model)
+    sm.set_state(model, again, pickle.loads(pickle.dumps(sm.get_state(model, data))))
+    assert not worlds.xpos[2].any()
+    assert many.get_state(worlds, 2) == sm.get_state(model, again)
+    many.step(worlds, 20)
+    sm.step(model, again, 20)
+    equal(worlds, [again] * N, [2])
+    assert not np.array_equal(worlds.qpos[1], worlds.qpos[2])
+    back = many.get_state(worlds, 2)
+    sm.set_state(model, data, back)
+    sm.set_state(model, again, back)
+    sm.step(model, data, 5)
+    many.set_state(worlds, 0, back)
+    many.step(worlds, 5, ids=[0])
+    equal(worlds, [data], [0])
+
+
+@pytest.mark.parametrize("every", [1, 4])
+@pytest.mark.parametrize("commanded", [False, True])
+def test_a_record_is_what_a_loop_reads(box: sm.Model, every: int, commanded: bool) -> None:
+    steps = 12
+    ctrl = commands(box, N, steps // every)
+    fields = ("time", "qpos", "qvel", "ctrl", "xpos", "qfrc_constraint")
+    with worlds_of(box) as worlds:
+        many.reset(worlds, keyframe=0)
+        rows = many.record(worlds, steps, fields, every=every, ctrl=ctrl if commanded else None)
+        assert list(rows) == list(fields)
+        for i in range(N):
+            data = sm.make_data(box)
+            sm.reset(box, data, 0)
+            for k in range(steps // every):
+                if commanded:
+                    data.ctrl = ctrl[i, k]
+                sm.step(box, data, every)
+                for name in fields:
+                    assert np.array_equal(rows[name][i, k], getattr(data, name)), (name, i, k)
+            equal(worlds, [data] * N, [i])
+            data.close()
+
+
+def single_error(model: sm.Model, spoil: Any, nstep: int) -> tuple[sm.Data, Any]:
+    data = sm.make_data(model)
+    sm.reset(model, data, 0)
+    spoil(data)
+    with pytest.raises(StateMachineError) as error:
+        sm.step(model, data, nstep)
+    return data, error.value
+
+
+SPOILS = {
+    "a NaN in ctrl": lambda of: of.ctrl.__setitem__((..., 2), np.nan),
+    "a NaN in qpos": lambda of: of.qpos.__setitem__((..., 1), np.nan),
+    "too fast": lambda of: of.qvel.__setitem__((..., slice(None)), 1e9),
+    "a zero quaternion": lambda of: of.qpos.__setitem__((..., slice(9, 13)), 0.0),
+}
+
+
+class Row:
+    """One world, with the inputs as a Data has them."""
+
+    def __init__(self, worlds: many.Worlds, world: int) -> None:
+        self.qpos, self.qvel = worlds.qpos[world], worlds.qvel[world]
+        self.ctrl = worlds.ctrl[world]
+
+
+@pytest.mark.parametrize("what", SPOILS)
+@pytest.mark.parametrize("recorded", [False, True])
+def test_a_world_that_diverges_leaves_the_others_alone(
+    worlds: many.Worlds, what: str, recorded: bool
+) -> None:
+    model = worlds.model
+    many.reset(worlds, keyframe=0)
+    SPOILS[what](Row(worlds, 1))
+    step = 1 if recorded else 20
+    _, wanted = single_error(model, SPOILS[what], step)
+    rows = {}
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        if recorded:
+            rows = many.record(worlds, 20, ("qpos", "time"))
+        else:
+            many.step(worlds, 20)
+    assert [w.category for w in told] == [DivergedWarning]
+    assert str(told[0].message).startswith(f"1 of {N} worlds diverged and is left out")
+    if recorded:
+        assert np.isnan(rows["qpos"][1, -1]).all()
+        assert np.isnan(rows["time"][1, -1])
+        assert np.isfinite(np.delete(rows["qpos"], 1, axis=0)).all()
+    assert list(worlds.diverged) == [1]
+    error: Any = worlds.diverged[1]
+    assert type(error) is type(wanted)
+    for fact in ("quantity", "index", "time"):
+        assert getattr(error, fact, None) == getattr(wanted, fact, None)
+    data = sm.make_data(model)
+    sm.reset(model, data, 0)
+    sm.step(model, data, 20)
+    equal(worlds, [data] * N, [0, 2, 3])
+    with pytest.raises(DivergedError, match=r"world 1 .* reset it"):
+        many.get_state(worlds, 1)
+    before = worlds.time[1]
+    many.step(worlds, ids=[0, 1])  # left out, and not told of again
+    assert worlds.time[1] == before or np.isnan(before)
+    assert worlds.time[0] == pytest.approx(data.time + model.timestep)
+    many.forward(worlds)
+    with pytest.raises(UnknownNameError):
+        many.reset(worlds, ids=[1], keyframe="no such")
+    assert 1 in worlds.diverged
+    if recorded:
+        many.reset(worlds, ids=[1], keyframe=0)
+    else:
+        many.set_state(worlds, 1, many.get_state(worlds, 2))
+    assert not worlds.diverged
+    time = worlds.time[1]
+    many.step(worlds)
+    assert worlds.time[1] == pytest.approx(time + model.timestep)
+
+
+def test_a_warning_names_a_few(box: sm.Model) -> None:
+    with worlds_of(box, 7) as worlds:
+        worlds.ctrl[:, 0] = np.nan
+        with pytest.warns(DivergedWarning) as told:
+            many.step(worlds)
+        text = str(told[0].message)
+        assert text.startswith("7 of 7 worlds diverged and are left out until reset or set_state")
+        assert text.endswith("and 2 more")
+        assert "0 (" in text
+        assert "5 (" not in text
+        many.step(worlds, 3)  # none is left
+        assert many.record(worlds, 2)["qpos"].shape == (7, 2, box.nq)
+        assert told[0].filename == __file__
+
+
+def test_forward_refuses_before_anything_changes(worlds: many.Worlds) -> None:
+    worlds.qpos[2, 1] = np.nan
+    with pytest.raises(BadInputError, match=r"^world 2: qpos\[1\] \(shoulder_lift\)") as error:
+        many.forward(worlds)
+    told: Any = error.value
+    assert (told.quantity, told.index, told.world) == ("qpos", 1, 2)
+    assert not worlds.xpos.any()
+    assert not worlds.diverged
+    with pytest.raises(BadInputError, match="world 2"):
+        many.get_state(worlds, 2)
+    many.forward(worlds, ids=[0, 1, 3])
+    assert worlds.xpos[3].any()
+    many.reset(worlds)
+    worlds.qpos[3, 9:13] = 0
+    with pytest.raises(BadInputError, match=r"world 3: .* is zero"):
+        many.forward(worlds)
+
+
+def test_assignment_copies_a_row_or_all(worlds: many.Worlds) -> None:
+    model, kept = worlds.model, worlds.ctrl
+    worlds.ctrl = np.arange(model.nu)
+    assert (worlds.ctrl == np.arange(model.nu)).all()
+    worlds.ctrl = commands(model, N)
+    assert np.array_equal(kept, commands(model, N))
+    worlds.ctrl *= 2
+    assert np.array_equal(kept, 2 * commands(model, N))
+    assert worlds.ctrl is kept
+    worlds.time = 3
+    many.step(worlds)
+    assert worlds.time == pytest.approx([3 + model.timestep] * N)
+    for bad in (np.zeros((N, model.nu + 1)), np.zeros((N + 1, model.nu)), "x", [[1], [1, 2]]):
+        with pytest.raises(BadInputError):
+            worlds.ctrl = bad
+    with pytest.raises(BadInputError):
+        worlds.qvel = np.full((N, model.nv), np.inf)
+    with pytest.raises(BadInputError, match=r"world 0: .* is zero"):
+        worlds.qpos = np.zeros((N, model.nq))
+    for name in ("xpos", "n", "anything"):
+        with pytest.raises(ReadOnlyError):
+            setattr(worlds, name, 1)
+    with pytest.raises(ValueError, match="read-only"):
+        worlds.xpos[0] = 1
+    assert np.array_equal(kept, 2 * commands(model, N))
+    worlds.ctrl.setflags(write=False)
+    with pytest.raises(ReadOnlyError, match=r"worlds\.ctrl"):
+        many.step(worlds)
+
+
+def test_arguments_are_checked(worlds: many.Worlds) -> None:
+    model: Any = worlds.model
+    for ids in ([0, 0], [N], [-1], 2, [0.5], [[1]], [True, False], "a", [[1], [2, 3]]):
+        for verb in (many.step, many.forward, many.reset):
+            with pytest.raises(BadInputError):
+                verb(worlds, ids=ids)
+    many.step(worlds, ids=[])
+    nstep: Any
+    for nstep in (0, -1, 1.0, True, "3", 2**31):
+        with pytest.raises(BadInputError):
+            many.step(worlds, nstep)
+        with pytest.raises(BadInputError):
+            many.record(worlds, nstep)
+    for world in (N, -1, 0.0, None, True):
+        with pytest.raises(BadInputError):
+            many.get_state(worlds, world)  # type: ignore[arg-type]
+    for every in (0, 3, 8):
+        with pytest.raises(BadInputError):
+            many.record(worlds, 4, every=every)
+    for ctrl in (np.zeros((N, 4, model.nu)), np.zeros(model.nu), np.full((2, model.nu), np.nan)):
+        with pytest.raises(BadInputError):
+            many.record(worlds, 4, every=2, ctrl=ctrl)
+    with pytest.raises(UnknownNameError, match="Did you mean 'qpos'"):
+        many.record(worlds, 1, ["qpo"])
+    with pytest.raises(UnknownNameError):
+        many.reset(worlds, keyframe=77)
+    other = sm.load("so101", backend=model.backend)
+    foreign = sm.get_state(other, sm.make_data(other))
+    with pytest.raises(ForeignStateError):
+        many.set_state(worlds, 0, foreign)
+    with pytest.raises(TypeError):
+        many.set_state(worlds, 0, b"")  # type: ignore[arg-type]
+    with pytest.raises(TypeError):
+        many.step(sm.make_data(model))  # type: ignore[arg-type]
+    with pytest.raises(TypeError):
+        many.make_worlds(worlds, 1)  # type: ignore[arg-type]
+    for bad in ({"n": 0}, {"n": 2, "workers": 0}, {"n": 2, "timestep": [0.1]}):
+        with pytest.raises(BadInputError):
+            many.make_worlds(model, **bad)  # type: ignore[arg-type]
+    with pytest.raises(BadInputError, match="world 1: timestep"):
+        many.make_worlds(model, 2, timestep=[0.001, -1])
+    with pytest.raises(UnsupportedError):
+        many.make_worlds(model, 2, colour=[1, 2])
+    with pytest.raises(UnknownNameError):
+        many.make_worlds(model, 2, derived=["contacts"])
+    assert not worlds.time.any()
+    assert not worlds.xpos.any()
+
+
+def test_what_is_not_kept_is_not_there(box: sm.Model) -> None:
+    with worlds_of(box, 2, derived=("xpos",)) as worlds:
+        many.step(worlds)
+        assert worlds.derived == ("xpos",)
+        assert worlds.xpos.shape == (2, box.nbody, 3)
+        with pytest.raises(AttributeError, match="do not keep 'qacc'"):
+            _ = worlds.qacc
+        with pytest.raises(UnknownNameError):
+            many.record(worlds, 1, ["qacc"])
+
+
+def test_closed_worlds_keep_their_inputs_and_refuse(box: sm.Model) -> None:
+    with worlds_of(box) as worlds:
+        many.step(worlds, 3)
+        view, qpos = worlds.ctrl, worlds.qpos.copy()
+        assert len(worlds) == N
+        assert f"{N} of" in repr(worlds)
+    worlds.close()
+    assert np.array_equal(worlds.qpos, qpos)
+    assert worlds.time == pytest.approx([3 * box.timestep] * N)
+    for use in (many.step, many.forward, many.reset, lambda w: many.get_state(w, 0)):
+        with pytest.raises(ClosedDataError):
+            use(worlds)
+    with pytest.raises(ClosedDataError):
+        _ = worlds.xpos
+    with pytest.raises(ClosedDataError):
+        worlds.ctrl = np.zeros(box.nu)
+    with pytest.raises(ValueError, match="read-only"):
+        view[0] = 1
+
+
+def test_worlds_are_not_pickled(worlds: many.Worlds) -> None:
+    with pytest.raises(TypeError, match="get_state"):
+        pickle.dumps(worlds)
+
+
+def test_one_thread_at_a_time(worlds: many.Worlds) -> None:
+    entered, leave = threading.Event(), threading.Event()
+    hook = worlds._step
+
+    def waiting(ids: Any, nstep: int) -> Any:
+        entered.set()
+        assert leave.wait(30)
+        return hook(ids, nstep)
+
+    worlds._step = waiting  # type: ignore[method-assign]
+    thread = threading.Thread(target=many.step, args=(worlds,))
+    thread.start()
+    try:
+        assert entered.wait(30)
+        for use in (many.forward, many.reset, lambda w: many.get_state(w, 0)):
+            with pytest.raises(BusyDataError, match="another thread is using this Worlds"):
+                use(worlds)
+    finally:
+        leave.set()
+        thread.join()
+    assert worlds.time.all()
+    many.reset(worlds)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
+def test_worlds_belong_to_the_process_that_made_them(worlds: many.Worlds) -> None:
+    def child(answers: Any) -> None:
+        try:
+            many.step(worlds)
+        except BusyDataError as error:
+            answers.put(str(error))
+        worlds.close()
+
+    context = multiprocessing.get_context("fork")
+    answers = context.Queue()
+    process = context.Process(target=child, args=(answers,))
+    process.start()
+    assert "another process" in answers.get(timeout=30)
+    process.join(30)
+    assert process.exitcode == 0
+    many.step(worlds)
+    assert worlds.time.all()
+
+
+def test_each_world_may_have_options_of_its_own(box: sm.Model) -> None:
+    values = {"timestep": [0.002, 0.005, 0.001], "damping": [0.1, 0.2, 0.7]}
+    with worlds_of(box, 3, **values) as worlds:
+        many.reset(worlds, keyframe=0)
+        many.step(worlds, 30)
+        for i in range(3):
+            model = box.replace(**{name: value[i] for name, value in values.items()})
+            assert worlds.model_of(i).timestep == model.timestep
+            data = sm.make_data(model)
+            sm.reset(model, data, 0)
+            sm.step(model, data, 30)
+            equal(worlds, [data] * 3, [i])
+            data.close()
+
+
+@pytest.fixture
+def mujoco_() -> None:
+    need_engine("mujoco")
+
+
+@pytest.fixture
+def rich(mujoco_: None, tmp_path: Path) -> sm.Model:
+    path = tmp_path / "rich.xml"
+    path.write_text(RICH)
+    return sm.load(path)
+
+
+@pytest.mark.parametrize("substeps", [1, 2])
+def test_what_a_file_may_have(rich: sm.Model, substeps: int) -> None:
+    model = rich.replace(substeps=substeps)
+    with worlds_of(model, 5, workers=3) as worlds:
+        follow(model, worlds)
+        data = sm.make_data(model)
+        sm.reset(model, data, 0)
+        data.raw.mocap_pos[0] = [0.2, 0.1, 0.9]
+        many.set_state(worlds, 4, sm.get_state(model, data))
+        many.step(worlds, 30)
+        sm.step(model, data, 30)
+        equal(worlds, [data] * 5, [4])
+        assert sm.get_state(model, data) == many.get_state(worlds, 4)
+
+
+ROBOTS = {
+    "ant": "gym/gymnasium/envs/mujoco/assets/ant.xml",
+    "car": "mj/model/car/car.xml",
+    "adhesion": "mj/model/adhesion/active_adhesion.xml",
+    "carousel": "mj/model/surfacevel/carousel.xml",
+    "ball in cup": "dmc/dm_control/suite/ball_in_cup.xml",
+    "humanoid": "dmc/dm_control/suite/humanoid.xml",
+}
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_robots_of_others(mujoco_: None, name: str) -> None:
+    path = SHARED / "robots" / "models" / ROBOTS[name]
+    if not path.exists():
+        pytest.skip(f"no {path.relative_to(SHARED.parent)} beside the checkout")
+    model = sm.load(path)
+    with worlds_of(model, 3) as worlds:
+        follow(model, worlds, 4)
+
+
+def test_where_the_engine_resets_by_itself(mujoco_: None) -> None:
+    model = sm.load("so101/scene_box", defaults="engine")
+    with worlds_of(model) as worlds:
+        many.reset(worlds, keyframe=0)
+        worlds.qvel[1] = 1e9
+        _, wanted = single_error(model, SPOILS["too fast"], 20)
+        with pytest.warns(DivergedWarning):
+            many.step(worlds, 20)
+        assert str(worlds.diverged[1]).split(".")[0] == str(wanted).split(".")[0]
+
+
+def test_sleep_is_run_or_refused(mujoco_: None, tmp_path: Path) -> None:
+    path = tmp_path / "sleep.xml"
+    flag = '<option timestep="0.002"><flag sleep="enable"/></option>'
+    path.write_text(RICH.replace('<option timestep="0.002"/>', flag))
+    model = sm.load(path)
+    with worlds_of(model, 3) as worlds:
+        follow(model, worlds)
+
+
+def test_a_python_callback_is_refused(mujoco_: None) -> None:
+    import mujoco
+
+    model = sm.load("so101")
+    with worlds_of(model) as worlds:
+        mujoco.set_mjcb_passive(lambda _m, _d: None)
+        try:
+            with pytest.raises(UnsupportedError, match="many worlds"):
+                many.step(worlds)
+        finally:
+            mujoco.set_mjcb_passive(None)
+        many.step(worlds)
+        assert worlds.time.all()
+
+
+def test_a_record_goes_on_past_a_warning_that_ends_nothing(mujoco_: None, tmp_path: Path) -> None:
+    """The engine's own rollout stops a world at any warning."""
+    path = tmp_path / "full.xml"
+    balls = "".join(
+        f'<body pos="{0.05 * (k % 5)} {0.05 * (k // 5)} .04"><freejoint/><geom size=".05"/></body>'
+        for k in range(20)
+    )
+    path.write_text(
+        f'<mujoco><size memory="60K"/><worldbody><geom type="plane" size="2 2 .1"/>{balls}'
+        "</worldbody></mujoco>"
+    )
+    model = sm.load(path)
+    data = sm.make_data(model)
+    with warnings.catch_warnings(record=True) as single:
+        warnings.simplefilter("always")
+        for _ in range(10):
+            sm.step(model, data)
+    assert single
+    with worlds_of(model, 3) as worlds, warnings.catch_warnings(record=True) as ours:
+        warnings.simplefilter("always")
+        rows = many.record(worlds, 10)
+        equal(worlds, [data] * 3)
+        assert np.array_equal(rows["qpos"][2, -1], data.qpos)
+    assert {str(w.message) for w in ours} == {str(w.message) for w in single}
+
+
+def test_the_engine_prints_nothing_and_writes_no_log(mujoco_: None, tmp_path: Path) -> None:
+    code = """
+import warnings, numpy as np, statemachine as sm
+from statemachine import worlds as many
+warnings.simplefilter("ignore")
+worlds = many.make_worlds(sm.load("so101/scene_box"), 64, workers=4)
+for _ in range(20):
+    worlds.ctrl[::2, 3] = np.nan
+    worlds.qvel[1::4] = 1e9
+    many.step(worlds, 10)
+    assert len(worlds.diverged) == 48, len(worlds.diverged)
+    many.reset(worlds)
+worlds.close()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,542 @@
+"""Worlds in processes of their own: the same bits, whatever fails, and nothing left behind."""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.errors import (
+    BusyDataError,
+    ClosedDataError,
+    DivergedError,
+    DivergedWarning,
+    EngineError,
+    EngineWarning,
+    UnsupportedError,
+)
+from statemachine.interface.worlds import BATCHED
+from statemachine.worlds import (
+    Worlds,
+    forward,
+    get_state,
+    make_worlds,
+    pool,
+    record,
+    reset,
+    set_state,
+    step,
+)
+
+from . import faulty_world as faulty
+from .conftest import ROOT, need_engine, registered
+
+linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks at /proc")
+N = 5
+
+
+@pytest.fixture
+def model() -> Iterator[sm.Model]:
+    """On the backend that fails when it is told to."""
+    with registered("faulty", "tests.faulty_world:load") as name:
+        yield sm.load("so101", backend=name)
+
+
+@pytest.fixture
+def worlds(model: sm.Model) -> Iterator[Worlds]:
+    """Five worlds in two processes: 0, 2, 4 and 1, 3."""
+    with make_worlds(model, N, workers=2) as made:
+        yield made
+
+
+def pids(worlds: Any) -> list[int]:
+    return [process.pid for process in worlds._processes]
+
+
+def running(numbers: Iterable[int]) -> list[int]:
+    """Those of some processes that have not ended; zombies have."""
+    found = []
+    for pid in numbers:
+        try:
+            state = Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()[0]
+        except OSError:
+            continue
+        if state not in b"ZX":
+            found.append(pid)
+    return found
+
+
+def all_end(numbers: Iterable[int], seconds: float = 10.0) -> bool:
+    deadline = time.monotonic() + seconds
+    while running(numbers):
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.02)
+    return True
+
+
+def bits(array: Any) -> bytes:
+    return np.ascontiguousarray(array).tobytes()
+
+
+def assert_same(worlds: Worlds, singles: list[sm.Data]) -> None:
+    for name in ("qpos", "qvel", "ctrl", "time", *worlds.derived):
+        rows = getattr(worlds, name)
+        for world, data in enumerate(singles):
+            assert bits(rows[world]) == bits(np.float64(getattr(data, name))), (name, world)
+
+
+def run_both(model: sm.Model, workers: int) -> None:
+    """Everything that can be done to worlds, and to as many Data one after the other."""
+    rng = np.random.default_rng(3)
+    singles = [sm.make_data(model) for _ in range(N)]
+    with make_worlds(model, N, workers=workers) as worlds:
+        assert worlds.workers == min(workers, N)
+        assert_same(worlds, singles)
+        if model.keyframes:
+            reset(worlds, keyframe=0)
+            for data in singles:
+                sm.reset(model, data, keyframe=0)
+            assert_same(worlds, singles)
+        worlds.ctrl[:] = rng.uniform(-0.1, 0.1, worlds.ctrl.shape)
+        for data, row in zip(singles, worlds.ctrl, strict=True):
+            data.ctrl[:] = row
+        step(worlds, 7)
+        for data in singles:
+            sm.step(model, data, 7)
+        assert_same(worlds, singles)
+        # A write reaches one world, with the next step that is for it.
+        worlds.qpos[3, 0] = singles[3].qpos[0] = 0.25
+        worlds.qvel[1, 1] = singles[1].qvel[1] = -0.0
+        worlds.time[0] = 2.0
+        singles[0].time = 2.0
+        assert_same(worlds, singles)
+        for ids in ([0, 3], [1, 2, 4], [3]):
+            step(worlds, 4, ids=ids)
+            for world in ids:
+                sm.step(model, singles[world], 4)
+        assert_same(worlds, singles)
+        state = get_state(worlds, 3)
+        assert state == sm.get_state(model, singles[3])
+        set_state(worlds, 0, state)
+        sm.set_state(model, singles[0], state)
+        forward(worlds, ids=[0, 1])
+        for data in singles[:2]:
+            sm.forward(model, data)
+        reset(worlds, ids=[2])
+        sm.reset(model, singles[2])
+        assert_same(worlds, singles)
+        commands = rng.uniform(-0.1, 0.1, (N, 6, model.nu))
+        rows = record(worlds, 12, ("time", "qpos", "site_xpos"), every=2, ctrl=commands)
+        for world, data in enumerate(singles):
+            for row in range(6):
+                data.ctrl[:] = commands[world, row]
+                sm.step(model, data, 2)
+                for name, array in rows.items():
+                    assert bits(array[world, row]) == bits(np.float64(getattr(data, name)))
+        assert_same(worlds, singles)
+    for data in singles:
+        data.close()
+
+
+def test_the_bits_are_those_of_single_data(model: sm.Model) -> None:
+    run_both(model, 2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 3, 64])
+def test_the_bits_do_not_depend_on_the_processes(model: sm.Model, workers: int) -> None:
+    run_both(model, workers)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2, 3])
+def test_a_hidden_world_with_contacts_has_the_same_bits(workers: int) -> None:
+    need_engine("pybullet")
+    run_both(sm.load("so101/scene_box", backend="pybullet"), workers)
+
+
+def test_what_is_not_written_keeps_what_the_engine_remembers() -> None:
+    """A write places the world anew, which drops the contact caches: the bits tell."""
+    need_engine("pybullet")
+    model = sm.load("so101/scene_box", backend="pybullet")
+    with make_worlds(model, 2, workers=1, derived=()) as worlds, sm.make_data(model) as data:
+        sm.reset(model, data, keyframe=0)
+        reset(worlds, keyframe=0)
+        for _ in range(30):
+            sm.step(model, data, 2)
+            step(worlds, 2)
+        assert bits(worlds.qpos) == 2 * bits(data.qpos)
+        worlds.qpos[1, 0] += 1e-9
+        step(worlds, 5)
+        sm.step(model, data, 5)
+        assert bits(worlds.qpos[0]) == bits(data.qpos)
+        assert bits(worlds.qpos[1]) != bits(data.qpos)
+
+
+def test_a_record_longer_than_the_shared_memory(
+    model: sm.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pool, "_SCRATCH", 0)
+    with make_worlds(model, N, workers=2, derived=("xpos",)) as worlds:
+        worlds._scratch = 2 * pool._WORDS + 8 * N * 3 * (6 + 3 * model.nbody + 6)
+        worlds.ctrl[1, 0] = 0.05
+        commands = np.random.default_rng(0).uniform(-0.1, 0.1, (N, 10, model.nu))
+        commands[2, 7, 0] = faulty.DIVERGE
+        with pytest.warns(DivergedWarning, match="1 of 5 worlds"):
+            rows = record(worlds, 10, ("qpos", "xpos"), ctrl=commands)
+    for world in range(N):
+        with sm.make_data(model) as data:
+            for row in range(7 if world == 2 else 10):
+                data.ctrl[:] = commands[world, row]
+                sm.step(model, data)
+                assert bits(rows["qpos"][world, row]) == bits(data.qpos)
+                assert bits(rows["xpos"][world, row]) == bits(data.xpos)
+    assert np.isnan(rows["qpos"][2, 7:]).all()
+
+
+def test_more_worlds_than_a_process_can_hold(model: sm.Model) -> None:
+    vars(model)["capabilities"] = replace(model.capabilities, data_per_process=faulty.MOST // 2)
+    with make_worlds(model, 8, workers=1) as worlds:
+        assert worlds.workers == len(set(pids(worlds))) == 3
+        forward(worlds)
+        assert worlds.qfrc_bias.any(axis=1).all()
+    vars(model)["capabilities"] = replace(model.capabilities, data_per_process=None)
+    with pytest.raises(EngineError, match="6 worlds at most"):
+        make_worlds(model, 8, workers=1)
+
+
+def test_each_world_has_its_own_options(model: sm.Model) -> None:
+    damping = [0.1, 0.2, 0.1]
+    with make_worlds(model, 3, workers=2, damping=damping) as worlds:
+        worlds.qvel[:] = 1.0
+        step(worlds, 5)
+        for world, value in enumerate(damping):
+            other = model.replace(damping=value)
+            assert bits(worlds.model_of(world).dof_damping) == bits(other.dof_damping)
+            with sm.make_data(other) as data:
+                data.qvel[:] = 1.0
+                sm.step(other, data, 5)
+                assert bits(worlds.qpos[world]) == bits(data.qpos)
+
+
+def test_a_world_that_diverges_or_breaks_is_left_out(worlds: Worlds) -> None:
+    worlds.ctrl[1, 0], worlds.ctrl[2, 0] = faulty.RAISE, faulty.DIVERGE
+    with pytest.warns(DivergedWarning, match=r"2 of 5 worlds .* 1 \(Faulty gave up: it broke"):
+        step(worlds, 3)
+    diverged = worlds.diverged[2]
+    assert isinstance(diverged, DivergedError)
+    assert (diverged.quantity, diverged.index, diverged.time) == ("qpos", 1, 0.0)
+    assert type(worlds.diverged[1]) is EngineError
+    step(worlds, 3)
+    assert worlds.time.tolist() == pytest.approx([0.03, 0, 0, 0.03, 0.03])
+    reset(worlds, ids=[1, 2])
+    step(worlds)
+    assert not worlds.diverged
+    assert worlds.time.all()
+
+
+def test_a_process_that_is_killed_takes_its_worlds_with_it(model: sm.Model, worlds: Worlds) -> None:
+    step(worlds, 2)
+    state = get_state(worlds, 3)
+    worlds.ctrl[4, 0] = faulty.CRASH
+    with pytest.raises(EngineError, match=r"3 worlds \(0, 2, 4\) .* SIGKILL") as raised:
+        step(worlds, 3)
+    assert raised.value.worlds == (0, 2, 4)
+    assert list(worlds.diverged) == [0, 2, 4]
+    step(worlds, 1)
+    assert worlds.time[[1, 3]].tolist() == pytest.approx([0.03, 0.03])
+    assert worlds.xpos[1].any()
+    set_state(worlds, 2, state)
+    assert list(worlds.diverged) == [0, 4]
+    reset(worlds, ids=[0])
+    step(worlds, 2)
+    with sm.make_data(model) as data:
+        sm.step(model, data, 2)
+        assert bits(worlds.qpos[0]) == bits(data.qpos)
+        sm.step(model, data, 2)
+        assert bits(worlds.qpos[2]) == bits(data.qpos)
+    for pid in pids(worlds):
+        os.kill(pid, signal.SIGKILL)
+    with pytest.raises(EngineError, match="5 worlds"):
+        step(worlds)
+    reset(worlds)
+    step(worlds)
+    assert not worlds.diverged
+
+
+def interrupted_after(seconds: float, call: Callable[[], Any]) -> float:
+    """Ctrl-C while something is called; how long the call then still took [s]."""
+    pressed = []
+
+    def press() -> None:
+        pressed.append(time.monotonic())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Timer(seconds, press).start()
+    with pytest.raises(KeyboardInterrupt):
+        call()
+    return time.monotonic() - pressed[0]
+
+
+def test_ctrl_c_ends_a_step_at_once_and_each_world_is_whole(
+    model: sm.Model, worlds: Worlds
+) -> None:
+    before = pids(worlds)
+    worlds.ctrl[[2, 3], 0] = faulty.SLOW
+    for pid in before:
+        os.kill(pid, signal.SIGINT)  # is not for them
+    assert interrupted_after(0.8, lambda: step(worlds, 3000)) < 0.9
+    assert pids(worlds) == running(before) == before
+    assert not worlds.diverged
+    times = worlds.time.copy()
+    assert times[[2, 3, 4]].tolist() == [0, 0, 0]
+    assert all(time in (0, pytest.approx(15.0)) for time in times[[0, 1]])
+    worlds.ctrl[:] = 0
+    step(worlds, 2)
+    assert worlds.time == pytest.approx(times + 0.01)
+    with sm.make_data(model) as data:
+        sm.step(model, data, 2)
+        assert bits(worlds.qpos[2]) == bits(data.qpos)
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_what_does_not_hear_it(worlds: Worlds) -> None:
+    worlds.ctrl[0, 0] = faulty.STUCK
+    assert interrupted_after(0.3, lambda: step(worlds)) < 4
+    assert list(worlds.diverged) == [0, 2, 4]
+    assert "interrupted" in str(worlds.diverged[0])
+    reset(worlds)
+    step(worlds)
+    assert worlds.time.all()
+
+
+def test_nothing_is_left_and_closed_is_closed(model: sm.Model) -> None:
+    worlds = make_worlds(model, N, workers=2)
+    step(worlds)
+    kept, numbers, time_of = worlds.qpos, pids(worlds), worlds.time.copy()
+    worlds.close()
+    worlds.close()
+    assert not running(numbers)
+    assert worlds.time.tolist() == time_of.tolist()
+    assert bits(kept) == bits(worlds.qpos)
+    with pytest.raises(ClosedDataError):
+        _ = worlds.xpos
+    with pytest.raises(ClosedDataError):
+        step(worlds)
+    worlds = make_worlds(model, 2, workers=2)
+    numbers = pids(worlds)
+    del worlds
+    gc.collect()
+    assert not running(numbers)
+
+
+def test_what_is_derived_is_computed_when_it_is_read(model: sm.Model) -> None:
+    with make_worlds(model, 2, workers=1, derived=("xpos", "qacc")) as worlds:
+        assert not worlds.xpos.any()
+        kept = worlds.xpos
+        step(worlds, 2)
+        assert "xpos" not in vars(worlds)
+        assert worlds.xpos is worlds.xpos
+        assert worlds.xpos.any()
+        assert not worlds.xpos.flags.writeable
+        assert np.shares_memory(kept, worlds.xpos)
+        with pytest.raises(AttributeError, match="qfrc_bias"):
+            _ = worlds.qfrc_bias
+
+
+def test_engines_are_silent_and_warn_once(
+    model: sm.Model, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with make_worlds(model, N, workers=2) as worlds:
+        worlds.ctrl[:, 0] = faulty.NOISE
+        with pytest.warns(EngineWarning, match="creaks") as told:
+            step(worlds, 2)
+        assert len(told) == 1
+        assert told[0].filename == __file__
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            step(worlds, 2)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_worlds_that_do_not_fit_are_refused_in_one_line(
+    model: sm.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pool, "free_memory", lambda: 300 << 20)
+    pool._check_memory(12, [{"each": 30 << 20, "left": 4}, {"each": 29 << 20, "left": 4}])
+    with pytest.raises(EngineError) as raised:
+        pool._check_memory(1004, [{"each": 30 << 20, "left": 500}, {"each": 0, "left": 500}])
+    assert str(raised.value) == (
+        "1004 worlds do not fit into memory: one takes 31 MB, and 0.3 GB are free: make 13 at most"
+    )
+
+
+@linux
+def test_memory_is_measured_and_no_process_is_left_by_a_refusal(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    need_engine("pybullet")
+    model = sm.load("so101", backend="pybullet")
+    monkeypatch.setattr(pool, "free_memory", lambda: 200 << 20)
+    started: list[int] = []
+    starting = pool.PoolWorlds._fill
+
+    def fill(worlds: Any, processes: Any) -> None:
+        started.extend(process.pid for process in processes)
+        starting(worlds, processes)
+
+    monkeypatch.setattr(pool.PoolWorlds, "_fill", fill)
+    with pytest.raises(EngineError, match=r"takes [23]\d MB, and 0.2 GB are free: make 1[0-3] "):
+        make_worlds(model, 1000, workers=2)
+    assert len(started) == 3
+    assert not running(started)
+
+
+def test_a_model_that_no_other_process_can_read(model: sm.Model) -> None:
+    vars(model)["inner"] = lambda: None
+    with pytest.raises(UnsupportedError, match="in processes of their own, which cannot read"):
+        make_worlds(model, 2)
+
+
+_SCRIPT = """
+import os, sys, time
+import statemachine as sm
+from statemachine import backends
+from statemachine.worlds import make_worlds, step
+backends.register("faulty", "tests.faulty_world:load")
+model = sm.load("so101", backend="faulty")
+worlds = make_worlds(model, 3, workers=2)
+print(*[process.pid for process in worlds._processes], flush=True)
+"""
+_LONG = """
+worlds.ctrl[:, 0] = 0.104
+print("steps", flush=True)
+step(worlds, 10**6)
+"""
+
+
+def script(text: str, **options: Any) -> subprocess.Popen[str]:
+    """A script that is read from standard input."""
+    run = subprocess.Popen(
+        [sys.executable, "-W", "error", "-"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        **options,
+    )
+    assert run.stdin is not None
+    run.stdin.write(text)
+    run.stdin.close()
+    run.stdin = None
+    return run
+
+
+def first_line(run: subprocess.Popen[str]) -> str:
+    assert run.stdout is not None
+    return run.stdout.readline()
+
+
+def rest(run: subprocess.Popen[str]) -> tuple[int, str, str]:
+    """Exit code, and what else was said."""
+    assert run.stdout is not None
+    assert run.stderr is not None
+    with run.stdout, run.stderr:
+        said = run.stdout.read(), run.stderr.read()
+    return run.wait(60), *said
+
+
+@linux
+def test_a_script_without_a_main_and_without_a_close(tmp_path: Path) -> None:
+    shared = set(os.listdir("/dev/shm"))
+    run = script(
+        _SCRIPT + "step(worlds, 3)\nprint(worlds.time)", cwd=tmp_path, start_new_session=True
+    )
+    numbers = [int(pid) for pid in first_line(run).split()]
+    assert rest(run) == (0, "[0.015 0.015 0.015]\n", "")
+    assert len(numbers) == 2
+    assert all_end(numbers, 0.5)
+    assert set(os.listdir("/dev/shm")) <= shared
+    assert not list(tmp_path.iterdir())
+
+
+@linux
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP])
+def test_no_process_outlives_one_that_is_killed_in_a_step(number: signal.Signals) -> None:
+    run = script(_SCRIPT + _LONG)
+    numbers = [int(pid) for pid in first_line(run).split()]
+    assert first_line(run) == "steps\n"
+    time.sleep(0.2)
+    assert running(numbers) == numbers
+    run.send_signal(number)
+    assert run.wait(30) == -number
+    assert all_end(numbers, 4.0)
+    assert rest(run) == (-number, "", "")
+
+
+@linux
+@pytest.mark.slow
+def test_ctrl_c_while_the_processes_start() -> None:
+    run = script(_SCRIPT, start_new_session=True)
+    time.sleep(1.2)
+    children: list[int] = []
+    deadline = time.monotonic() + 30
+    while not children and time.monotonic() < deadline:
+        text = Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text()
+        children = [int(pid) for pid in text.split()]
+    os.killpg(run.pid, signal.SIGINT)
+    assert "KeyboardInterrupt" in rest(run)[2]
+    assert children
+    assert all_end(children, 5.0)
+
+
+@linux
+def test_the_child_of_a_fork_leaves_them_alone(worlds: Worlds) -> None:
+    before = pids(worlds)
+    child = os.fork()
+    if not child:  # it says by its exit code what it found
+        code = 1
+        try:
+            step(worlds)
+        except BusyDataError:
+            code = 0
+        worlds._end()
+        worlds.close()
+        os._exit(code)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    step(worlds)
+    assert pids(worlds) == running(before) == before
+    assert worlds.time.all()
+    assert worlds.derived == BATCHED
+
+
+@linux
+@pytest.mark.slow
+def test_a_forked_child_does_not_keep_them_alive() -> None:
+    fork = "\nif not os.fork():\n    time.sleep(60)\n    os._exit(0)\n"
+    run = script(_SCRIPT + fork + _LONG, start_new_session=True)
+    numbers = [int(pid) for pid in first_line(run).split()]
+    assert first_line(run) == "steps\n"
+    run.kill()
+    run.wait(30)
+    try:
+        assert all_end(numbers, 4.0)
+    finally:
+        os.killpg(run.pid, signal.SIGKILL)
+        rest(run)

@@ -1,0 +1,243 @@
+"""Worlds that differ: options of `Model.replace` for each, and drawing them from a seed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine import worlds
+from statemachine.errors import BadInputError, UnknownNameError
+from statemachine.worlds import LogUniform, Uniform, draw, make_worlds
+
+FIELDS = ("qpos", "qvel", "ctrl", "time")
+FACTS = (
+    "timestep", "gravity", "body_mass", "geom_friction", "actuator_kp", "actuator_kv",
+    "actuator_delay", "dof_armature", "dof_damping", "dof_frictionloss",
+)  # fmt: skip
+N = 5
+
+
+@pytest.fixture(scope="module")
+def box() -> Any:
+    return sm.load("so101/scene_box")
+
+
+def varied(model: Any) -> dict[str, Any]:
+    """Every option of MuJoCo's that can differ between worlds, for N of them."""
+    drawn = draw(
+        model,
+        N,
+        seed=1,
+        mass=Uniform(0.7, 1.3, each=True),
+        friction=(0.3, 1.0),
+        kp=LogUniform(0.5, 2.0),
+        kv=Uniform(0.5, 2.0, each=True),
+        armature=(0.5, 2.0),
+        damping=(0.5, 2.0),
+        frictionloss=(0.0, 2.0),
+        gravity=(0.5, 1.5),
+        latency=Uniform(0.0, 0.04, each=True),
+    )
+    return drawn | {
+        "timestep": [0.002, 0.005, 0.004, 0.003, 0.001],
+        "actuation": [True, True, False, True, True],
+        "contacts": [True, False, True, True, True],
+        "limits": [True, True, True, False, True],
+        "integrator": ["euler", "implicit", "implicitfast", "euler", "implicitfast"],
+        "substeps": [2] * N,
+    }
+
+
+NAMES = (
+    "mass", "friction", "kp", "kv", "armature", "damping", "frictionloss", "gravity", "latency",
+    "timestep", "actuation", "contacts", "limits", "integrator", "substeps",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [*NAMES, "all of them"])
+def test_a_world_is_the_data_of_a_replaced_model(box: Any, name: str) -> None:
+    """Bit for bit, from a keyframe, under a command of its own."""
+    every = varied(box)
+    assert set(every) == set(NAMES) == set(box.capabilities.options)
+    options = every if name not in NAMES else {name: every[name]}
+    push = np.random.default_rng(2).uniform(-0.2, 0.2, (N, 6))
+    with make_worlds(box, N, workers=2, **options) as many:
+        worlds.reset(many, keyframe=0)
+        many.ctrl += push
+        worlds.step(many, 50)
+        worlds.forward(many)
+        for i in range(N):
+            model = box.replace(**{key: values[i] for key, values in options.items()})
+            with sm.make_data(model) as data:
+                sm.reset(model, data, keyframe=0)
+                data.ctrl += push[i]
+                sm.step(model, data, 50)
+                sm.forward(model, data)
+                for field in (*FIELDS, *many.derived):
+                    np.testing.assert_array_equal(getattr(many, field)[i], getattr(data, field))
+            for fact in FACTS:
+                got, wanted = (getattr(each, fact) for each in (many.model_of(i), model))
+                np.testing.assert_array_equal(got, wanted, err_msg=fact)
+
+
+def test_every_backend_has_worlds_that_differ(backend: str) -> None:
+    """What is drawn for domain randomisation, on each, bit for bit."""
+    model = sm.load("so101/scene_box", backend=backend)
+    options = draw(
+        model, 2, seed=4, mass=Uniform(0.8, 1.2, each=True), friction=(0.6, 1.0),
+        kp=(0.8, 1.2), damping=(0.5, 2.0), latency=(0.005, 0.02),
+    )  # fmt: skip
+    with make_worlds(model, 2, workers=2, **options) as many:
+        worlds.reset(many, keyframe=0)
+        many.ctrl += 0.1
+        worlds.step(many, 20)
+        for i in range(2):
+            one = model.replace(**{name: values[i] for name, values in options.items()})
+            with sm.make_data(one) as data:
+                sm.reset(one, data, keyframe=0)
+                data.ctrl += 0.1
+                sm.step(one, data, 20)
+                np.testing.assert_array_equal(many.qpos[i], data.qpos)
+    assert (many.qpos[0] != many.qpos[1]).any()
+
+
+def test_no_world_has_a_compiled_model_of_its_own(box: Any) -> None:
+    """Its own are some kilobytes of arrays; a compiled model of the scene takes 3 MB."""
+    n = 64
+    options = draw(box, n, seed=0, mass=(0.8, 1.2), friction=(0.5, 1.5), kp=(0.8, 1.2))
+    with make_worlds(box, n, **options) as many:
+        batch = many._batch
+        assert batch.models is None
+        expanded = (batch.expanded(name) for name in mujoco.batch.MODEL_FIELDS)
+        size = sum(array.nbytes for array in expanded if array is not None)
+    assert 1000 < size / n < 6000
+    assert mujoco.mj_sizeModel(box.raw) > 2e6
+
+
+def test_a_state_moves_to_a_data_of_the_worlds_model(box: Any) -> None:
+    """Commands on their way, too, of which each world has room for as many as the slowest."""
+    options: dict[str, Any] = {"latency": [0.0, 0.03, 0.1], "kp": [500.0, 900.0, 998.0]}
+    with make_worlds(box, 3, **options) as many:
+        worlds.reset(many, keyframe=0)
+        for k in range(8):
+            many.ctrl[:, 0] = 0.1 * k
+            worlds.step(many, 3)
+        for i in range(3):
+            state, model = worlds.get_state(many, i), many.model_of(i)
+            with sm.make_data(model) as data:
+                sm.set_state(model, data, state)
+                sm.step(model, data, 30)
+                worlds.step(many, 30, ids=[i])
+                np.testing.assert_array_equal(many.qpos[i], data.qpos)
+                np.testing.assert_array_equal(many.qvel[i], data.qvel)
+                worlds.set_state(many, i, sm.get_state(model, data))
+                assert many.time[i] == data.time
+
+
+def test_a_subset_reset_to_a_keyframe_holds_under_latency(box: Any) -> None:
+    with make_worlds(box, 3, latency=[0.1] * 3) as many:
+        many.ctrl[:] = 0.5
+        worlds.step(many, 30)
+        kept = many.qpos[1].copy()
+        worlds.reset(many, ids=[0, 2], keyframe=0)
+        start = many.qpos.copy()
+        worlds.step(many, 20, ids=[0, 2])
+        np.testing.assert_allclose(many.qpos[[0, 2], :6], start[[0, 2], :6], atol=0.01)
+        np.testing.assert_array_equal(many.qpos[1], kept)
+
+
+def test_what_cannot_differ_is_refused(box: Any) -> None:
+    with pytest.raises(BadInputError, match="substeps must be the same in all worlds"):
+        make_worlds(box, 2, substeps=[1, 2])
+    with pytest.raises(BadInputError, match="mass"):
+        make_worlds(box, 2, mass=[box.body_mass, 0 * box.body_mass])
+    with pytest.raises(BadInputError, match="mass"):
+        make_worlds(box, 2, mass=[box.body_mass])
+
+
+def test_options_that_are_alike_change_nothing(box: Any) -> None:
+    """Nominal values drawn with a factor of 1 are the nominal values, bit for bit."""
+    options = draw(box, 2, seed=0, mass=(1, 1), friction=(1, 1), kp=LogUniform(1, 1))
+    with make_worlds(box, 2, **options) as many, make_worlds(box, 2) as plain:
+        for each in (many, plain):
+            worlds.reset(each, keyframe=0)
+            worlds.step(each, 30)
+        np.testing.assert_array_equal(many.qpos, plain.qpos)
+
+
+def test_a_draw_depends_on_seed_number_and_option_alone(box: Any) -> None:
+    ranges: dict[str, Any] = {
+        "mass": (0.8, 1.2),
+        "kp": LogUniform(0.5, 2.0, each=True),
+        "latency": (0.0, 0.03),
+    }
+    many = draw(box, 100, seed=7, **ranges)
+    few = draw(box, 3, seed=7, **dict(reversed(ranges.items())))
+    alone = draw(box, 3, seed=7, kp=ranges["kp"])
+    for name in ranges:
+        np.testing.assert_array_equal(many[name][:3], few[name])
+    np.testing.assert_array_equal(few["kp"], alone["kp"])
+    other = draw(box, 3, seed=8, **ranges)
+    assert all((other[name] != few[name]).any() for name in ranges)
+    # The streams of two options are not the same numbers.
+    factors = {name: many[name][:, 1] / getattr(box, fact)[1]
+               for name, fact in (("mass", "body_mass"), ("kp", "actuator_kp"))}  # fmt: skip
+    assert abs(np.corrcoef(factors["mass"], factors["kp"])[0, 1]) < 0.3
+
+
+def test_the_numbers_of_a_seed_stay_those() -> None:
+    """A seed that a paper names gives these numbers in every version."""
+    model = sm.load("so101")
+    drawn = draw(model, 2, seed=0, latency=(0.0, 1.0), damping=LogUniform(0.5, 2.0))
+    np.testing.assert_allclose(drawn["latency"][:, 0], LATENCIES, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(drawn["damping"][:, 0] / 0.6, FACTORS, rtol=1e-15)
+
+
+LATENCIES = (0.04236974312728847, 0.022566133945349676)
+FACTORS = (0.6496135874063642, 0.5931352164359404)
+
+
+@pytest.mark.parametrize("kind", [Uniform, LogUniform])
+def test_ranges_are_filled_and_kept(box: Any, kind: type[Uniform]) -> None:
+    n = 20_000
+    factors = draw(box, n, seed=3, mass=kind(0.5, 2.0))["mass"][:, 1] / box.body_mass[1]
+    assert factors.min() >= 0.5 * (1 - 1e-12)
+    assert factors.max() <= 2.0 * (1 + 1e-12)
+    # The middle: 1.25 of the numbers, or 1 of their logarithms; both within 4 standard errors.
+    below = np.mean(factors < (1.25 if kind is Uniform else 1.0))
+    assert abs(below - 0.5) < 4 * 0.5 / np.sqrt(n)
+
+
+def test_one_factor_for_all_or_one_for_each(box: Any) -> None:
+    one = draw(box, 4, seed=0, mass=(0.5, 2.0))["mass"]
+    each = draw(box, 4, seed=0, mass=Uniform(0.5, 2.0, each=True))["mass"]
+    bodies = box.body_mass > 0
+    assert one.shape == each.shape == (4, box.nbody)
+    assert (np.ptp(one[:, bodies] / box.body_mass[bodies], axis=1) < 1e-12).all()
+    assert (np.ptp(each[:, bodies] / box.body_mass[bodies], axis=1) > 0.1).all()
+    assert not one[:, ~bodies].any()
+
+
+@pytest.mark.parametrize(
+    ("ranges", "said"),
+    [
+        ({"mass": (1.2, 0.8)}, "0 ≤ low ≤ high"),
+        ({"mass": (-1, 1)}, "0 ≤ low ≤ high"),
+        ({"mass": (0, np.nan)}, "finite"),
+        ({"mass": 1.2}, "mass wants a range"),
+        ({"mass": (1, 2, 3)}, "mass wants a range"),
+    ],
+)
+def test_ranges_that_are_none(box: Any, ranges: dict[str, Any], said: str) -> None:
+    with pytest.raises(BadInputError, match=said):
+        draw(box, 2, seed=0, **ranges)
+    with pytest.raises(BadInputError, match="low > 0"):
+        LogUniform(0.0, 1.0)
+    with pytest.raises(BadInputError, match="seed"):
+        draw(box, 2, seed=-1)
+    with pytest.raises(UnknownNameError, match="friction"):
+        draw(box, 2, seed=0, frictoin=(0.8, 1.2))
