@@ -133,9 +133,8 @@ class HeatMap:
         columns: Values of the one, as text; rows: of the other.
         values: By row and column, in `unit`; None where there is none.
         unit: As it is read.
-        hatched: By row and column, what is not to be read; says: why.
-        framed: By row and column, what is set off; says why too.
-        says: One name for what is hatched, one for what is framed.
+        hatched: By row and column, what is not to be read; the title says why.
+        framed: By row and column, what is set off; likewise.
     """
 
     title: str
@@ -147,7 +146,6 @@ class HeatMap:
     unit: str
     hatched: Sequence[Sequence[bool]]
     framed: Sequence[Sequence[bool]]
-    says: tuple[str, str] = ("", "")
 
 
 @dataclass(frozen=True)

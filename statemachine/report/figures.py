@@ -58,16 +58,16 @@ def drawn(pictures: Sequence[Drawn], form: str) -> bytes:
         {"svg.fonttype": "none", "svg.hashsalt": "statemachine", "text.parse_math": False}
     ):
         size = max(width for width, _ in sizes), sum(heights)
-        figure = Figure(figsize=size, facecolor=_PAPER, layout="constrained" if heights[1:] else None)
+        figure = Figure(
+            figsize=size, facecolor=_PAPER, layout="constrained" if heights[1:] else None
+        )
         rows = figure.subplots(len(pictures), height_ratios=heights, squeeze=False)[:, 0]
         for axes, picture in zip(rows, pictures, strict=True):
             cast("Callable[[Any, Any], None]", _DRAW[type(picture)])(axes, picture)
             if heights[1:]:
                 axes.set_title(picture.title, fontsize="medium", loc="left")
         out = io.BytesIO()
-        figure.savefig(
-            out, format=form, dpi=_DOTS, bbox_inches="tight", metadata=_METADATA[form]
-        )
+        figure.savefig(out, format=form, dpi=_DOTS, bbox_inches="tight", metadata=_METADATA[form])
     return out.getvalue()
 
 
@@ -163,8 +163,9 @@ def _pipeline(axes: Any, picture: Pipeline) -> None:
 def _heat_map(axes: Any, picture: HeatMap) -> None:
     """Cells with their figures; hatched where they are not to be read."""
     import matplotlib
+    from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm, Normalize
-    from matplotlib.patches import Patch, Rectangle
+    from matplotlib.patches import Rectangle
 
     values = np.array([[np.nan if v is None else v for v in row] for row in picture.values])
     known = values[np.isfinite(values) & ~np.array(picture.hatched, dtype=bool)]
@@ -201,18 +202,14 @@ def _heat_map(axes: Any, picture: HeatMap) -> None:
     axes.set_yticks(range(len(picture.rows)), picture.rows, fontsize=8)
     axes.set_xlabel(picture.across)
     axes.set_ylabel(picture.up)
-    handles = []
-    if np.array(picture.hatched).any():
-        handles.append(Patch(facecolor=_PAPER, edgecolor="#999999", hatch="////",
-                             label=picture.says[0]))  # fmt: skip
-    if np.array(picture.framed).any():
-        handles.append(Patch(facecolor="none", edgecolor=_COLOURS[2], label=picture.says[1]))
-    scale = matplotlib.cm.ScalarMappable(norm, colours.resampled(256))
-    bar = axes.figure.colorbar(scale, ax=axes, shrink=0.9)
+    scale = ScalarMappable(norm, colours.resampled(256))
+    bar = axes.figure.colorbar(scale, ax=axes, shrink=0.9, pad=0.02)
+    if wide:
+        steps = [m * 10.0**e for e in range(-15, 16) for m in (1, 2, 5)]
+        bar.set_ticks([step for step in steps if low <= step <= high], minor=False)
+        bar.ax.minorticks_off()
+    bar.ax.yaxis.set_major_formatter(lambda tick, _place: f"{tick:g}")
     bar.set_label(picture.unit)
-    if handles:
-        axes.legend(handles=handles, fontsize="small", frameon=False, loc="lower left",
-                    bbox_to_anchor=(0.0, 1.0), ncols=2)  # fmt: skip
 
 
 def _bars(axes: Any, picture: Bars) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from ..comparison.text import (
     NONE,
     capital,
@@ -13,15 +11,16 @@ from ..comparison.text import (
     quantity,
     reading,
     rough,
-    significant,
 )
-from ..page import Bars, Block, Headline, HeatMap, Page, Section, Table, TableCell, Text, Traces
+from ..page import Block, Headline, Page, Section, Table, TableCell, Text
 from ..sweep.analysis import VERDICTS, SettingGap, SweepReport
 from ..sweep.analysis_map import GapMap
 from ..sweep.analysis_together import BroughtTogether
+from .sweep_pictures import bars, fit_curve, map_picture, size_word, value_word
 
 _SHOWN = 5  # settings of the largest gaps
 _COLUMNS = 7  # of a map that 80 characters have room for
+_NEAR = 0.5  # of the measured gap: a prediction that is farther off is called so
 _SAYS = {
     "agrees": "agree at every seed",
     "some seeds": "agree at some seeds",
@@ -44,7 +43,7 @@ def page(found: SweepReport, command: str = "") -> Page:
         found: The report.
         command: What was typed, or "".
     """
-    blocks: list[Block] = [Text(_made(found)), _quantities(found), Text(_floor(found))]
+    blocks: list[Block] = [Text(_made(found)), Text(_floor(found))]
     blocks += _left_out(found)
     blocks.append(Section("where", "Where they agree", _where(found)))
     if found.parameters:
@@ -56,18 +55,12 @@ def page(found: SweepReport, command: str = "") -> Page:
     return Page(title, origin, blocks, _headline(found))
 
 
-def pictures(found: SweepReport) -> list[HeatMap | Bars | Traces]:
-    """The pictures of the page, in its order."""
-    chosen = [_map_picture(found), _bars(found), *(_fit_curve(found, t) for t in found.together)]
-    return [each for each in chosen if each is not None]
-
-
 def _headline(found: SweepReport) -> Headline:
     main = found.quantity
     pair = listed(list(found.sides))
     lead = (
         f"In {found.agreed} of {count(len(found.settings), 'setting')} {pair} agree within "
-        f"{_rounded(main.tolerance, main.unit)} ({main.says})"
+        f"{size_word(main.tolerance, main.unit)} ({main.says})"
     )
     causes = []
     shares = found.sensitivity
@@ -98,7 +91,7 @@ def _quantities(found: SweepReport) -> Table:
         rows.append(
             (
                 each.says,
-                _rounded(each.tolerance, each.unit),
+                size_word(each.tolerance, each.unit),
                 *counts,
                 quantity(each.median, each.unit),
                 quantity(each.worst, each.unit),
@@ -129,9 +122,10 @@ def _floor(found: SweepReport) -> str:
         "one)"
     )  # fmt: skip
     return (
-        f"The chaos floor: {floor.backend} ran again from starts that differ by {floor.rounding:g}, "
-        f"at {where}: {count(floor.cells, 'cell')}, {floor.seconds:.2g} s. The largest gap that "
-        f"this makes is {rough(max(widths), main.unit)}. "
+        f"The chaos floor: {floor.backend} ran again from starts that differ by "
+        f"{floor.rounding:g}, at {where}: {count(floor.cells, 'cell')}, "
+        f"{floor.seconds:.2g} s. The largest gap that this makes is "
+        f"{rough(max(widths), main.unit)}. "
         + (
             f"In {count(inside, 'setting')} the gap between the engines is inside it: nothing can "
             "be concluded there."
@@ -152,13 +146,17 @@ def _left_out(found: SweepReport) -> list[Block]:
     if not said:
         return []
     none = found.quantity.counts.get("no runs", 0)
-    gone = f" {count(none, 'setting')} thereby have no gap." if none else ""
+    gone = (
+        f" {count(none, 'setting')} thereby {'has' if none == 1 else 'have'} no gap."
+        if none
+        else ""
+    )
     return [Text(f"Left out: {listed(said)}.{gone}")]
 
 
 def _where(found: SweepReport) -> list[Block]:
-    blocks: list[Block] = []
-    picture = _map_picture(found)
+    blocks: list[Block] = [_quantities(found)]
+    picture = map_picture(found)
     if found.map is not None:
         blocks.append(_map_table(found, found.map))
         notes = []
@@ -166,7 +164,7 @@ def _where(found: SweepReport) -> list[Block]:
             notes.append(f"Each figure is the median over {listed(found.map.others)}.")
         if found.map.sampled:
             notes.append(f"{listed(found.map.sampled)}: the middles of equal parts of the range.")
-        marks = "~: inside the chaos floor. =: agrees at every seed, or within tolerance."
+        marks = "~: inside the chaos floor. =: within tolerance."
         notes.append(marks)
         blocks.append(Text(" ".join(notes), small=True))
     if picture is not None:
@@ -187,9 +185,12 @@ def _map_table(found: SweepReport, chart: GapMap) -> Table:
         mark = "~" if chart.inside[r][c] else "=" if value <= tolerance else ""
         return f"{mark}{rough(value * scale)}"
 
-    places = [_value(value) for value in chart.columns]
+    places = [value_word(value) for value in chart.columns]
     rows = [
-        (_value(chart.rows[r]) if chart.up else "gap", *(cell(r, c) for c in range(len(places))))
+        (
+            value_word(chart.rows[r]) if chart.up else "gap",
+            *(cell(r, c) for c in range(len(places))),
+        )
         for r in reversed(range(len(chart.gap)))
     ]
     kept = {round(k * (len(places) - 1) / (_COLUMNS - 1)) for k in range(_COLUMNS)}
@@ -201,58 +202,6 @@ def _map_table(found: SweepReport, chart: GapMap) -> Table:
         f"The gap of the {found.quantity.says},{name}: {down}{chart.across} across",
         wide=frozenset(wide),
     )
-
-
-def _map_picture(found: SweepReport) -> HeatMap | Traces | None:
-    chart, main = found.map, found.quantity
-    if chart is None:
-        return None
-    scale, unit = reading(main.unit)
-    title = f"Gap of the {main.says} between {listed(list(found.sides))}"
-    numbers = [value for value in chart.columns if not isinstance(value, (bool, str))]
-    if not chart.up and len(numbers) == len(chart.columns) > 1:
-        return _curve(found, chart, title)
-    return HeatMap(
-        title + (f"; median over {listed(chart.others)}" if chart.others else ""),
-        chart.across,
-        chart.up,
-        [_value(value) for value in chart.columns],
-        [_value(value) for value in chart.rows] or [""],
-        [[None if v is None else v * scale for v in row] for row in chart.gap],
-        unit.strip(),
-        chart.inside,
-        [[v is not None and v <= main.tolerance for v in row] for row in chart.gap],
-        ("inside the chaos floor", f"within {_rounded(main.tolerance, main.unit)}"),
-    )
-
-
-def _curve(found: SweepReport, chart: GapMap, title: str) -> Traces:
-    """The gap over one parameter."""
-    main, scale = found.quantity, reading(found.quantity.unit)[0]
-    place = found.parameters.index(chart.across)
-    by = sorted(
-        (float(s.values[place]), s)
-        for s in found.settings
-        if s.median is not None
-    ) if not chart.sampled else []  # fmt: skip
-    x = [v for v, _ in by]
-    curves: dict[str, tuple[Sequence[float], Sequence[float]]] = {}
-    if by:
-        curves["median of the seeds"] = (x, [(s.median or 0.0) * scale for _, s in by])
-        if found.seeds > 1:
-            curves["worst seed"] = (x, [(s.worst or 0.0) * scale for _, s in by])
-        if found.floor is not None:
-            curves["chaos floor"] = (x, [(s.floor or 0.0) * scale for _, s in by])
-    else:
-        pairs = [
-            (float(v), g * scale)
-            for v, g in zip(chart.columns, chart.gap[0], strict=True)
-            if g is not None
-        ]
-        x = [v for v, _ in pairs]
-        curves["median"] = (x, [g for _, g in pairs])
-    curves["tolerance"] = ([x[0], x[-1]], [main.tolerance * scale] * 2)
-    return Traces(title, chart.across, f"gap [{reading(main.unit)[1].strip()}]", curves)
 
 
 def _largest(found: SweepReport) -> Table:
@@ -275,7 +224,7 @@ def _largest(found: SweepReport) -> Table:
 
 def _setting(found: SweepReport, setting: SettingGap) -> str:
     pairs = zip(found.parameters, setting.values, strict=True)
-    return few([f"{name} {_value(value)}" for name, value in pairs], 4) or "as it is"
+    return few([f"{name} {value_word(value)}" for name, value in pairs], 4) or "as it is"
 
 
 def _sensitive(found: SweepReport) -> list[Block]:
@@ -308,23 +257,8 @@ def _sensitive(found: SweepReport) -> list[Block]:
     where = "samples in each block" if shares.method == "sobol" else "settings"
     text = f"{capital(_METHODS[shares.method])}; {shares.samples} {where}.{error}"
     blocks: list[Block] = [table, Text(" ".join([text, *shares.notes]), small=True)]
-    picture = _bars(found)
+    picture = bars(found)
     return [*blocks, picture] if picture else blocks
-
-
-def _bars(found: SweepReport) -> Bars | None:
-    shares = found.sensitivity
-    if shares is None or shares.method == "rank":
-        return None
-    return Bars(
-        "What the gap is sensitive to",
-        "share of the gap's variance",
-        [each.label for each in shares.indices],
-        {
-            "first order": [(each.first, each.first_interval) for each in shares.indices],
-            "total": [(each.total, each.total_interval) for each in shares.indices],
-        },
-    )
 
 
 def _together(found: SweepReport) -> list[Block]:
@@ -333,8 +267,9 @@ def _together(found: SweepReport) -> list[Block]:
     blocks: list[Block] = []
     for each in found.together:
         blocks.append(Text(_line(found, each)))
-        blocks.append(Text(_how(found, each), small=True))
-        picture = _fit_curve(found, each)
+        if each.fit is not None:
+            blocks.append(Text(_how(found, each), small=True))
+        picture = fit_curve(found, each)
         if picture is not None:
             blocks.append(picture)
     return blocks
@@ -373,12 +308,11 @@ def _how(found: SweepReport, each: BroughtTogether) -> str:
         said = [f"{left} keeps the model's own {each.label}{own}, {right} has the values."]
     else:
         said = [f"Both sides have the same {each.label}."]
-    if fit is None:
-        return said[0]
+    assert fit is not None
     error = "" if fit.error is None else f"; ± is its standard error, from {fit.of}"
     said.append(
         f"Least gap between {_times(each, fit.bounds[0])} and {_times(each, fit.bounds[1])}, "
-        f"interpolated from {count(fit.curves, 'curve')}{error}."
+        f"in the mean of {count(fit.curves, 'curve')} over settings and seeds{error}."
     )
     if each.measured is None:
         said.append(f"It is not checked by a run: {each.why_not}.")
@@ -387,26 +321,12 @@ def _how(found: SweepReport, each: BroughtTogether) -> str:
             f"Run there, {count(each.pairs, 'pair')}: {quantity(each.measured, unit)}; predicted "
             f"{quantity(each.predicted, unit)}."
         )
+        near = max(_NEAR * each.measured, found.quantity.tolerance)
+        if each.predicted is not None and abs(each.predicted - each.measured) > near:
+            said.append(
+                "That is far off: between its values the design is too coarse for this gap."
+            )
     return " ".join(said)
-
-
-def _fit_curve(found: SweepReport, each: BroughtTogether) -> Traces | None:
-    """The predicted gap over a parameter, and what was measured."""
-    if each.fit is None:
-        return None
-    scale, unit = reading(found.quantity.unit)
-    x, y = each.fit.scan
-    curves: dict[str, tuple[Sequence[float], Sequence[float]]] = {
-        "predicted": (x, [value * scale for value in y]),
-        "tolerance": ([x[0], x[-1]], [found.quantity.tolerance * scale] * 2),
-    }
-    value = each.fit.value
-    if each.measured is not None:
-        width = 0.01 * (x[-1] - x[0])
-        curves["run there"] = ([value - width, value + width], [each.measured * scale] * 2)
-    across = each.label + (" [times the model's own]" if each.times else "")
-    side = found.sides[1] if each.varied == "right" else "both"
-    return Traces(f"The gap over {each.label} in {side}", across, f"gap [{unit.strip()}]", curves)
 
 
 def _fitted(each: BroughtTogether) -> str:
@@ -424,17 +344,6 @@ def _fitted(each: BroughtTogether) -> str:
 
 def _times(each: BroughtTogether, value: float) -> str:
     return f"{value:.4g}{'x' if each.times else ''}"
-
-
-def _rounded(value: float, unit: str) -> str:
-    scale, name = reading(unit)
-    return f"{significant(value * scale, 2)}{name}"
-
-
-def _value(value: object) -> str:
-    if isinstance(value, bool):
-        return "on" if value else "off"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _index(value: float) -> str:

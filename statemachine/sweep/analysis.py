@@ -1,9 +1,9 @@
 """From a sweep to an answer: where two engines agree, what decides it, what brings them together.
 
-    from statemachine.sweep.analysis import sweep_report
+from statemachine.sweep.analysis import sweep_report
 
-    found = sweep_report("sweep-damping")
-    print(found.agreed, "of", len(found.settings), "settings agree")
+found = sweep_report("sweep-damping")
+print(found.agreed, "of", len(found.settings), "settings agree")
 """
 
 from __future__ import annotations
@@ -190,7 +190,8 @@ def sweep_report(
         no_floor = "" if floor else "no cell was to be run for it"
     widths = {} if floor is None else floor.width
     found = {
-        name: _agreement(gaps, name, widths.get(name), facts, tolerances) for name in gaps.quantities
+        name: _agreement(gaps, name, widths.get(name), facts, tolerances)
+        for name in gaps.quantities
     }
     agreement, settings = found[main]
     figures = gaps.gap(main)
@@ -291,7 +292,9 @@ def _tolerance(
     if kind == "joint":
         return np.full(points, COUNT), count
     if kind == "tip":
-        reach = np.linalg.norm(np.concatenate([gaps.left.tip, gaps.right.tip]) - facts.foot, axis=-1)
+        reach = np.linalg.norm(
+            np.concatenate([gaps.left.tip, gaps.right.tip]) - facts.foot, axis=-1
+        )
         far = float(np.nanmax(reach))
         return np.full(points, COUNT * far), f"what {count}, moves it, {far:.2f} m from the foot"
     steps = np.concatenate([gaps.left.timestep, gaps.right.timestep], axis=1)

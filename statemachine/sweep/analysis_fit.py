@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -30,7 +31,7 @@ class FittedValue:
         value: Of the parameter.
         error: Its standard error; of: what that is from.
         of: See error.
-        gap: What is predicted there, the median of the curves [SI].
+        gap: What is predicted there, the mean of the curves [SI].
         bounds: The range of the design.
         edge: Whether it is at the end of the range.
         curves: From how many curves; of a sampled design, from how many settings.
@@ -45,10 +46,8 @@ class FittedValue:
     bounds: tuple[float, float]
     edge: bool
     curves: int
-    scan: tuple[tuple[float, ...], tuple[float, ...]]
-    each: Array = field(
-        default_factory=lambda: np.empty(0), repr=False, metadata={"json": False}
-    )
+    scan: tuple[tuple[float, ...], tuple[float, ...]] = field(repr=False, metadata={"json": False})
+    each: Array = field(default_factory=lambda: np.empty(0), repr=False, metadata={"json": False})
 
     def at(self, value: float) -> float:
         """The predicted gap at a value within the bounds."""
@@ -70,7 +69,9 @@ class FittedValue:
         return "together" if gap <= good else "closer"
 
 
-def fit_curves(name: str, levels: Array, left: Array, right: Array) -> FittedValue | None:
+def fit_curves(
+    name: str, levels: Array, left: Array, right: Array, seeds: Sequence[int]
+) -> FittedValue | None:
     """The least gap over a parameter, from runs at some of its values.
 
     Each number of a run is interpolated over the parameter (PCHIP, which does not overshoot), and
@@ -82,6 +83,7 @@ def fit_curves(name: str, levels: Array, left: Array, right: Array) -> FittedVal
         levels: (k,) values of the parameter, increasing.
         left: (c, k, m, d) curves of the one side; (c, 1, m, d) where it keeps its own value.
         right: (c, k, m, d) of the other. NaN where there is no run.
+        seeds: (c,) that of each curve: the curves of a seed are no independent figures.
 
     Returns:
         The value; None if there are fewer than three values or no whole curve.
@@ -92,7 +94,9 @@ def fit_curves(name: str, levels: Array, left: Array, right: Array) -> FittedVal
     whole = [k for k in range(count) if _whole(left[k]) and _whole(right[k])]
     if not whole:
         return None
-    chosen = np.array(whole)[np.linspace(0, len(whole) - 1, min(len(whole), MOST_CURVES)).astype(int)]
+    chosen = np.array(whole)[
+        np.linspace(0, len(whole) - 1, min(len(whole), MOST_CURVES)).astype(int)
+    ]
     used = ~np.isnan(right[chosen]).all(axis=(0, 1)) & ~np.isnan(left[chosen]).all(axis=(0, 1))
     left, right = (np.where(used, each[chosen], 0.0) for each in (left, right))
     interpolate = importlib.import_module("scipy.interpolate")
@@ -105,12 +109,18 @@ def fit_curves(name: str, levels: Array, left: Array, right: Array) -> FittedVal
     low, high = float(levels[0]), float(levels[-1])
     scan = np.linspace(low, high, _SCAN)
     table = gaps(scan)
-    centre = np.median(table, axis=1)
-    value = _refined(lambda x: float(np.median(gaps(np.array([x])))), scan, centre)
+    centre = table.mean(axis=1)
+    value = _refined(lambda x: float(gaps(np.array([x])).mean()), scan, centre)
     slope = difference.derivative()
     each = np.full(count, np.nan)
     each[chosen] = gaps(np.array([value]))[0]
-    if len(chosen) >= _LEAST_CURVES:
+    own_seeds = np.array(seeds)[chosen]
+    drawn = np.unique(own_seeds)
+    if len(drawn) >= _LEAST_CURVES:
+        by_seed = np.array([table[:, own_seeds == seed].mean(axis=1) for seed in drawn]).T
+        error = float(np.std(_drawn_again(scan, by_seed)))
+        of = f"{len(drawn)} seeds drawn again"
+    elif len(chosen) >= _LEAST_CURVES:
         error = float(np.std(_drawn_again(scan, table)))
         of = f"{len(chosen)} curves drawn again"
     else:
@@ -120,7 +130,7 @@ def fit_curves(name: str, levels: Array, left: Array, right: Array) -> FittedVal
         value=value,
         error=error,
         of=of,
-        gap=float(np.nanmedian(each)),
+        gap=float(np.nanmean(each)),
         bounds=(low, high),
         edge=not low + _EDGE * (high - low) < value < high - _EDGE * (high - low),
         curves=len(chosen),
@@ -148,7 +158,8 @@ def fit_scatter(values: Array, gaps: Array) -> FittedValue | None:
     def curve(rows: Any) -> Array:
         scaled = 2 * (values[rows] - low) / (high - low) - 1
         parabola = np.polynomial.polynomial.polyfit(scaled, gaps[rows] ** 2, 2)
-        return np.polynomial.polynomial.polyval(2 * (scan - low) / (high - low) - 1, parabola)
+        unit = 2 * (scan - low) / (high - low) - 1
+        return np.asarray(np.polynomial.polynomial.polyval(unit, parabola), dtype=np.float64)
 
     found = curve(slice(None))
     place = int(np.argmin(found))
@@ -193,7 +204,7 @@ def _drawn_again(scan: Array, table: Array) -> Array:
     count = table.shape[1]
     found = []
     for _ in range(_RESAMPLES):
-        centre = np.median(table[:, draw.integers(0, count, count)], axis=1)
+        centre = table[:, draw.integers(0, count, count)].mean(axis=1)
         place = int(np.argmin(centre))
         shift = 0.0
         if 0 < place < len(scan) - 1:
@@ -211,5 +222,3 @@ def _curvature(difference: Array, slope: Array) -> float | None:
     if not bend or count < 2:
         return None
     return float(np.sqrt((difference**2).sum() / (count - 1) / bend))
-
-

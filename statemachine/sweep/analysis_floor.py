@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..compare.perturbed import ROUNDING
-from ..interface import Array
+from ..interface import Array, Ints
 from ..scenarios.runs import Progress, silent
 from .analysis_gaps import SweepGaps, gap_between
 from .analysis_runs import CellRunner, evenly
@@ -58,7 +58,7 @@ def floor_of(
     chosen = known[evenly(len(known), most // NUDGES)]
     settings = [(gaps.points[k].values, gaps.seeds[seed]) for k in chosen for _ in range(NUDGES)]
     nudges = [1 + n for _ in chosen for n in range(NUDGES)]
-    runs = runner.run(gaps.sides[0], settings, nudges=nudges, progress=progress)
+    runs = runner.run([gaps.sides[0]] * len(settings), settings, nudges=nudges, progress=progress)
     as_it_was = gaps.left[np.repeat(chosen, NUDGES), seed]
     nearest = _nearest(gaps, chosen)
     width = {}
@@ -71,9 +71,11 @@ def floor_of(
     )
 
 
-def _nearest(gaps: SweepGaps, chosen: Array) -> Array:
+def _nearest(gaps: SweepGaps, chosen: Ints) -> Ints:
     """(p) which of the chosen settings is nearest to each, every parameter as wide as any."""
-    columns = [_unit([point.values[k] for point in gaps.points]) for k in range(len(gaps.design.factors))]
+    columns = [
+        _unit([point.values[k] for point in gaps.points]) for k in range(len(gaps.design.factors))
+    ]
     if not columns:
         return np.zeros(len(gaps.points), dtype=int)
     place = np.array(columns).T

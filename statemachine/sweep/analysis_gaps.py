@@ -6,6 +6,7 @@ import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -184,14 +185,20 @@ class SweepGaps:
     failed: Mapping[str, int]
     missing: int
 
+    @cached_property
+    def _gaps(self) -> dict[str, Array]:
+        return {name: gap_between(name, self.left, self.right) for name in QUANTITIES}
+
     def gap(self, name: str) -> Array:
         """(p, s) of a quantity; NaN where either side has no run."""
-        return gap_between(name, self.left, self.right)
+        return self._gaps[name]
 
-    @property
+    @cached_property
     def quantities(self) -> tuple[str, ...]:
         """The names of what the dataset has on both sides."""
-        found = [name for name in QUANTITIES if name != "touch" and np.isfinite(self.gap(name)).any()]
+        found = [
+            name for name in QUANTITIES if name != "touch" and np.isfinite(self.gap(name)).any()
+        ]
         if any((np.isfinite(each.touch)).any() for each in (self.left, self.right)):
             found.append("touch")
         return tuple(found)
@@ -272,6 +279,16 @@ def _spread(runs: Runs, where: Sequence[int], points: int, seeds: int) -> Runs:
         return made.reshape(points, seeds, *values.shape[1:])
 
     return Runs(*(put(getattr(runs, name)) for name in runs.__dataclass_fields__))
+
+
+def joined(runs: Sequence[Runs]) -> Runs:
+    """Runs (n,) one after the other, with arrays of the same shapes."""
+    found = runs[0]
+    for other in runs[1:]:
+        pair = _alike(found, other)
+        names = found.__dataclass_fields__
+        found = Runs(*(np.concatenate([getattr(each, name) for each in pair]) for name in names))
+    return found
 
 
 def _alike(one: Runs, two: Runs) -> tuple[Runs, Runs]:

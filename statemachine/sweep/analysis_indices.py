@@ -1,4 +1,4 @@
-"""Which parameter a figure is most sensitive to: shares of its variance, of first order and total."""
+"""Which parameter a figure is most sensitive to: first-order and total shares of its variance."""
 
 from __future__ import annotations
 

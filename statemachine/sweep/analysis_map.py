@@ -55,9 +55,7 @@ def gap_map(
     if not factors:
         return None
     order = [each.label for each in shares.indices] if shares else []
-    ranked = sorted(
-        factors, key=lambda v: order.index(v.label) if v.label in order else len(order)
-    )
+    ranked = sorted(factors, key=lambda v: order.index(v.label) if v.label in order else len(order))
     across, up = ranked[0], ranked[1] if len(ranked) > 1 else None
     columns, column = _axis(gaps, across)
     rows, row = ((), np.zeros(len(centre), dtype=int)) if up is None else _axis(gaps, up)

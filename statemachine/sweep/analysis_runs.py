@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from ..backends import load
 from ..errors import StateMachineError
 from ..grading.parallel import checked_jobs
-from ..interface import Array, JointType, Model
+from ..interface import Ints, JointType, Model, forward, make_data, reset
 from ..scenarios.runs import Progress, silent
 from ..traces.controllers import is_function
 from .analysis_gaps import Runs, runs_of
@@ -41,7 +41,7 @@ class CellRunner:
 
     def run(
         self,
-        backend: str,
+        backends: Sequence[str],
         settings: Sequence[Setting],
         *,
         nudges: Sequence[int] = (),
@@ -51,7 +51,7 @@ class CellRunner:
         """Runs (n,) at settings.
 
         Args:
-            backend: The engine.
+            backends: The engine of each.
             settings: Values and seed of each.
             nudges: For each what a change of its start by rounding is drawn from.
             own: A factor that is as the model has it, whatever the settings say.
@@ -61,7 +61,7 @@ class CellRunner:
         if own is not None:
             rules, settings = _without(rules, own, settings)
         cells = [
-            SweepCell(f"{k}", "", values, seed, backend, nudges[k] if nudges else 0)
+            SweepCell(f"{k}", "", values, seed, backends[k], nudges[k] if nudges else 0)
             for k, (values, seed) in enumerate(settings)
         ]
         rows = _run(rules, cells, self.jobs, progress)
@@ -144,7 +144,7 @@ class ModelFacts:
 
     hinges: tuple[int, ...] | None = None
     foot: tuple[float, ...] = (0.0, 0.0, 0.0)
-    own: Mapping[str, float | None] = ()  # pyright: ignore[reportAssignmentType]
+    own: Mapping[str, float | None] = field(default_factory=dict)
 
 
 def facts_of(
@@ -156,7 +156,7 @@ def facts_of(
     """What the model of a sweep is like; nothing where it cannot be loaded, or is varied."""
     files = list(manifest["files"])
     if len(files) != 1:
-        return ModelFacts(own={})
+        return ModelFacts()
     for backend in backends:
         try:
             model = load(files[0], backend=backend, menagerie=menagerie)
@@ -164,13 +164,13 @@ def facts_of(
             continue
         kinds = zip(model.jnt_type.tolist(), model.jnt_qposadr.tolist(), strict=True)
         hinges = tuple(place for kind, place in kinds if kind == JointType.HINGE)
-        return ModelFacts(hinges or None, _foot(model), {v.label: own_value(v, model) for v in factors})
-    return ModelFacts(own={})
+        return ModelFacts(
+            hinges or None, _foot(model), {v.label: own_value(v, model) for v in factors}
+        )
+    return ModelFacts()
 
 
 def _foot(model: Model) -> tuple[float, ...]:
-    from ..interface import forward, make_data, reset
-
     with make_data(model) as data:
         reset(model, data)
         forward(model, data)
@@ -195,6 +195,7 @@ def own_value(vary: Vary, model: Model) -> float | None:
     return float(values[0]) if len(values) and not np.ptp(values) else None
 
 
-def evenly(count: int, most: int) -> Array:
+def evenly(count: int, most: int) -> Ints:
     """At most so many of `count` numbers from 0, evenly spread."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
+    found: Ints = np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
+    return found

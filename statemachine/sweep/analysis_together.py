@@ -11,7 +11,7 @@ import numpy as np
 from ..interface import Array
 from ..scenarios.runs import Progress, silent
 from .analysis_fit import FittedValue, Verdict, fit_curves, fit_scatter
-from .analysis_gaps import Runs, SweepGaps, gap_between, median
+from .analysis_gaps import Runs, SweepGaps, gap_between, joined, median
 from .analysis_runs import CellRunner, Setting, evenly
 from .factors import Vary
 
@@ -29,7 +29,8 @@ class BroughtTogether:
         times: See label.
         varied: "right": the left side keeps the model's own value; "both": both have the same.
         own: The model's own value; None where it is not known or has several.
-        before: The gap with the parameter as the model has it [SI]; None where that is not known.
+        before: The gap with the parameter as the model has it, as all of these the mean of
+            settings and seeds [SI]; None where that is not known.
         fit: The value of the least gap; None where the design does not allow one.
         measured: The gap of runs at that value; None where none was run.
         predicted: What the fit says of the same runs.
@@ -160,7 +161,8 @@ class _Case:
                 left, right = runs.vectors(self.quantity)[:, None], right[chosen]
                 settings = [settings[k] for k in chosen]
         self.kept = settings
-        return fit_curves(self.quantity, levels, left, right)
+        seeds = [seed for _, seed in settings]
+        return fit_curves(self.quantity, levels, left, right, seeds)
 
     def scatter(self) -> FittedValue | None:
         """From samples of a range."""
@@ -184,49 +186,71 @@ class _Case:
                 "may be run"
             )
             return None
-        self.cells += len(settings)
-        return self.runner.run(
-            self.gaps.sides[0], settings, own=self.vary, progress=lambda f: self.progress(f / 2)
-        )
+        return self._run([(self.gaps.sides[0], settings, True)], 0.0)
+
+    def _run(self, groups: Sequence[tuple[str, Sequence[Setting], bool]], start: float) -> Runs:
+        """Runs (n,) of groups of a backend, settings, and whether the model's own value is meant.
+
+        Groups of the same kind go together: each start of processes takes a second.
+        """
+        assert self.runner is not None
+        told: list[tuple[str, Setting]] = []
+        apart: list[tuple[str, Setting]] = []
+        order: list[tuple[bool, int]] = []
+        for backend, settings, is_own in groups:
+            for values, seed in settings:
+                without = is_own and self.own is None
+                kept = values
+                if is_own and self.own is not None:
+                    kept = self._with(values, self.own)
+                into = apart if without else told
+                order.append((without, len(into)))
+                into.append((backend, (kept, seed)))
+        found = {}
+        for k, (batch, without) in enumerate(((told, False), (apart, True))):
+            if batch:
+                found[without] = self.runner.run(
+                    [backend for backend, _ in batch],
+                    [setting for _, setting in batch],
+                    own=self.vary if without else None,
+                    progress=lambda f, k=k: self.progress(start + (f + k) / 4),
+                )
+        self.cells += len(order)
+        rows = [k + (len(told) if without else 0) for without, k in order]
+        return joined([found[key] for key in sorted(found)])[rows]
 
     def check(self, fit: FittedValue) -> tuple[float, float, int] | None:
         """Run both sides at the value: the gap, what the fit says, and of how many pairs."""
         assert self.runner is not None
-        known = np.flatnonzero(np.isfinite(fit.each)) if len(fit.each) else np.arange(len(self.kept))
+        known = (
+            np.flatnonzero(np.isfinite(fit.each)) if len(fit.each) else np.arange(len(self.kept))
+        )
         picked = known[evenly(len(known), CHECKED)]
         chosen = [self.kept[k] for k in picked]
         left, right = self.gaps.sides
         at = [(self._with(values, fit.value), seed) for values, seed in chosen]
-        jobs: list[tuple[str, Any, Any]] = [(right, at, None)]
-        jobs.append((left, chosen, self.vary) if self.varied == "right" else (left, at, None))
+        groups = [(right, at, False)]
+        groups.append((left, chosen, True) if self.varied == "right" else (left, at, False))
         own = self.vary.kind == "option"
         if own:
-            jobs.append((right, chosen, self.vary))
+            groups.append((right, chosen, True))
             if self.varied == "both":
-                jobs.append((left, chosen, self.vary))
-        found = []
-        for k, (backend, settings, without) in enumerate(jobs):
-            share = (k, len(jobs))
-            found.append(
-                self.runner.run(
-                    backend, settings, own=without,
-                    progress=lambda f, s=share: self.progress(0.5 + (s[0] + f) / s[1] / 2),
-                )
-            )  # fmt: skip
-            self.cells += len(settings)
+                groups.append((left, chosen, True))
+        runs = self._run(groups, 0.5)
+        found = [runs[k * len(chosen) : (k + 1) * len(chosen)] for k in range(len(groups))]
         gap = gap_between(self.quantity, found[1], found[0])
         if own:
-            before = gap_between(self.quantity, found[-1] if self.varied == "both" else found[1],
-                                 found[2])  # fmt: skip
+            other = found[3] if self.varied == "both" else found[1]
+            before = gap_between(self.quantity, other, found[2])
             if np.isfinite(before).any():
-                self.before = float(median(before))
+                self.before = float(np.nanmean(before))
         if not np.isfinite(gap).any():
             return None
-        predicted = median(fit.each[picked]) if len(fit.each) else fit.gap
-        return float(median(gap)), float(predicted), int(np.isfinite(gap).sum())
+        predicted = np.mean(fit.each[picked]) if len(fit.each) else fit.gap
+        return float(np.nanmean(gap)), float(predicted), int(np.isfinite(gap).sum())
 
     def _with(self, values: tuple[Any, ...], value: float) -> tuple[Any, ...]:
-        return values[: self.place] + (value,) + values[self.place + 1 :]
+        return (*values[: self.place], value, *values[self.place + 1 :])
 
     def own_gap(self) -> float | None:
         """The gap of the dataset with the parameter as the model has it."""
@@ -235,4 +259,4 @@ class _Case:
         values = np.array([float(value) for value in self.gaps.values(self.vary.label)])
         near = np.isclose(values, self.own)
         gap = self.gaps.gap(self.quantity)[near]
-        return float(median(gap.ravel())) if np.isfinite(gap).any() else None
+        return float(np.nanmean(gap)) if np.isfinite(gap).any() else None
