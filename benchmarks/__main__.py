@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -15,10 +16,14 @@ import numpy as np
 import statemachine as sm
 from benchmarks.interleave import Ratio, interleaved
 from statemachine import __version__
+from statemachine.processes import resident_memory
 from statemachine.scenarios.runs import silent
 from statemachine.traces import recorder
+from statemachine.worlds import make_worlds
+from statemachine.worlds import step as step_worlds
 
 STEPS = 500
+_N = 64  # worlds
 
 
 def _loop(call: Callable[[], object]) -> Callable[[], None]:
@@ -230,6 +235,26 @@ def _reading_emulated(name: str, rounds: int, where: str, target: list[float]) -
     return interleaved(steps(lambda _: None), others, rounds)
 
 
+def pooled(name: str, rounds: int) -> list[Ratio]:
+    """Worlds on PyBullet, in processes, against as many Data stepped one after the other."""
+    model, count, steps = sm.load(name, backend="pybullet"), 8, STEPS // 20
+    singles = [sm.make_data(model) for _ in range(count)]
+    pools = {
+        f"PyBullet, {count} worlds, {words}": make_worlds(model, count, workers=workers)
+        for workers, words in ((1, "a process"), (2, "two processes"))
+    }
+
+    def serial() -> None:
+        for data in singles:
+            sm.step(model, data, steps)
+
+    others = {words: partial(step_worlds, worlds, steps) for words, worlds in pools.items()}
+    ratios = interleaved(serial, others, max(1, rounds // 5))
+    for worlds in pools.values():
+        worlds.close()
+    return ratios
+
+
 def freshness(name: str, rounds: int) -> list[Ratio]:
     """What `sm.freshness` and a watch cost: nothing to a step when they are not in use.
 
@@ -294,6 +319,50 @@ def reading(name: str, rounds: int) -> list[Ratio]:
         )
 
 
+def _worlds(name: str, rounds: int, workers: int) -> list[Ratio]:
+    """Many worlds against a loop of bulk calls, one for each of as many MjData."""
+    model, steps = sm.load(name), 10
+    data = [sm.make_data(model) for _ in range(_N)]
+    raw_model, raws = model.raw, [each.raw for each in data]
+    worlds = make_worlds(model, _N, workers=workers)
+
+    def loop() -> None:
+        call = mujoco.mj_step
+        for raw in raws:
+            call(raw_model, raw, steps)
+
+    words = f"{_N} worlds, {workers} thread{'s' * (workers > 1)}, {name}"
+    return interleaved(loop, {words: lambda: step_worlds(worlds, steps)}, rounds // 3 + 1)
+
+
+def worlds_alone(name: str, rounds: int) -> list[Ratio]:
+    """Many worlds on one thread."""
+    return _worlds(name, rounds, 1)
+
+
+def worlds_on_two(name: str, rounds: int) -> list[Ratio]:
+    """Many worlds on two processors."""
+    return _worlds(name, rounds, 2)
+
+
+def worlds_memory(name: str, _rounds: int) -> list[Ratio]:
+    """Resident memory of a world, in kB: with all derived arrays, and the same once more."""
+    model, n, sizes = sm.load(name), 4096, []
+    kept = [make_worlds(model, 1)]
+    for _ in range(2):
+        before = resident_memory()
+        kept.append(make_worlds(model, n))
+        step_worlds(kept[-1])
+        sizes.append((resident_memory() - before) / n / 1000)
+    for worlds in kept:
+        worlds.close()
+    size, null = sizes
+    return [
+        Ratio("the baseline again (null)", null / size, null / size, null / size, 1),
+        Ratio(f"kB a world of {n}, {name}", size, size, size, 1),
+    ]
+
+
 # What DESIGN asks of each: at most this, measured on a quiet machine.
 BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None]] = [
     (step, "so101", 1.025),
@@ -304,9 +373,15 @@ BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None]] = [
     (kinematics, "so101", 0.8),
     (emulation, "so101/scene", 1.8),
     (reading_emulated, "so101/scene", 1.5),
+    (pooled, "so101/scene", None),
     (freshness, "so101", 1.02),
     (reading, "so101", None),
     (recording, "so101", 1.10),
+    (worlds_memory, "so101", 3.0),
+    (worlds_alone, "so101", 1.03),
+    (worlds_alone, "so101/scene_box", 1.03),
+    (worlds_on_two, "so101", 1 / 1.9),
+    (worlds_on_two, "so101/scene_box", 1 / 1.9),
 ]
 
 

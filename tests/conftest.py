@@ -41,7 +41,7 @@ def lesson_result(name: str, model: Model, **options: Any) -> Any:
     return take(LESSONS[name], model, model.backend, options).result
 
 
-def _shared(path: Path) -> Path:
+def shared(path: Path) -> Path:
     """Data of the public model, which are no part of the project: skip without them."""
     if not path.exists():
         reason = f"no {path.relative_to(SHARED.parent)} beside the checkout"
@@ -91,7 +91,7 @@ def pinocchio() -> None:
 @pytest.fixture
 def menagerie() -> Path:
     """The folder of public models beside the checkout."""
-    return _shared(SHARED / "menagerie")
+    return shared(SHARED / "menagerie")
 
 
 @pytest.fixture
@@ -99,7 +99,7 @@ def golden() -> Callable[[str], np.ndarray]:
     """Golden data from the public reference model, by file name: columns by name."""
 
     def read(name: str) -> np.ndarray:
-        path = _shared(SHARED / "so101" / f"{name}.csv")
+        path = shared(SHARED / "so101" / f"{name}.csv")
         return np.genfromtxt(path, delimiter=",", names=True)
 
     return read

@@ -659,3 +659,26 @@ def test_no_command_leaves_ctrl_as_it_is_on_both_sides(tmp_path):
     nothing = ARM[: ARM.index("<keyframe>")] + "</mujoco>"  # it starts in the left's
     left = right
     assert explained(tmp_path, left, nothing, scenario=silent).is_rounding
+
+
+def test_detection_is_told_from_contact_at_equal_states():
+    """As `--one-step` has it: which pairs each engine finds at the left's states, and how deep."""
+    need_engine("pybullet")
+    from statemachine.compare import one_step
+    from statemachine.compare.perturbed import rerun_of
+    from statemachine.compare.why import attribute
+    from statemachine.report import why
+
+    one, two = (sm.load("so101/scene", backend=name) for name in ("mujoco", "pybullet"))
+    hold = scenario("hold")
+    found = attribute(one, two, hold, seconds=0.45, uncertain=None)
+    wanted = one_step(rerun_of(hold, one, seconds=0.45), two, moments=100)
+    (gap,) = [stage for stage in wanted.stages if stage.stage == "contacts found"]
+    told = found.detection
+    assert told is not None
+    assert (told.moments, told.differing, told.first) == (wanted.moments, gap.beyond, gap.first)
+    assert (told.where, told.depth) == (gap.where, gap.worst)
+    texts = [getattr(block, "text", "") for block in why.causes(found)]
+    assert any(text.startswith("Contacts found at equal states") for text in texts)
+    fall = attribute(one, two, scenario("fall"), seconds=0.1, uncertain=None)
+    assert fall.detection is None  # nothing touches

@@ -29,11 +29,11 @@ import statemachine as sm
 from statemachine.cli import main
 from statemachine.commands import lesson as lesson_command
 from statemachine.errors import StateMachineError
-from statemachine.lessons import LESSONS, STATIONS, module
+from statemachine.lessons import LESSONS, STATIONS, _worlds, module
 from statemachine.lessons.in_turns import Ratio
 from statemachine.lessons.records import Session
 from statemachine.lessons.session import CodeRun, CodeWatch, Taken, load_line, page_of_lesson, take
-from statemachine.page import Code, Heading, Page, Printed, Question, Table, Text, Verdict
+from statemachine.page import Code, Heading, Page, Printed, Question, Table, Text, Traces, Verdict
 from statemachine.report import progress as bar
 from statemachine.report import quiz
 from statemachine.scenarios import SCENARIOS
@@ -67,6 +67,43 @@ def test_the_path_has_ten_stations_in_the_order_of_the_course() -> None:
         "objects", "state", "write", "forward", "hold", "gravity", "reset", "replay", "time",
         "speed",
     ]  # fmt: skip
+
+
+@pytest.mark.slow
+def test_what_a_shared_model_saves(backend: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_worlds, "_SIZES", (1, 4))
+    monkeypatch.setattr(_worlds, "_MOST_APART", 2)
+    monkeypatch.setattr(_worlds, "_ROUND", 0.002)
+    fractions: list[float] = []
+    lesson = LESSONS["speed"]
+    model = sm.load(lesson.model, backend=backend)
+    taken = take(lesson, model, backend, {"worlds": True}, progress=fractions.append)
+    result, page = taken.result, page_of_lesson(lesson, {backend: taken})
+    assert taken.printed.startswith("worlds: 1, ")
+    assert max(map(len, taken.code.splitlines())) <= 76
+    shared = model.capabilities.shared_model
+    assert [cost.n for cost in result.costs] == ([1, 4] if shared else [1])
+    assert result.load > result.make_data > 0
+    assert all(cost.step > 0 and cost.faster.rounds == _worlds._ROUNDS for cost in result.costs)
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1
+    assert [len(b.rows) for b in page.blocks if isinstance(b, Table)] == [5, len(result.costs)]
+    (curves,) = (block for block in page.blocks if isinstance(block, Traces))
+    assert list(curves.curves) == [f"{backend}: a step of one world"]
+    if not shared:
+        small = dataclasses.replace(result, most="the reason")
+        text = _repage("speed", backend, small).blocks
+        assert any("the reason" in b.text for b in text if isinstance(b, Text))
+
+
+def test_worlds_that_are_apart_fit_into_the_memory_that_is_free(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(_worlds, "free_memory", lambda: 5 * 3 * 30e6)
+    sizes, why = _worlds._sizes(False, 30e6)
+    assert sizes == [1, 4]
+    assert "about 30 MB, and 450 MB are free" in why
+    assert _worlds._sizes(True, 30e6)[0][-1] == 4096
 
 
 @pytest.mark.slow

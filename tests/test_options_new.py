@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine import worlds
 from statemachine.errors import BadInputError, EngineWarning, UnsupportedError
 
 from .conftest import need_engine
@@ -122,6 +123,19 @@ def test_pybullet_says_which_frictions_it_cannot_have() -> None:
     with pytest.warns(EngineWarning, match=r"friction of .* is .*, not") as caught:
         model.replace(friction=friction)
     assert caught[0].filename == __file__
+
+
+def test_friction_without_effect_is_refused(tmp_path: Path) -> None:
+    """The file overrides that of every contact."""
+    path = tmp_path / "override.xml"
+    text = CART.format(actuators=MOTOR)
+    option = '<option><flag override="enable"/></option>'
+    path.write_text(text.replace("<worldbody>", f"{option}<worldbody>"))
+    model = sm.load(path)
+    with pytest.raises(UnsupportedError, match="overrides the friction"):
+        model.replace(friction=0.5)
+    with pytest.raises(UnsupportedError, match="overrides the friction"):
+        worlds.make_worlds(model, 2, friction=[0.5, 0.6])
 
 
 DELAYED = CART.format(

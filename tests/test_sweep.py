@@ -2,11 +2,91 @@
 
 from __future__ import annotations
 
+import json
+import os
 import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
-from statemachine.sweep import COLUMNS
+import numpy as np
+import pytest
 
-from .conftest import ROOT
+import statemachine as sm
+from statemachine.errors import BadInputError, MissingEngineError, StateMachineError
+from statemachine.scenarios import scenario
+from statemachine.sweep import (
+    COLUMNS,
+    Design,
+    Sweep,
+    Vary,
+    design_of,
+    prepared,
+    read_cells,
+    read_manifest,
+    run_sweep,
+)
+from statemachine.sweep.factors import parse_vary
+from statemachine.sweep.folder import locked, settle_manifest
+from statemachine.sweep.rows import MEASURED, RowWriter, counted
+from statemachine.sweep.worker import run_batch
+from statemachine.traces import record_scenario
+
+from .conftest import ROOT, need_engine
+
+pytest.importorskip("pyarrow")
+pytest.importorskip("joblib")
+pytest.importorskip("scipy")
+
+POLICY = """
+import os, signal, time
+
+def still(model, data, gain=1.0, seed=0):
+    return [gain * 0.001 + 0.01 * seed] * model.nu
+
+def slow(model, data, gain=1.0):
+    time.sleep(0.02)
+
+def ends(model, data, gain=1.0):
+    if gain == 2:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+def hangs(model, data, gain=1.0):
+    while gain == 2:
+        pass
+
+def fails(model, data, gain=1.0):
+    return [1 / (gain - 2)] * model.nu
+"""
+
+
+@pytest.fixture
+def policy(tmp_path: Path) -> str:
+    """A file of functions."""
+    file = tmp_path / "policy.py"
+    file.write_text(POLICY)
+    return str(file)
+
+
+def small(what: str, *vary: str, **others: Any) -> Sweep:
+    given = {"backends": ("mujoco",), "seconds": 0.05, "model": "so101", **others}
+    return Sweep(what, vary=vary, **given)
+
+
+def in_process(sweep: Sweep) -> list[dict[str, Any]]:
+    """The rows of a sweep, run here one after the other."""
+    ready = prepared(sweep)
+    cells = [cell for name in ready.backends for cell in ready.cells(name)]
+    return run_batch(ready.rules, cells, False)
+
+
+def values(folder: Path) -> Any:
+    """The dataset, without what is measured."""
+    return read_cells(folder).drop_columns(list(MEASURED))
 
 
 def test_the_guide_lists_the_columns() -> None:
@@ -14,3 +94,394 @@ def test_the_guide_lists_the_columns() -> None:
     rows = dict(re.findall(r"^\| `([^`]+)` \| (.*) \|$", page.partition("| column |")[2], re.M))
     for name, kind, says in COLUMNS:
         assert rows[name] == f"{kind} | {says}"
+
+
+# What is varied.
+
+
+@pytest.mark.parametrize(
+    ("word", "values", "times"),
+    [
+        ("timestep=0.001,0.005", (0.001, 0.005), False),
+        ("damping=0:1:3", (0.0, 0.5, 1.0), False),
+        ("damping=0.5x:1.5x:11", tuple(round(0.5 + k / 10, 1) for k in range(11)), True),
+        ("contacts=on,off", (True, False), False),
+        ("integrator=Euler,RK4", ("Euler", "RK4"), False),
+        ("model=a.xml,b.xml", ("a.xml", "b.xml"), False),
+        ("gain=1", (1.0,), False),
+    ],
+)
+def test_what_is_typed(word: str, values: tuple[Any, ...], times: bool) -> None:
+    (vary,) = parse_vary([word], ("timestep", "damping", "contacts", "integrator"), ("gain",))
+    assert (vary.values, vary.times, vary.bounds) == (values, times, None)
+    assert vary.numeric == isinstance(values[0], float)
+
+
+REFUSED = [
+    (("timestp=0.1",), "Did you mean 'timestep'"),
+    (("timestep",), "--vary wants NAME="),
+    (("timestep=0.001,on",), "mixes values"),
+    (("timestep=0.001,0.001",), "a value twice"),
+    (("timestep=0.001", "timestep=0.002"), "varied twice"),
+    (("timestep=0.002:0.001:3",), "the smaller number first"),
+    (("timestep=0.001:0.002:1",), "with a count from 2"),
+    (("timestep=0.001:0.002",), "say --samples N"),
+    (("timestep=-1",), "timestep must be above 0"),
+    (("timestep=1",), "longer than the run"),
+    (("damping[elbow]=1",), "no joint named 'elbow'"),
+    (("damping=1", "damping[elbow_flex]=1"), "both varied"),
+    (("gravity[w]=1",), "no axis named 'w'"),
+    (("qpos=1",), "qpos[JOINT]"),
+    (("qpos[elbow]=1",), "no joint named 'elbow'"),
+    (("qpos[elbow_flex]=1x",), "leave the x out"),
+    (("integrator=Euler4",), "no integrator named"),
+    (("model=so101,so102",), "--model says one model"),
+]
+
+
+@pytest.mark.parametrize(("vary", "says"), REFUSED)
+def test_what_is_refused_before_anything_runs(vary: tuple[str, ...], says: str) -> None:
+    with pytest.raises(StateMachineError, match=re.escape(says)) as caught:
+        prepared(small("hold", *vary))
+    assert "\n" not in str(caught.value)
+
+
+def test_other_requests_that_are_refused(policy: str) -> None:
+    for sweep, says in (
+        (small("holt"), "Did you mean 'hold'"),
+        (small("hold", every=5), "--every is of a FUNCTION"),
+        (small("hold", seeds=0), "--seeds must be at least 1"),
+        (small("hold", samples=8), "none is varied"),
+        (small("hold", backends=("mujocco",)), "Did you mean 'mujoco'"),
+        (small("hold", spread=("1",)), "an uncertainty reads like"),
+        (small(f"{policy}:still", "gian=1"), "Did you mean 'gain'"),
+        (small(f"{policy}:still", "seed=1"), "no thing to vary named 'seed'"),
+        (small(f"{policy}:missing"), "has no function missing"),
+        (small(f"{policy}:still", keyframe="away"), "no keyframe named 'away'"),
+    ):
+        with pytest.raises(StateMachineError, match=re.escape(says)):
+            prepared(sweep)
+
+
+def test_the_points_of_a_design() -> None:
+    listed = Vary("contacts", values=(True, False))
+    one, two = Vary("damping", bounds=(0.0, 2.0)), Vary("kp", bounds=(10.0, 20.0))
+    points = list(Design((one, listed, two), samples=8).points())
+    assert len(points) == len(Design((one, listed, two), samples=8)) == 16
+    assert len({point.id for point in points}) == 16
+    drawn = np.array([(p.values[0], p.values[2]) for p in points if p.values[1]])
+    # Each eighth of each range has one point: a Sobol sequence, not a random one.
+    assert sorted((drawn[:, 0] // 0.25).astype(int)) == list(range(8))
+    assert sorted(((drawn[:, 1] - 10) // 1.25).astype(int)) == list(range(8))
+    # More samples keep the first ones.
+    more = {point.id for point in Design((one, listed, two), samples=16).points()}
+    assert {point.id for point in points} < more
+
+
+def test_the_points_of_indices() -> None:
+    one, two = Vary("damping", bounds=(0.0, 2.0)), Vary("kp", bounds=(10.0, 20.0))
+    design = Design((one, two), samples=4, indices=True)
+    block: dict[str, Any] = {}
+    for point in design.points():
+        block.setdefault(point.block, []).append(point.values)
+    assert {name: len(rows) for name, rows in block.items()} == dict.fromkeys(
+        ("A", "B", "damping", "kp"), 4
+    )
+    assert len(design) == 16
+    a, b, mixed = (np.array(block[name]) for name in ("A", "B", "damping"))
+    assert np.array_equal(mixed, np.column_stack([b[:, 0], a[:, 1]]))
+
+
+# The cells.
+
+
+@pytest.mark.parametrize("backend", ["mujoco", "pybullet"])
+def test_a_cell_is_the_run_of_a_trace(backend: str) -> None:
+    need_engine(backend)
+    sweep = Sweep("hold", ("timestep=0.004", "damping=0.5x"), (backend,), seconds=0.4)
+    (row,) = in_process(sweep)
+    model = sm.load("so101/scene", backend=backend)
+    options = {"timestep": 0.004, "damping": 0.5 * model.dof_damping}
+    trace = record_scenario(scenario("hold"), model, seconds=0.4, options=options)
+    assert row["status"] == "done", row
+    assert (row["steps"], row["time"]) == (100, trace.time[-1])
+    assert row["qpos"] == trace.qpos[-1].tolist()
+    assert row["qvel"] == trace.qvel[-1].tolist()
+    assert row["max_qvel"] == np.abs(trace.qvel[1:]).max()
+    rows = np.searchsorted(trace.time, np.array(row["sample_time"]) - 1e-9)
+    assert row["sample_qpos"] == trace.qpos[rows].tolist()
+    site = model.site_id("gripperframe")
+    assert np.allclose(row["sample_tip"], trace["site_xpos"][rows, site], atol=1e-9)
+    assert np.isclose(row["energy"], trace["energy"][-1].sum(), atol=1e-9)
+    touches = trace["contact_row"]
+    assert row["first_touch"] == trace.time[touches[0]]
+    assert row["touch"]
+
+
+def test_a_seed_draws_the_same_start_everywhere() -> None:
+    need_engine("pybullet")
+    sweep = Sweep("hold", backends=("mujoco", "pybullet"), seeds=3, seconds=0.005, moments=1)
+    rows = {(row["backend"], row["seed"]): np.array(row["qpos"]) for row in in_process(sweep)}
+    one, two = rows["mujoco", 1], rows["pybullet", 1]
+    still = in_process(Sweep("hold", backends=("mujoco",), seeds=2, seconds=0.005, spread=("0",)))
+    assert np.array_equal(rows["mujoco", 0], still[0]["qpos"])
+    assert still[0]["qpos"] == still[1]["qpos"]
+    assert 1e-3 < np.abs(one - rows["mujoco", 0]).max() < np.deg2rad(1.1)
+    assert np.abs(one - two).max() < 1e-3 < np.abs(one - rows["mujoco", 2]).max()
+
+
+def test_a_start_a_place_and_a_parameter(policy: str) -> None:
+    vary = ("qpos[elbow_flex]=0.5", "gravity[z]=0", "gain=1,2")
+    rows = in_process(small(f"{policy}:still", *vary, seconds=0.005))
+    assert [row["values"] for row in rows] == [(0.5, 0.0, 1.0), (0.5, 0.0, 2.0)]
+    elbow = sm.load("so101").joint_id("elbow_flex")
+    assert all(abs(row["qpos"][elbow] - 0.5) < 0.01 for row in rows)
+    assert rows[0]["qpos"] != rows[1]["qpos"]
+
+
+def test_a_cell_that_fails_is_a_row(policy: str) -> None:
+    need_engine("pybullet")
+    both = Sweep("hold", ("integrator=euler",), ("mujoco", "pybullet"), seconds=0.05)
+    rows = {row["backend"]: row for row in in_process(both)}
+    assert rows["mujoco"]["status"] == "done"
+    assert rows["pybullet"]["error_class"] == "UnsupportedError"
+    fast, fine = in_process(small("hold", "qvel[elbow_flex]=1e9,0"))
+    assert (fast["error_class"], fine["status"]) == ("DivergedError", "done")
+    (late,) = in_process(small("hold", "timestep=1e-4", timeout=1e-6))
+    assert late["error_class"] == "TimedOutError"
+    assert late["steps"] < 500
+    fine, wrong = in_process(small(f"{policy}:fails", "gain=1,2"))
+    assert (fine["status"], wrong["error_class"]) == ("done", "BadInputError")
+    assert "policy.py, line" in wrong["error"]
+
+
+# The folder.
+
+
+def test_a_request_is_kept_and_another_one_refused(tmp_path: Path) -> None:
+    first = prepared(small("hold", "timestep=0.005,0.01"))
+    settle_manifest(tmp_path, first.manifest(), False)
+    settle_manifest(tmp_path, first.manifest(), False)
+    told = read_manifest(tmp_path)
+    assert design_of(told) == first.design
+    assert (told["cells"], told["points"]) == (2, 2)
+    longer = prepared(small("hold", "timestep=0.005,0.01", seconds=0.1))
+    with pytest.raises(BadInputError, match=r"seconds 0.05 there, 0.1 here"):
+        settle_manifest(tmp_path, longer.manifest(), True)
+    more = prepared(small("hold", "timestep=0.005,0.01", seeds=2))
+    with pytest.raises(BadInputError, match=r"seeds 1 there, 2 here.*--extend"):
+        settle_manifest(tmp_path, more.manifest(), False)
+    settle_manifest(tmp_path, more.manifest(), True)
+    assert read_manifest(tmp_path)["design"]["seeds"] == 2
+    other = prepared(small("hold", "damping=1"))
+    with pytest.raises(BadInputError, match="varies timestep"):
+        settle_manifest(tmp_path, other.manifest(), True)
+
+
+def test_two_drivers_are_refused(tmp_path: Path) -> None:
+    with locked(tmp_path):
+        code = (
+            "from pathlib import Path; from statemachine.sweep.folder import locked\n"
+            f"with locked(Path({str(tmp_path)!r})): pass"
+        )
+        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            capture_output=True,
+            text=True,
+            env=environment,
+            check=False,
+        )
+        assert "another sweep runs in" in done.stderr
+    with locked(tmp_path):  # it was let go
+        pass
+
+
+def test_rows_are_written_whole_and_read_in_order(tmp_path: Path) -> None:
+    sweep = prepared(small("hold", "timestep=0.005,0.01"))
+    rows = run_batch(sweep.rules, list(sweep.cells("mujoco")), False)
+    writer = RowWriter(tmp_path, sweep.design.factors, {"request": {}})
+    for row in rows:
+        writer.add([row])
+        writer.flush()
+    place = tmp_path / "cells" / "backend=mujoco"
+    (place / ".part-x.parquet.part-1.parquet").write_bytes(b"half")  # of a driver that was killed
+    assert dict(counted(tmp_path)) == {row["cell"]: "done" for row in rows}
+    table = read_cells(tmp_path)
+    assert table["cell"].to_pylist() == sorted(row["cell"] for row in rows)
+    assert set(table["backend"].to_pylist()) == {"mujoco"}
+    assert set(table["vary.timestep"].to_pylist()) == {0.005, 0.01}
+    assert table.column_names == [
+        *[name for name, _, _ in COLUMNS[:3]],
+        "vary.timestep",
+        *[name for name, _, _ in COLUMNS[3:]],
+        "backend",
+    ]
+    (place / "part-0.parquet").write_bytes(b"no parquet")
+    with pytest.raises(BadInputError, match="cannot be read"):
+        dict(counted(tmp_path))
+
+
+def test_an_extra_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    sweep = prepared(small("hold"))
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(MissingEngineError, match=r"statemachine-sim\[cluster\]"):
+        run_sweep(sweep, tmp_path, scheduler="tcp://127.0.0.1:1")
+    monkeypatch.setitem(sys.modules, "joblib", None)
+    with pytest.raises(MissingEngineError, match=r"statemachine-sim\[sweep\]"):
+        run_sweep(sweep, tmp_path)
+
+
+def test_a_folder_of_something_else_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("")
+    with pytest.raises(BadInputError, match=r"holds something else, as thesis.tex"):
+        run_sweep(prepared(small("hold")), tmp_path)
+    with pytest.raises(BadInputError, match="is a file"):
+        run_sweep(prepared(small("hold")), tmp_path / "thesis.tex")
+
+
+# Workers, and what dies.
+
+
+@pytest.mark.slow
+def test_jobs_do_not_change_results(tmp_path: Path) -> None:
+    need_engine("pybullet")
+    sweep = Sweep("hold", ("timestep=0.005,0.01", "damping=1x,2x"), seeds=2, seconds=0.1)
+    serial = sorted(in_process(sweep), key=lambda row: row["cell"])
+    tables = []
+    for jobs in (1, 2):
+        summary = run_sweep(sweep, tmp_path / str(jobs), jobs=jobs)
+        assert (summary.cells, summary.done, summary.ran, summary.missing) == (16, 16, 16, 0)
+        tables.append(values(tmp_path / str(jobs)))
+    assert tables[0].equals(tables[1])
+    for name in ("cell", "seed", "qpos", "sample_qpos", "sample_tip", "energy", "touch"):
+        assert tables[0][name].to_pylist() == [row.get(name) for row in serial]
+    again = run_sweep(sweep, tmp_path / "2", jobs=2)
+    assert (again.ran, again.done) == (0, 16)
+    assert values(tmp_path / "2").equals(tables[1])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_worker_that_dies_or_hangs_is_a_row(policy: str, tmp_path: Path, jobs: int) -> None:
+    for name, kind in (("ends", "WorkerEndedError"), ("hangs", "TimedOutError")):
+        sweep = small(f"{policy}:{name}", "gain=1,2,3,4", seeds=2, timeout=3.0)
+        out = tmp_path / name
+        summary = run_sweep(sweep, out, jobs=jobs)
+        assert (summary.done, dict(summary.failed), summary.missing) == (6, {kind: 2}, 0)
+        table = read_cells(out)
+        failed = [row["vary.gain"] for row in table.to_pylist() if row["status"] == "failed"]
+        assert failed == [2.0, 2.0]
+
+
+Start = Callable[..., "subprocess.Popen[str]"]
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Start:
+    """Starts a command of the library in a process and a group of its own."""
+
+    def start(*words: str) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [sys.executable, "-m", "statemachine", *words],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            start_new_session=True,
+        )
+
+    return start
+
+
+def _until(what: Callable[[], Any], seconds: float = 120.0) -> Any:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if found := what():
+            return found
+        time.sleep(0.1)
+    raise AssertionError("it did not happen")
+
+
+def _group(leader: int) -> list[str]:
+    """The processes of a group."""
+    listed = subprocess.run(["ps", "-eo", "pgid,args"], capture_output=True, text=True, check=True)
+    return [line for line in listed.stdout.splitlines() if line.split()[0] == str(leader)]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name == "nt", reason="no SIGKILL")
+def test_a_driver_that_is_killed_goes_on(policy: str, tmp_path: Path, start: Start) -> None:
+    words = ["sweep", f"{policy}:slow", "--vary", "gain=1:60:60", "--model", "so101"]
+    words += ["--seconds", "0.1", "--backend", "mujoco", "--jobs", "2", "--json"]
+    out = tmp_path / "killed"
+    driver = start(*words, "--out", str(out))
+    _until(lambda: list(out.glob("cells/*/part-*.parquet")))
+    os.kill(driver.pid, signal.SIGKILL)
+    driver.communicate()
+    before = dict(counted(out))
+    assert 0 < len(before) < 60
+    _until(lambda: not _group(driver.pid))  # its workers end by themselves
+    second = start(*words, "--out", str(out))
+    told, error = second.communicate()
+    assert second.returncode == 0, error
+    summary = json.loads(told)
+    assert (summary["done"], summary["missing"], summary["ran"]) == (60, 0, 60 - len(before))
+    cells = [cell for cell, _ in counted(out)]
+    assert len(cells) == len(set(cells)) == 60
+    sweep = small(f"{policy}:slow", "gain=1:60:60", seconds=0.1)
+    assert {cell.id for cell in prepared(sweep).cells("mujoco")} == set(cells)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name == "nt", reason="no such signals")
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_an_interrupt_keeps_what_was_done(
+    policy: str, tmp_path: Path, start: Start, jobs: str
+) -> None:
+    words = ["sweep", f"{policy}:slow", "--vary", "gain=1:60:60", "--model", "so101"]
+    words += ["--seconds", "0.1", "--backend", "mujoco", "--jobs", jobs, "--out", "out"]
+    driver = start(*words)
+    _until(lambda: list(tmp_path.glob("out/cells/*/part-*.parquet")))
+    os.killpg(driver.pid, signal.SIGINT)
+    told, error = driver.communicate(timeout=60)
+    assert (driver.returncode, told) == (130, "")
+    assert error == "statemachine: stopped; out has what was done. Type the same to go on\n"
+    assert 0 < len(dict(counted(tmp_path / "out"))) < 60
+    _until(lambda: not _group(driver.pid))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name == "nt", reason="no SIGKILL")
+def test_dask_with_a_worker_that_is_killed(policy: str, tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    sweep = small(f"{policy}:slow", "gain=1:24:24", seconds=0.2)
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        first = next(iter(client.run(os.getpid).values()))
+        killed: list[int] = []
+
+        def progress(_fraction: float) -> None:
+            if not killed:
+                killed.append(first)
+                os.kill(first, signal.SIGKILL)
+
+        summary = run_sweep(
+            sweep, tmp_path / "dask", scheduler=cluster.scheduler_address, progress=progress
+        )
+    assert killed
+    assert (summary.done, summary.missing, dict(summary.failed)) == (24, 0, {})
+    run_sweep(sweep, tmp_path / "here", jobs=1)
+    assert values(tmp_path / "dask").equals(values(tmp_path / "here"))
+
+
+def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("statemachine.sweep.drive._PATIENCE", 0.5)
+    with pytest.raises(BadInputError, match="no Dask scheduler answers at"):
+        run_sweep(prepared(small("hold")), tmp_path, scheduler="tcp://127.0.0.1:9")

@@ -233,6 +233,21 @@ def test_each_world_has_its_own_options(model: sm.Model) -> None:
                 assert bits(worlds.qpos[world]) == bits(data.qpos)
 
 
+def test_a_state_of_a_world_whose_latency_is_its_own(model: sm.Model) -> None:
+    late = [0.0, 0.05, 0.0]
+    with make_worlds(model, 3, workers=2, latency=late) as worlds:
+        worlds.ctrl[:] = 0.1
+        step(worlds, 20)
+        for world, latency in enumerate(late):
+            other = model.replace(latency=latency)
+            with sm.make_data(other) as data:
+                data.ctrl[:] = 0.1
+                sm.step(other, data, 20)
+                state = get_state(worlds, world)
+                assert state == sm.get_state(other, data)
+                set_state(worlds, world, state)
+
+
 def test_a_world_that_diverges_or_breaks_is_left_out(worlds: Worlds) -> None:
     worlds.ctrl[1, 0], worlds.ctrl[2, 0] = faulty.RAISE, faulty.DIVERGE
     with pytest.warns(DivergedWarning, match=r"2 of 5 worlds .* 1 \(Faulty gave up: it broke"):

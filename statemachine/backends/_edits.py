@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..interface import Array, Ints
-from ._delays import SHORTER
+from ._delays import SHORTER, needed, with_room
 
 _DISABLE = mujoco.mjtDisableBit
 _SWITCHES = {  # option of `replace` -> the flag that turns it off
@@ -82,6 +82,31 @@ def changes(raw: mujoco.MjModel, options: Mapping[str, Any]) -> dict[str, Any]:
     if flags.ndim or int(flags) != raw.opt.disableflags:
         found["opt.disableflags"] = flags
     return found
+
+
+def varied(
+    raw: mujoco.MjModel, options: Mapping[str, Any]
+) -> tuple[mujoco.MjModel, dict[str, Any]]:
+    """What worlds share, and the arrays of the compiled model that each has of its own.
+
+    Args:
+        raw: The compiled model; flags that are the same for all are written into it.
+        options: Those of `changes` with a value for each world, and as (n,) "timestep", of an
+            engine step [s], and "integrator", a number of mjtIntegrator.
+
+    Returns:
+        The compiled model, with room for the longest latency; (n, ...) arrays, as `changes`.
+    """
+    found = changes(raw, options)
+    found |= {
+        f"opt.{name}": options[name] for name in ("timestep", "integrator") if name in options
+    }
+    for name in [name for name, value in found.items() if not np.ndim(value)]:
+        put(raw, name, found.pop(name))
+    delay = found.get("actuator_delay", raw.actuator_delay)
+    timestep = np.asarray(found.get("opt.timestep", raw.opt.timestep))
+    steps = np.atleast_2d(needed(delay, timestep[..., None]))
+    return with_room(raw, steps.max(axis=0)), found
 
 
 def _rows(array: Array, value: Any) -> Array:

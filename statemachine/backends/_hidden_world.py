@@ -80,7 +80,10 @@ class HiddenWorld(ABC):
 
     @abstractmethod
     def command(self, ctrl: Array) -> None:
-        """Take a command (nu,) [unit of the actuator] that is in force until the next one."""
+        """Take a command (nu,) [unit of the actuator] that is in force until the next one.
+
+        A latency (`Model.actuator_delay`) has passed already: the Data keeps what is on its way.
+        """
 
     @abstractmethod
     def step(self) -> None:

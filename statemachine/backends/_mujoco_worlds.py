@@ -214,7 +214,7 @@ class MujocoWorlds(Worlds):
         self._reset(self._numbers[world : world + 1], None)
         self._batch.state[world] = state.vector
 
-    def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
+    def _state_layout(self, world: int) -> tuple[str, tuple[tuple[str, int], ...]]:
         return self._layout
 
     def _record(

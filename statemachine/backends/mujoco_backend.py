@@ -7,14 +7,14 @@ its own buffers, seen read-only.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Literal, cast
 
 import mujoco
 import numpy as np
 
-from ..errors import BadInputError
+from ..errors import BadInputError, UnsupportedError
 from ..interface import (
     BEHAVIOURS,
     FORCES,
@@ -30,8 +30,8 @@ from ..interface import (
     State,
 )
 from ..interface.checks import HUGE, TINY, check_finite
-from ._delays import hold, needed
-from ._edits import CONSTANTS_FOLLOW, changes, put
+from ._delays import hold
+from ._edits import CONSTANTS_FOLLOW, varied
 from ._mujoco_alarms import AlarmError, Alarms, ended, gave_up, pass_on, resets_itself
 from .compiled import (
     check_numbers,
@@ -171,9 +171,9 @@ class MujocoModel(Model):
     ) -> Any:
         from ._mujoco_worlds import MujocoWorlds
 
-        base, varied = self._varied(options) if options else (self, {})
+        base, arrays = self._varied(options) if options else (self, {})
         follow = bool(CONSTANTS_FOLLOW & options.keys())
-        return MujocoWorlds(self, base, (n, workers), derived, (varied, follow), _layout(base))
+        return MujocoWorlds(self, base, (n, workers), derived, (arrays, follow), _layout(base))
 
     def _varied(self, options: dict[str, Any]) -> tuple[MujocoModel, dict[str, Any]]:
         """What worlds share, and the arrays of the compiled model that each has of its own.
@@ -184,28 +184,35 @@ class MujocoModel(Model):
         Returns:
             A Model, and (n, ...) arrays by name; see `changes`.
         """
+        self._check_friction(options)
         given = {name: np.array(values) for name, values in options.items()}
         substeps = given.pop("substeps", np.array([self.substeps]))
         if (substeps != substeps[0]).any():
             raise BadInputError("substeps must be the same in all worlds: they step together")
         # As `_replace` would, so that a timestep is the same to the last bit.
         base = self._replace({"substeps": int(substeps[0])})
-        varied = changes(base.raw, given)
         if "integrator" in given:
-            codes = [int(_INTEGRATORS[name]) for name in options["integrator"]]
-            varied["opt.integrator"] = np.array(codes)
+            given["integrator"] = np.array([int(_INTEGRATORS[n]) for n in options["integrator"]])
         if "timestep" in given:
             lengths = [step_length(length, base.substeps, {}) for length in options["timestep"]]
-            varied["opt.timestep"] = np.array(lengths)
-        raw = base.raw
-        for name in [name for name, value in varied.items() if not np.ndim(value)]:
-            put(raw, name, varied.pop(name))  # a flag that is the same for all
-        delay = varied.get("actuator_delay", raw.actuator_delay)
-        timestep = np.asarray(varied.get("opt.timestep", raw.opt.timestep))
-        steps = needed(delay, timestep[..., None]).reshape(-1, raw.nactuator)
-        return MujocoModel(with_room(raw, steps.max(axis=0)), self.path, base.substeps), varied
+            given["timestep"] = np.array(lengths)
+        raw, arrays = varied(base.raw, given)
+        return MujocoModel(raw, self.path, base.substeps), arrays
+
+    def _check_friction(self, options: Mapping[str, Any]) -> None:
+        """Raise UnsupportedError where the friction of geoms would be without effect."""
+        override = int(mujoco.mjtEnableBit.mjENBL_OVERRIDE)
+        if "friction" in options and self.raw.opt.enableflags & override:
+            reason = "the file overrides the friction of all contacts (flag override)"
+            raise UnsupportedError(
+                f"backend 'mujoco' does not support 'friction' here: {reason}",
+                backend=self.backend,
+                feature="friction",
+                reason=reason,
+            )
 
     def _replace(self, options: dict[str, Any]) -> MujocoModel:
+        self._check_friction(options)
         try:
             raw = edited(self.raw, options)
         except (MemoryError, mujoco.FatalError) as error:

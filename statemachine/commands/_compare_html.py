@@ -128,7 +128,14 @@ def _models(request: Any, traces: tuple[Any, Any]) -> Any:
 
     files = [request.model or name for name in names]
     try:
-        return page(compare(files[0], files[1], engines=engines, menagerie=request.menagerie))
+        found = compare(
+            files[0],
+            files[1],
+            engines=engines,
+            rename=request.names,
+            menagerie=request.menagerie,
+        )
+        return page(found)
     except (StateMachineError, OSError):
         return None
 

@@ -18,7 +18,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "engine, and write a row for each run into a partitioned Parquet dataset. A run that\n"
         "fails is a row with its error. Typed again, it runs only what is missing.\n\n"
         "What --vary takes:\n"
-        "  timestep=0.001,0.005      a list; also contacts=on,off and integrator=Euler,RK4\n"
+        "  timestep=0.001,0.005      a list; also contacts=on,off and integrator=euler,implicit\n"
         "  damping=0.5:1.5:11        a grid: from, to, count\n"
         "  damping=0.5x:2x:5         times the model's own values\n"
         "  damping[elbow_flex]=0:1:3 of one joint; mass[gripper], gravity[z], …\n"

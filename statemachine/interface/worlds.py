@@ -170,8 +170,8 @@ class Worlds(ABC):
         """Take a State of the right layout; BadInputError only before anything changes."""
 
     @abstractmethod
-    def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
-        """Fingerprint and layout of the States, as one Data of the Model has them."""
+    def _state_layout(self, world: int) -> tuple[str, tuple[tuple[str, int], ...]]:
+        """Fingerprint and layout of the States of one world, as a Data of its Model has them."""
 
     @abstractmethod
     def _record(

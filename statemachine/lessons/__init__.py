@@ -109,7 +109,10 @@ LESSONS = {
             "speed",
             "What does one second of your machine buy?",
             "so101/scene_box",
-            (Option("--steps", 4000, "steps of each run", int),),
+            (
+                Option("--steps", 4000, "steps of each run", int),
+                Option("--worlds", False, "many worlds: what a shared Model saves", bool),
+            ),
         ),
         Lesson("questions", "Check yourself: six questions.", "so101/scene_box", station=False),
     )

@@ -14,6 +14,7 @@ from ..interface.checks import as_count
 from ..page import Page, Question, Table, Text
 from ..scenarios.provenance import Provenance, provenance
 from ..scenarios.runs import Progress
+from . import _worlds
 from ._words import differences, page_of, sentence, typed
 from .in_turns import FEWEST, Ratio, in_turns
 from .records import Session
@@ -25,7 +26,9 @@ _BULK, _AGAIN, _LOOP, _OWN = "in bulk", "in bulk again", "step by step", "as it 
 
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
-    """The same steps by the clock, both ways, once."""
+    """The same steps by the clock, both ways, once; or some worlds of one Model."""
+    if options.get("worlds"):
+        return _worlds.code(load)
     steps = as_count(options["steps"], "steps")
     whole, rest = divmod(steps, _MOST)
     bulk = f"[{steps}]" if not whole else f"[{_MOST}] * {whole}" + f" + [{rest}]" * bool(rest)
@@ -97,8 +100,12 @@ class Speed:
         return self.loop.differs_from(self.null)
 
 
-def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Speed:
+def run(
+    play: CodeRun, options: Mapping[str, Any], progress: Progress
+) -> Speed | _worlds.WorldsSpeed:
     """Measure the same steps again with the code's own functions, in rounds, the ways in turns."""
+    if options.get("worlds"):
+        return _worlds.run(play, progress)
     model, total = play.model, options["steps"]
     names = play()
     size = max(1, min(total // _ROUNDS, _MOST))
@@ -138,9 +145,11 @@ def _way(
     return advance
 
 
-def page(results: Mapping[str, Speed], session: Session) -> Page:
+def page(results: Mapping[str, Any], session: Session) -> Page:
     """Times and factors; they are this machine's, now."""
     first = next(iter(results.values()))
+    if isinstance(first, _worlds.WorldsSpeed):
+        return _worlds.page(results, session)
     blocks: list[Any] = [
         Text(
             f"{first.simulated:g} simulated seconds, {count(first.nstep, 'step')} of "

@@ -72,7 +72,25 @@ def causes(result: Attribution) -> list[Block]:
         if "!" in line:
             blocks.append(_astray(result))
             marked = True
-    return [*blocks, _alone(result, starred, marked)]
+    return [*blocks, *_detection(result), _alone(result, starred, marked)]
+
+
+def _detection(result: Attribution) -> list[Block]:
+    """Whether the engines find the same contacts at the same states."""
+    found = result.detection
+    if found is None:
+        return []
+    one, _ = result.names
+    text = f"Contacts found at equal states, {found.moments} of the run on {one}: "
+    if not found.differing:
+        return [Text(f"{text}the same pairs, as deep. What differs of contact is its law.")]
+    return [
+        Text(
+            f"{text}at {found.differing} of them other pairs, or not as deep, first at "
+            f"{short_time(found.first or 0.0)}; by up to {quantity(found.depth, 'm')}, "
+            f"{found.where} (--one-step)."
+        )
+    ]
 
 
 def steps(result: Attribution) -> list[Block]:

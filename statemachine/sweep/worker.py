@@ -32,6 +32,7 @@ from .settings import options_at
 T = TypeVar("T")
 Row = dict[str, Any]
 
+_TO_LOAD = 60.0  # seconds that an engine and a model may take at least
 _GRACE = 10.0  # seconds beyond a time-out, after which a process that still hangs ends itself
 _WATCH = 1.0  # seconds between two looks at whether the driver is still there
 _ONE_AT_A_TIME = threading.Lock()  # a Dask worker may have several threads, and an engine must not
@@ -71,13 +72,16 @@ def _row(rules: CellRules, cell: SweepCell, own: bool) -> Row:
     began = time.perf_counter()
     row: Row = {}
     try:
-        with _limited(rules.timeout, own):
-            if rules.function and digest_of(rules.what) != rules.function:
-                name = function_file(rules.what).name
-                raise BadInputError(f"{name} is not the file of the sweep: it changed")
+        if rules.function and digest_of(rules.what) != rules.function:
+            name = function_file(rules.what).name
+            raise BadInputError(f"{name} is not the file of the sweep: it changed")
+        with _limited(max(rules.timeout, _TO_LOAD), own):
             model, options, doing = _model(rules, cell, rules.scenario_of(cell), row)
+        with _limited(rules.timeout, own):
             run_cell(rules, cell, model, options, doing, row)
         told: Row = {"status": DONE}
+    except _OutOfTimeError:
+        told = failed_row(cell, timed_out(rules.timeout))
     except Exception as error:  # of any kind: it belongs into the row
         told = failed_row(cell, error)
     plain = {
@@ -153,9 +157,13 @@ class _Kept:
 _loaded, _on_robot, _replaced = _Kept(8), _Kept(8), _Kept(4)
 
 
+class _OutOfTimeError(BaseException):
+    """The time is up: raised wherever the process is; nobody takes it for an error of theirs."""
+
+
 @contextmanager
 def _limited(seconds: float, own: bool) -> Iterator[None]:
-    """Raise TimedOutError in what takes too long; end a process that does not even raise it.
+    """Raise `_OutOfTimeError` in what takes too long; end a process that does not even raise it.
 
     A run looks at the clock itself. This is for what does not come back from the user's function
     or from the engine; it needs a process of its own, whose signals are nobody else's.
@@ -165,7 +173,7 @@ def _limited(seconds: float, own: bool) -> Iterator[None]:
         return
 
     def end(_number: int, _frame: FrameType | None) -> None:
-        raise timed_out(seconds)
+        raise _OutOfTimeError
 
     signal.signal(signal.SIGALRM, end)
     signal.setitimer(signal.ITIMER_REAL, seconds)

@@ -12,11 +12,13 @@ import os
 import secrets
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..interface import INPUTS, Model
 
 _PAGE = 4096
 
@@ -72,6 +74,16 @@ def open_block(handle: str, size: int) -> mmap.mmap:
     memory = mmap.mmap(file, size)
     os.close(file)
     return memory
+
+
+def shapes_of(model: Model, n: int, derived: Sequence[str]) -> Shapes:
+    """Of the arrays of n worlds, and of two that say which are meant, and what rows they have."""
+    sizes = {"qpos": (model.nq,), "ctrl": (model.nu,), "time": ()}
+    sizes |= {"xpos": (model.nbody, 3), "xquat": (model.nbody, 4)}
+    sizes |= {"site_xpos": (model.nsite, 3), "site_xmat": (model.nsite, 9)}
+    floats = {name: (n, *sizes.get(name, (model.nv,))) for name in (*INPUTS, "time", *derived)}
+    shapes = {name: (shape, "f8") for name, shape in floats.items()}
+    return {**shapes, "ids": ((n,), "u1"), "rows": ((n,), "i8")}
 
 
 def laid_out(shapes: Shapes, start: int) -> tuple[Layout, int]:

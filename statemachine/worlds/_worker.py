@@ -168,7 +168,7 @@ class Holder:
 
     def _fill(self, _argument: int, _payload: Any, _places: Any) -> Any:
         self._make(self._all)
-        return self._data[0]._state_layout()
+        return [data._state_layout() for data in self._data[: None if self._options else 1]]
 
     def _make(self, most: int) -> None:
         while len(self._data) < min(most, self._all):
@@ -270,6 +270,8 @@ class Holder:
     def _derive(self, _argument: int, name: str, places: Sequence[int]) -> None:
         rows = self._arrays[name]
         for place in places:
+            if self._inbox.stopped:
+                return
             rows[self._world(place)] = getattr(self._data[place], name)
 
 

@@ -13,21 +13,22 @@ import time
 import warnings
 import weakref
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
 from .. import backends
 from ..errors import BusyDataError, EngineError, StateMachineError, UnsupportedError
-from ..interface import INPUTS, Array, Ints, Model, State
+from ..interface import Array, Ints, Model, State
 from ..interface.data import alone
 from ..interface.worlds import Worlds
 from ..processes import free_memory
 from ._process import WorldsProcess, end_all, lost_worlds
 from ._protocol import ANSWER_MOST, Verb
-from ._shared import Layout, Shapes, SharedBlock, arrays_in, laid_out
+from ._shared import SharedBlock, arrays_in, laid_out, shapes_of
 
-_PATIENCE = 1.0  # seconds in which a process has to end a step that was interrupted
+_PATIENCE = 2.0  # seconds in which a process has to end a step that was interrupted
 _SCRATCH = 1 << 24  # bytes for what belongs to a command, at least
 _WORDS = 1 << 16  # of these, for what is no array of a record
 _SPARE = 0.95  # of the memory that is free, what worlds may take
@@ -78,7 +79,7 @@ class PoolWorlds(Worlds):
             "options": dict(options),
             "model": _pickled(model),
         }
-        shapes = _shapes(model, n, derived)
+        shapes = shapes_of(model, n, derived)
         row = sum(8 * int(np.prod(shape)) for shape, _ in shapes.values())
         self._scratch = max(_SCRATCH, 2 * _WORDS + 2 * row, _WORDS + len(pickle.dumps(job)))
         self._answers = -(-self._scratch // _WORDS) * _WORDS
@@ -90,6 +91,7 @@ class PoolWorlds(Worlds):
         self._rows: Any = arrays.pop("rows")
         self._count, self._warned = 0, set[tuple[Any, str]]()
         self._processes: list[WorldsProcess] = []
+        self._layouts: dict[int, Any] = {}  # of the States, by process
         self._end = weakref.finalize(self, end_all, self._processes, os.getpid())
         super().__init__(model, n, workers, derived, arrays)
         self._kept = {name: vars(self)[name] for name in derived}
@@ -120,8 +122,8 @@ class PoolWorlds(Worlds):
         _check_memory(self.n, [answer["value"] for answer in answers])
         answers = self._exchange(processes, Verb.FILL)
         self._check(processes, answers)
-        self._fingerprint = answers[0]["value"]
-        for process in processes:
+        for process, answer in zip(processes, answers, strict=True):
+            self._layouts[process.worlds[0]] = answer["value"]
             process.started()
 
     def _check(self, processes: list[WorldsProcess], answers: Answers) -> None:
@@ -162,21 +164,26 @@ class PoolWorlds(Worlds):
                 process.send(number, verb, argument, size, of_ids)
             return [process.receive(number) or {} for process in processes]
         except BaseException:  # Ctrl-C, mostly
-            self._halt(processes)
+            if verb > Verb.FILL:  # who starts is closed
+                self._halt(processes)
             raise
 
     def _halt(self, processes: list[WorldsProcess]) -> None:
         """Let processes end what they are at; kill those that do not."""
-        self._count += 1
         deadline = time.monotonic() + _PATIENCE
+        ended = False
         try:
+            while not ended:
+                with suppress(KeyboardInterrupt):  # one is on its way already
+                    self._count += 1
+                    for process in processes:
+                        process.send(self._count, Verb.STOP)
+                    for process in processes:
+                        process.stop(self._count, deadline)
+                    ended = True
+        except BaseException:
             for process in processes:
-                process.send(self._count, Verb.STOP)
-            for process in processes:
-                process.stop(self._count, deadline)
-        except BaseException:  # a second Ctrl-C
-            for process in processes:
-                process.give_up("it was interrupted twice")
+                process.give_up("what was asked of it was interrupted twice")
             raise
         finally:
             self._find_lost(processes)
@@ -284,8 +291,9 @@ class PoolWorlds(Worlds):
         self._renew(ids)
         self._ask(ids, Verb.SET_STATE, world, state)
 
-    def _state_layout(self) -> tuple[str, tuple[tuple[str, int], ...]]:
-        return self._fingerprint
+    def _state_layout(self, world: int) -> tuple[str, tuple[tuple[str, int], ...]]:
+        own = self._layouts[world % len(self._processes)]
+        return own[world // len(self._processes) if self._options else 0]
 
     def _record(
         self, ids: Ints, nstep: int, every: int, arrays: Mapping[str, Array], ctrl: Array | None
@@ -298,7 +306,8 @@ class PoolWorlds(Worlds):
         most = max(1, (self._scratch - 2 * _WORDS) // max(1, row))
         while start < rows and len(ids):
             count = min(most, rows - start)
-            layout = _record_layout(sources, count)
+            sizes = {name: (self.n, count, *array.shape[2:]) for name, array in sources.items()}
+            layout, _ = laid_out({name: (size, "f8") for name, size in sizes.items()}, _WORDS)
             shared = arrays_in(self._block.memory, layout)
             part = slice(start, start + count)
             if ctrl is not None:
@@ -314,22 +323,6 @@ class PoolWorlds(Worlds):
             ids = ids[~np.isin(ids, list(ended))]
             start += count
         return errors
-
-
-def _shapes(model: Model, n: int, derived: Sequence[str]) -> Shapes:
-    sizes = {"qpos": (model.nq,), "ctrl": (model.nu,), "time": ()}
-    sizes |= {"xpos": (model.nbody, 3), "xquat": (model.nbody, 4)}
-    sizes |= {"site_xpos": (model.nsite, 3), "site_xmat": (model.nsite, 9)}
-    floats = {name: (n, *sizes.get(name, (model.nv,))) for name in (*INPUTS, "time", *derived)}
-    shapes = {name: (shape, "f8") for name, shape in floats.items()}
-    return {**shapes, "ids": ((n,), "u1"), "rows": ((n,), "i8")}
-
-
-def _record_layout(sources: Mapping[str, Array], rows: int) -> Layout:
-    shapes = {
-        name: ((array.shape[0], rows, *array.shape[2:]), "f8") for name, array in sources.items()
-    }
-    return laid_out(shapes, _WORDS)[0]
 
 
 def _pickled(model: Model) -> bytes:

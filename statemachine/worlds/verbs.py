@@ -168,7 +168,7 @@ def set_state(worlds: Worlds, world: int, state: State) -> None:
     """
     _admit(worlds)
     number = _world(worlds, world)
-    check_state(state, worlds.model, *worlds._state_layout())
+    check_state(state, worlds.model, *worlds._state_layout(number))
     alone(worlds, _set_state, worlds, number, state)
 
 

@@ -6,7 +6,7 @@
   engine's own is the part `reading` of its room
 - `diff`: every difference with its size, entered into a `ledger`; by subject in `_places`,
   `_joints`, `_solids`, `_shapes`, `_settings`
-- `_one_list`: joins that with the list of compiled models that `..why` explains a gap with
+- `_one_list`, `_told`: joins that with the list of compiled models that `..why` explains a gap with
 - `engines`: what engines do of themselves
 """
 
@@ -169,7 +169,8 @@ def compare(
     trees = [GroupTree(renamed(robots[0], rename or {})), GroupTree(robots[1])]
     found = diff(trees[0], trees[1], frames, digits, seed, own_ways(*engines))
     skipped = list[str]()
-    if engines == (None, None) and any(robot.format != "URDF" for robot in robots):
+    compiled = all(engine in (None, DEFAULT) for engine in engines)
+    if compiled and any(robot.format != "URDF" for robot in robots):
         rows, skipped = one_list(
             found.differences,
             [resolve(m, menagerie) for m in (one, two)],

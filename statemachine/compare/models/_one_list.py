@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,84 +23,8 @@ from ...errors import StateMachineError
 from ...interface import Model
 from ..matching import Matched, match_models
 from ..why.causes import differences_of
+from ._told import FLAGS, SETTINGS, SUBJECTS_OF, TOLD, WEIGHTS, WHOLE_LINK
 from .ledger import Difference, Value
-
-_ANY = frozenset[str]()
-
-
-@dataclass(frozen=True)
-class _Told:
-    """What of a description tells of a difference: a subject, and figures of it; none: any."""
-
-    subject: str
-    figures: frozenset[str] = _ANY
-
-
-def _figures(text: str) -> frozenset[str]:
-    return frozenset(text.split())
-
-
-_CONTACT = _Told("contact", _figures("friction condim priority solref solimp solmix margin gap"))
-_DRIVE = _Told("drive", _figures("drive count kp kv gain"))
-# By the kind of an element and the subject of its difference.
-_TOLD: dict[str, dict[str, tuple[_Told, ...]]] = {
-    "body": {
-        "mass": (_Told("mass"),),
-        "centre of mass": (_Told("centre of mass"),),
-        "inertia": (_Told("inertia"),),
-        "place": (_Told("places", frozenset({"origin", "frame turned", "zero position"})),),
-        "zero": (_Told("places", frozenset({"zero position"})),),
-        "parent": (_Told("structure"), _Told("places")),
-        "joints": (_Told("structure"), _Told("places", frozenset({"kind"}))),
-    },
-    "joint": {
-        "axis": (_Told("places", frozenset({"axis"})),),
-        "anchor": (_Told("places", frozenset({"axis beside", "origin"})),),
-        "range": (_Told("limits"),),
-        "armature": (_Told("armature"),),
-        "damping": (_Told("damping"),),
-        "dry friction": (_Told("dry friction"),),
-        "spring": (_Told("spring", frozenset({"stiffness"})),),
-        "rest of the spring": (_Told("spring", frozenset({"slack at"})),),
-        "force limit": (_Told("effort"),),
-        "extra joint": (_Told("structure"), _Told("places", frozenset({"kind"}))),
-    },
-    "geom": {
-        "shape": (_Told("shapes"),),
-        "hull": (_Told("shapes"),),
-        "heights": (_Told("shapes"),),
-        "extra shape": (_Told("shapes", frozenset({"shapes"})),),
-        "place": (_Told("shapes", frozenset({"middle", "turned"})),),
-        **dict.fromkeys(
-            ("friction", "friction dimensions", "softness", "priority", "margin"), (_CONTACT,)
-        ),
-    },
-    "site": {"place": (_Told("tool frame"),)},
-    "actuator": {
-        "gains": (_DRIVE,),
-        "law": (_DRIVE,),
-        "gear": (_Told("drive", frozenset({"gear"})),),
-        "force range": (_Told("drive", frozenset({"forcerange"})),),
-        "range of ctrl": (_Told("drive", frozenset({"ctrlrange"})),),
-        "transmission": (_DRIVE,),
-        "extra actuator": (_DRIVE,),
-    },
-    "equality": {
-        "extra equality": (_Told("structure", frozenset({"follows"})),),
-        "what it keeps": (_Told("structure", frozenset({"follows"})),),
-    },
-}
-_SETTINGS = ("option", "flag")
-# What a row of its own is a matter of, where no description speaks of the difference.
-_SUBJECTS = {
-    ("joint", "force limit"): "effort",
-    ("geom", "filter"): "contact",
-    **{("geom", each): "contact" for each in ("adhesion", "moving surface")},
-}
-# Figures of a description that sum up others.
-_WHOLE_LINK = frozenset({"shapes", "volume", *(f"ends at {s}{a}" for a in "xyz" for s in "+-")})
-_FLAGS = frozenset({"turned on", "turned off"})
-_WEIGHTS = ("centre of mass", "inertia")  # of bodies that are fixed to each other, together
 
 
 def one_list(
@@ -208,10 +132,10 @@ class _Joined:
 
     def join(self, each: ModelDifference) -> bool:
         """Whether rows tell of a difference; they are then called as it is."""
-        if each.kind in _SETTINGS:
+        if each.kind in SETTINGS:
             return self._join_settings(each)
         joined = False
-        for told in _TOLD.get(each.kind, {}).get(each.subject, ()):
+        for told in TOLD.get(each.kind, {}).get(each.subject, ()):
             for k, row in enumerate(self.rows):
                 if row.subject != told.subject or (told.figures and row.figure not in told.figures):
                     continue
@@ -251,13 +175,13 @@ class _Joined:
 
     def add(self, each: ModelDifference) -> None:
         """Enter rows of a difference that no description speaks of."""
-        told = _TOLD.get(each.kind, {}).get(each.subject)
-        usual = "settings" if each.kind in _SETTINGS else "further"
-        subject = told[0].subject if told else _SUBJECTS.get((each.kind, each.subject), usual)
+        told = TOLD.get(each.kind, {}).get(each.subject)
+        usual = "settings" if each.kind in SETTINGS else "further"
+        subject = told[0].subject if told else SUBJECTS_OF.get((each.kind, each.subject), usual)
         values = each.values or (("", None, None),)
-        for name, one, two in values if each.kind in _SETTINGS else values[:1]:
-            more = f" (+ {len(values) - 1})" if values[1:] and each.kind not in _SETTINGS else ""
-            where = "" if each.kind in _SETTINGS else each.where
+        for name, one, two in values if each.kind in SETTINGS else values[:1]:
+            more = f" (+ {len(values) - 1})" if values[1:] and each.kind not in SETTINGS else ""
+            where = "" if each.kind in SETTINGS else each.where
             row = _row(subject, where, f"{name}{more}", _value(one), _value(two), each.unit)
             self.rows.append(replace(row, causes=(each.title,), refused=each.refused))
 
@@ -268,8 +192,8 @@ class _Joined:
         self.rows = [
             row
             for row in self.rows
-            if row.figure not in _FLAGS  # each has its row
-            and (row.causes or row.subject not in _WEIGHTS or not weighed)
+            if row.figure not in FLAGS  # each has its row
+            and (row.causes or row.subject not in WEIGHTS or not weighed)
         ]
         for row in [row for row in self.rows if _is_of_a_whole_link(row)]:
             others = [
@@ -301,7 +225,7 @@ class _Joined:
 
 
 def _is_of_a_whole_link(row: Difference) -> bool:
-    return row.subject == "shapes" and row.figure in _WHOLE_LINK
+    return row.subject == "shapes" and row.figure in WHOLE_LINK
 
 
 def _is_named(shape: str, owners: _Owners) -> bool:
@@ -323,7 +247,7 @@ def _is_described(each: ModelDifference) -> bool:
     figures = {name.partition("[")[0] for name, _, _ in each.values}
     if figures and figures <= {"dampingpoly", "stiffnesspoly", "springyield", "gap"}:
         return False
-    return each.kind in _SETTINGS or each.subject in _TOLD.get(each.kind, ())
+    return each.kind in SETTINGS or each.subject in TOLD.get(each.kind, ())
 
 
 def _agrees(each: ModelDifference, digits: int, reach: float) -> bool:

@@ -6,14 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ...errors import EndedEarlyError, unknown_name
+from ...errors import EndedEarlyError, StateMachineError, unknown_name
 from ...interface import Model
 from ...scenarios import Scenario
 from ...scenarios.runs import Progress, silent
-from ..perturbed import EXACT, Uncertainty
+from ..one_step import one_step
+from ..perturbed import EXACT, Uncertainty, rerun_of
+from ..stages import FOUND
 from .factors import FACTORS, OFF_ORDER, PARITY_ORDER, Factor
 from .gap import Deviation
-from .results import ROUNDING, Attribution, FactorTrial, Way
+from .results import ROUNDING, Attribution, Detection, FactorTrial, Way
 from .runs import Runs
 from .sides import Change, Changes, same, side_of
 
@@ -22,6 +24,7 @@ _NOTHING = 1e-6  # of the first gap: what is less is left alone
 # it stays in the ladder only if it takes away this part of what was left, and if one still
 # moves by this part of what it moves as it comes.
 _MOST, _MOVES = 0.5, 0.1
+_MOMENTS = 100  # at which contacts are looked for from equal states
 
 ORDER = (
     "First the settings that differ: {two} gets those of {one}, and {one} moves as "
@@ -65,8 +68,10 @@ def attribute(
     """
     scenario = scenario.on(one)
     sides = [side_of(model, scenario.options) for model in (one, two)]
+    models = one, two
     if sides[0].fresh and not sides[1].fresh:
         sides.reverse()
+        models = two, one
     runs = Runs(sides, scenario, scenario.seconds if seconds is None else seconds, seed, progress)
     names = runs.ruler.units
     if quantity is not None and quantity not in names:
@@ -82,6 +87,9 @@ def attribute(
     ladder, parity = ((), ({}, {})) if nothing else _ladder(runs)
     alone = () if nothing else _alone(runs, *parity)
     steps = [trial.worst for trial in ladder if trial.explains is not None]
+    detection = None
+    if not nothing and runs.touch is not None:
+        detection = _detection(models, scenario, seconds=runs.seconds, seed=seed)
     runs.done()
     return Attribution(
         experiment=scenario.name,
@@ -105,7 +113,27 @@ def attribute(
         order=(ORDER[0].format(one=runs.names[0], two=runs.names[1]), ORDER[1]),
         runs=runs.count,
         provenance=runs.provenance,
+        detection=detection,
     )
+
+
+def _detection(
+    models: tuple[Model, Model], scenario: Scenario, *, seconds: float, seed: int
+) -> Detection | None:
+    """The contacts that each engine finds at the states of the first one's run."""
+    one, two = models
+    if one.backend == two.backend:
+        return None
+    try:
+        rerun = rerun_of(scenario, one, seconds=seconds, seed=seed)
+        other = two.replace(**scenario.options) if scenario.options else two
+        found = one_step(rerun, other, moments=_MOMENTS)
+    except StateMachineError:
+        return None
+    (gap,) = [stage for stage in found.stages if stage.stage == FOUND]
+    if not gap.told:
+        return None
+    return Detection(found.moments, gap.beyond, gap.first, gap.where, gap.worst)
 
 
 @dataclass(frozen=True)

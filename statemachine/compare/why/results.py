@@ -69,6 +69,25 @@ class FirstTouch:
 
 
 @dataclass(frozen=True)
+class Detection:
+    """Which contacts two engines find at the same states, those of the first one's run.
+
+    Attributes:
+        moments: From how many states.
+        differing: At how many of them the pairs that touch, or how deep, are not the same.
+        first: The first of these, since the start [s]; None if there is none.
+        where: The pair that differs most.
+        depth: By how much [m]; of a pair that one of them does not find, all of its depth.
+    """
+
+    moments: int
+    differing: int
+    first: float | None
+    where: str
+    depth: float
+
+
+@dataclass(frozen=True)
 class Attribution:
     """How much of the gap between two simulations each of their differences explains.
 
@@ -89,6 +108,8 @@ class Attribution:
             interpolated there.
         order: How the ladder was ordered, and why.
         runs: How many runs it took.
+        detection: Which contacts both find at equal states; None where nothing touches, or one of
+            them does not tell.
     """
 
     experiment: str
@@ -112,6 +133,7 @@ class Attribution:
     order: tuple[str, str]
     runs: int
     provenance: tuple[Provenance, Provenance]
+    detection: Detection | None = None
 
     @property
     def gap(self) -> float:

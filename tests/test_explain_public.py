@@ -1,0 +1,67 @@
+"""Public robots: a file does not differ from itself, and two seeded causes are found on each."""
+
+from __future__ import annotations
+
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.compare.matching import match_models
+from statemachine.compare.why import explain
+from statemachine.compare.why.causes import differences_of
+from statemachine.engines.mujoco.differences import edited
+from statemachine.errors import StateMachineError
+from statemachine.interface import Model
+from statemachine.scenarios import SCENARIOS, fitting
+
+from .conftest import SHARED, shared
+
+pytestmark = pytest.mark.slow
+MODELS = SHARED / "robots" / "models"
+FILES = sorted(path for kind in ("xml", "urdf") for path in MODELS.rglob(f"*.{kind}"))
+MOST = 100  # degrees of freedom: thousands of small bodies take minutes
+
+
+def _loaded(path: Path) -> Model:
+    try:
+        model = sm.load(path)
+    except StateMachineError as error:  # a part of a file, or one that wants what is not here
+        pytest.skip(str(error).splitlines()[0])
+    if not model.nv or model.nv > MOST:
+        pytest.skip(f"{model.nv} degrees of freedom")
+    return model
+
+
+def _moving(raw) -> list[int]:
+    """Bodies with a joint and a mass."""
+    has = (raw.body_dofnum > 0) & (raw.body_mass > 0) & (raw.body_weldid == np.arange(raw.nbody))
+    return np.flatnonzero(has).tolist()
+
+
+@pytest.mark.parametrize("path", FILES or [MODELS], ids=lambda path: "/".join(path.parts[-2:]))
+def test_public_robots(path):
+    shared(MODELS)
+    model = _loaded(path)
+    again = sm.load(path)
+    assert differences_of(model, again, match_models(model, again)) == ()
+    raw, fits = model.compiled, fitting(model)
+    if not fits or not _moving(raw):
+        return
+    random = np.random.default_rng([1, zlib.crc32(path.name.encode())])
+    body, dof = int(random.choice(_moving(raw))), int(random.integers(raw.nv))
+    edits = [
+        ("body_mass", (body,), raw.body_mass[body] * 1.2),
+        ("dof_damping", (dof,), raw.dof_damping[dof] + 0.05),
+    ]
+    right = model.with_compiled(edited(raw, edits))
+    scenario = SCENARIOS["waves" if "waves" in fits else fits[0]]
+    found = explain(model, right, scenario, seconds=0.2, uncertain=None)
+    assert {each.name.partition(" of ")[0] for each in found.shares} == {"mass", "damping"}
+    assert len(found.shares) == 2
+    assert found.brought == 0.0
+    assert found.is_explained
+    if not found.is_rounding:
+        assert sum(each.share or 0.0 for each in found.shares) == pytest.approx(1.0, abs=0.02)
