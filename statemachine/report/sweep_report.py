@@ -285,6 +285,8 @@ def _line(found: SweepReport, each: BroughtTogether) -> str:
     before = f"{quantity(each.before, unit)} → " if each.before is not None else ""
     sizes = f"{what} {before}{quantity(gap, unit)}"
     value = _fitted(each)
+    if each.verdict == "none" and _is_own(each):
+        return f"The model's own {each.label} is the best already: at {value}, {sizes}."
     if each.verdict == "none":
         own = "than the model's own" if each.own is not None else "than any other"
         return f"No value of {each.label} is better {own}: at the best, {value}, {sizes}."
@@ -297,6 +299,15 @@ def _line(found: SweepReport, each: BroughtTogether) -> str:
         )
     brings = "together" if each.verdict == "together" else "closer, not together"
     return f"{each.label} = {value} {where} brings {pair} {brings}: {sizes}."
+
+
+def _is_own(each: BroughtTogether) -> bool:
+    """Whether the value is the model's own, as far as its error tells."""
+    fit = each.fit
+    if fit is None or each.own is None:
+        return False
+    wide = fit.bounds[1] - fit.bounds[0]
+    return abs(fit.value - each.own) <= max(2 * (fit.error or 0.0), 0.02 * wide)
 
 
 def _how(found: SweepReport, each: BroughtTogether) -> str:

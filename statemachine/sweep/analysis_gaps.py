@@ -52,7 +52,7 @@ QUANTITIES = {
 
 
 @dataclass(frozen=True, eq=False)
-class Runs:
+class SweepRuns:
     """Runs of one engine, at points and seeds or in any other order; NaN where there is none.
 
     Attributes:
@@ -74,8 +74,8 @@ class Runs:
         """(…) whether there is a run."""
         return ~np.isnan(self.time)
 
-    def __getitem__(self, place: Any) -> Runs:
-        return Runs(*(getattr(self, name)[place] for name in self.__dataclass_fields__))
+    def __getitem__(self, place: Any) -> SweepRuns:
+        return SweepRuns(*(getattr(self, name)[place] for name in self.__dataclass_fields__))
 
     def vectors(self, name: str) -> Array:
         """(…, m, d): what the gap of a quantity is the length of a difference of."""
@@ -100,7 +100,7 @@ def _largest(values: Array) -> Array:
     return np.where(found == -np.inf, np.nan, found)
 
 
-def gap_between(name: str, one: Runs, two: Runs) -> Array:
+def gap_between(name: str, one: SweepRuns, two: SweepRuns) -> Array:
     """The gap (…) of a quantity between runs.
 
     Of a first touch that only one side has it is the length of the run, and 0 if neither has one.
@@ -114,7 +114,7 @@ def gap_between(name: str, one: Runs, two: Runs) -> Array:
     return np.where(never == 2, 0.0 * until, np.where(never == 1, until, gap))
 
 
-def runs_of(rows: Sequence[Mapping[str, Any]], hinges: Sequence[int] | None = None) -> Runs:
+def runs_of(rows: Sequence[Mapping[str, Any]], hinges: Sequence[int] | None = None) -> SweepRuns:
     """Runs (n,) from rows as the dataset has them; a row that failed is none.
 
     Args:
@@ -139,7 +139,7 @@ def runs_of(rows: Sequence[Mapping[str, Any]], hinges: Sequence[int] | None = No
         return made
 
     qpos, time, steps = nested("sample_qpos"), scalar("time", np.nan), scalar("steps", np.nan)
-    return Runs(
+    return SweepRuns(
         nested("sample_tip"),
         qpos if hinges is None else qpos[..., list(hinges)],
         scalar("first_touch", np.inf),
@@ -180,8 +180,8 @@ class SweepGaps:
     design: Design
     points: tuple[DesignPoint, ...]
     seeds: tuple[int, ...]
-    left: Runs
-    right: Runs
+    left: SweepRuns
+    right: SweepRuns
     failed: Mapping[str, int]
     missing: int
 
@@ -232,7 +232,7 @@ def gaps_of(
     place = {point.id: k for k, point in enumerate(points)}
     keys = [table[name].to_pylist() for name in ("backend", "point", "seed", "status")]
     failed: Counter[str] = Counter()
-    found: list[Runs] = []
+    found: list[SweepRuns] = []
     count = 0
     for side in sides:
         rows, where = [], []
@@ -256,7 +256,7 @@ def gaps_of(
     )  # fmt: skip
 
 
-def _read(table: Any, hinges: Sequence[int] | None) -> Runs:
+def _read(table: Any, hinges: Sequence[int] | None) -> SweepRuns:
     """Runs (n,) of the rows of a table, all of them done."""
     tip, qpos = _nested(table["sample_tip"]), _nested(table["sample_qpos"])
     if tip is None or qpos is None:
@@ -267,10 +267,10 @@ def _read(table: Any, hinges: Sequence[int] | None) -> Runs:
     )
     touch = np.where(np.isnan(touch), np.inf, touch)
     qpos = qpos if hinges is None else qpos[..., list(hinges)]
-    return Runs(tip, qpos, touch, time, time / np.maximum(steps, 1))
+    return SweepRuns(tip, qpos, touch, time, time / np.maximum(steps, 1))
 
 
-def _spread(runs: Runs, where: Sequence[int], points: int, seeds: int) -> Runs:
+def _spread(runs: SweepRuns, where: Sequence[int], points: int, seeds: int) -> SweepRuns:
     """Runs (n,) put at their points and seeds (p, s)."""
 
     def put(values: Array) -> Array:
@@ -278,21 +278,23 @@ def _spread(runs: Runs, where: Sequence[int], points: int, seeds: int) -> Runs:
         made[list(where)] = values
         return made.reshape(points, seeds, *values.shape[1:])
 
-    return Runs(*(put(getattr(runs, name)) for name in runs.__dataclass_fields__))
+    return SweepRuns(*(put(getattr(runs, name)) for name in runs.__dataclass_fields__))
 
 
-def joined(runs: Sequence[Runs]) -> Runs:
+def joined(runs: Sequence[SweepRuns]) -> SweepRuns:
     """Runs (n,) one after the other, with arrays of the same shapes."""
     found = runs[0]
     for other in runs[1:]:
         pair = _alike(found, other)
         names = found.__dataclass_fields__
-        found = Runs(*(np.concatenate([getattr(each, name) for each in pair]) for name in names))
+        found = SweepRuns(
+            *(np.concatenate([getattr(each, name) for each in pair]) for name in names)
+        )
     return found
 
 
-def _alike(one: Runs, two: Runs) -> tuple[Runs, Runs]:
-    """Two Runs with arrays of the same shapes, the shorter one filled up with NaN."""
+def _alike(one: SweepRuns, two: SweepRuns) -> tuple[SweepRuns, SweepRuns]:
+    """Two SweepRuns with arrays of the same shapes, the shorter one filled up with NaN."""
 
     def filled(values: Array, like: Array) -> Array:
         m, d = (max(values.shape[k], like.shape[k]) for k in (-2, -1))
@@ -300,8 +302,8 @@ def _alike(one: Runs, two: Runs) -> tuple[Runs, Runs]:
         made[..., m - values.shape[-2] :, : values.shape[-1]] = values
         return made
 
-    def of(a: Runs, b: Runs) -> Runs:
-        return Runs(filled(a.tip, b.tip), filled(a.qpos, b.qpos), a.touch, a.time, a.timestep)
+    def of(a: SweepRuns, b: SweepRuns) -> SweepRuns:
+        return SweepRuns(filled(a.tip, b.tip), filled(a.qpos, b.qpos), a.touch, a.time, a.timestep)
 
     return of(one, two), of(two, one)
 

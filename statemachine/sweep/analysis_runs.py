@@ -15,7 +15,7 @@ from ..grading.parallel import checked_jobs
 from ..interface import Ints, JointType, Model, forward, make_data, reset
 from ..scenarios.runs import Progress, silent
 from ..traces.controllers import is_function
-from .analysis_gaps import Runs, runs_of
+from .analysis_gaps import SweepRuns, runs_of
 from .apart import apart
 from .cell import CellRules, SweepCell
 from .factors import Value, Vary
@@ -47,7 +47,7 @@ class CellRunner:
         nudges: Sequence[int] = (),
         own: Vary | None = None,
         progress: Progress = silent,
-    ) -> Runs:
+    ) -> SweepRuns:
         """Runs (n,) at settings.
 
         Args:

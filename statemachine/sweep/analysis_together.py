@@ -11,7 +11,7 @@ import numpy as np
 from ..interface import Array
 from ..scenarios.runs import Progress, silent
 from .analysis_fit import FittedValue, Verdict, fit_curves, fit_scatter
-from .analysis_gaps import Runs, SweepGaps, gap_between, joined, median
+from .analysis_gaps import SweepRuns, SweepGaps, gap_between, joined, median
 from .analysis_runs import CellRunner, Setting, evenly
 from .factors import Vary
 
@@ -178,7 +178,7 @@ class _Case:
         gap = gap_between(self.quantity, runs, self.gaps.right[chosen, 0])
         return fit_scatter(values[chosen], gap)
 
-    def _references(self, settings: Sequence[Setting]) -> Runs | None:
+    def _references(self, settings: Sequence[Setting]) -> SweepRuns | None:
         """The left side at the model's own value."""
         if self.runner is None:
             self.why_not = (
@@ -188,7 +188,9 @@ class _Case:
             return None
         return self._run([(self.gaps.sides[0], settings, True)], 0.0)
 
-    def _run(self, groups: Sequence[tuple[str, Sequence[Setting], bool]], start: float) -> Runs:
+    def _run(
+        self, groups: Sequence[tuple[str, Sequence[Setting], bool]], start: float
+    ) -> SweepRuns:
         """Runs (n,) of groups of a backend, settings, and whether the model's own value is meant.
 
         Groups of the same kind go together: each start of processes takes a second.
