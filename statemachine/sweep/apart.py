@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import importlib
+import signal
 import threading
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from concurrent.futures import TimeoutError as WaitedTooLong
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from itertools import islice
 from typing import Any
 
@@ -19,6 +20,10 @@ Batch = Sequence[SweepCell]
 Results = Generator[list[Row], None, None]
 _GRACE = 30.0  # seconds beyond what a batch may take; its process ends itself before
 ALONE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # several processes run at once
+_TRACKERS = (
+    "multiprocessing.resource_tracker",
+    "joblib.externals.loky.backend.resource_tracker",
+)
 
 
 def require_joblib() -> Any:
@@ -33,6 +38,21 @@ def require_joblib() -> Any:
         raise MissingEngineError(
             "a sweep needs joblib: pip install 'statemachine-sim[sweep]'", engine="joblib"
         ) from error
+
+
+@contextmanager
+def deaf() -> Iterator[None]:
+    """Processes that begin in here never take a Ctrl-C: it is for the driver to answer it."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    for name in _TRACKERS:  # which would take the block away when they begin
+        importlib.import_module(name).ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class _Process:
@@ -61,7 +81,8 @@ class _Process:
     def _run(self, batch: Batch) -> list[Row]:
         if self._pool is None:
             self._pool = self._loky.ProcessPoolExecutor(max_workers=1, env=ALONE)
-        future: Future[list[Row]] = self._pool.submit(run_batch, self._rules, batch, True)
+        with deaf():
+            future: Future[list[Row]] = self._pool.submit(run_batch, self._rules, batch, True)
         try:
             return future.result(self._rules.timeout * len(batch) + _GRACE)
         except (self._loky.BrokenProcessPool, WaitedTooLong) as error:

@@ -20,7 +20,7 @@ from ..errors import BadInputError, MissingEngineError, StateMachineError
 from ..grading.parallel import checked_jobs
 from ..grading.unwinding import unwinding
 from ..scenarios.runs import Progress, silent
-from .apart import Batch, Results, apart, require_joblib
+from .apart import Batch, Results, apart, deaf, require_joblib
 from .cell import DONE, CellRules
 from .folder import check_folder, locked, settle_manifest
 from .request import PreparedSweep, Sweep, prepared
@@ -238,7 +238,9 @@ def _parallel(rules: CellRules, feed: _Feed, jobs: int, client: Any) -> Results:
         parallel = joblib.Parallel(
             return_as="generator_unordered", batch_size=1, pre_dispatch="2 * n_jobs"
         )
-        with closing(parallel(feed.tasks(rules, client is None))) as found:
+        with deaf():
+            started = parallel(feed.tasks(rules, client is None))
+        with closing(started) as found:
             for number, rows in found:
                 feed.back(number)
                 yield rows

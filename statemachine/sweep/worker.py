@@ -198,7 +198,7 @@ def _settle() -> None:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):
         os.dup2(nowhere, stream)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the driver has it, too, and says what to do
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it was not kept from it already
     driver = os.getppid()
 
     def watch() -> None:

@@ -1,0 +1,150 @@
+"""What a cell of a sweep costs, and how many tasks joblib and Dask hand out: `docs/scale.md`.
+
+    python -m benchmarks.sweep_cost
+
+Cells are measured in processor seconds, which other work on the machine changes little; rates of
+tasks by the clock. It takes about two minutes.
+"""
+
+from __future__ import annotations
+
+import datetime
+import os
+import platform
+import tempfile
+import time
+import tracemalloc
+import warnings
+from pathlib import Path
+from typing import Any
+
+import joblib
+
+import statemachine as sm
+from statemachine.scenarios import TARGET
+from statemachine.sweep import Sweep, prepared
+from statemachine.sweep.rows import CELLS, RowWriter, counted
+from statemachine.sweep.worker import Row, run_batch
+
+YEAR = 365.25 * 86400
+CELLS_OF_ALL = 10**9
+TASKS, ROWS = 1000, 400
+
+
+def empty(number: int) -> int:
+    """A task that does nothing."""
+    return number
+
+
+def cells(what: str, backend: str, vary: tuple[str, ...], seeds: int) -> tuple[float, list[Row]]:
+    """Processor seconds of a cell, and the rows; the first ones, which load, are left out."""
+    ready = prepared(Sweep(what, vary, (backend,), seeds=seeds))
+    every = list(ready.cells(backend))
+    run_batch(ready.rules, every[:1], False)
+    began = time.process_time()
+    rows = run_batch(ready.rules, every[1:], False)
+    return (time.process_time() - began) / len(rows), rows
+
+
+def bytes_of(rows: list[Row], moments: int) -> tuple[float, float, float]:
+    """Bytes of a row on disk; seconds to write one, and to read its id again."""
+    ready = prepared(Sweep("hold", ("damping=0.5x,2x",), ("mujoco",), moments=moments))
+    with tempfile.TemporaryDirectory() as folder:
+        writer = RowWriter(Path(folder), ready.design.factors, {"request": {}})
+        began = time.process_time()
+        writer.add(rows)
+        writer.flush()
+        wrote = (time.process_time() - began) / len(rows)
+        size = sum(part.stat().st_size for part in (Path(folder) / CELLS).rglob("*.parquet"))
+        sum(1 for _ in counted(Path(folder)))  # the first time imports more
+        began = time.process_time()
+        found = sum(1 for _ in counted(Path(folder)))
+        return size / len(rows), wrote, (time.process_time() - began) / found
+
+
+def ids() -> tuple[float, float]:
+    """Processor seconds to name a cell, and bytes to remember that it is there."""
+    ready = prepared(Sweep("hold", ("damping=0.5x:2x:10000",), ("mujoco",)))
+    began = time.process_time()
+    number = sum(1 for _ in ready.cells("mujoco"))
+    took = time.process_time() - began
+    tracemalloc.start()
+    known = {cell.id: "done" for cell in ready.cells("mujoco")}
+    size, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    return took / number, size / len(known)
+
+
+def steps_alone(backend: str) -> float:
+    """Processor seconds of the steps of `hold`, and of nothing else."""
+    model = sm.load("so101/scene", backend=backend)
+    with sm.make_data(model) as data:
+        data.ctrl[:] = TARGET
+        began = time.process_time()
+        sm.step(model, data, 400)
+        return time.process_time() - began
+
+
+def rate(**how: object) -> float:
+    """Empty tasks a second through joblib."""
+    with joblib.parallel_config(**how):  # type: ignore[arg-type]
+        given: Any = {"return_as": "generator_unordered", "batch_size": 1}
+        parallel = joblib.Parallel(**given)
+        list(parallel(joblib.delayed(empty)(k) for k in range(50)))
+        began = time.perf_counter()
+        list(parallel(joblib.delayed(empty)(k) for k in range(TASKS)))
+        return TASKS / (time.perf_counter() - began)
+
+
+def main() -> None:
+    """Print all of it."""
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
+    print(f"{datetime.date.today()}, {platform.machine()}, {os.cpu_count()} processors,")
+    print(f"load {load:.1f}, Python {platform.python_version()}, joblib {joblib.__version__}")
+    for backend in ("mujoco", "pybullet"):
+        alone = min(steps_alone(backend) for _ in range(3))
+        print(f"the 400 steps of hold alone, {backend}: {alone * 1e3:.1f} ms")
+    for what in ("hold", "waves"):
+        for backend in ("mujoco", "pybullet"):
+            for label, vary, seeds in (
+                ("one Model, many seeds", (), 9),
+                ("a Model for each", ("damping=0.5x:2x:9",), 1),
+            ):
+                cost, rows = cells(what, backend, vary, seeds)
+                years = cost * CELLS_OF_ALL / YEAR
+                print(
+                    f"{what:6} {backend:9} {label:22} {cost * 1e3:7.1f} ms a cell, "
+                    f"{rows[0]['steps']} steps; 1e9 cells: {years:.1f} processor years"
+                )
+    _, kept = cells("hold", "mujoco", ("damping=0.5x,2x",), ROWS // 2)
+    for moments in (20, 1):
+        chosen = kept
+        if moments == 1:
+            chosen = [
+                {**row, **{name: row[name][-1:] for name in row if name.startswith("sample_")}}
+                for row in kept
+            ]
+        size, wrote, read = bytes_of([dict(row) for row in chosen], moments)
+        print(
+            f"{moments} moments: {size:.0f} bytes a row in a file of {len(chosen)}, "
+            f"{wrote * 1e6:.0f} µs to write it, {read * 1e6:.1f} µs to read its id"
+        )
+    took, size = ids()
+    print(f"{took * 1e6:.1f} µs to name a cell, {size:.0f} bytes to remember it")
+    jobs = os.cpu_count() or 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        print(f"loky, {jobs} processes: {rate(backend='loky', n_jobs=jobs):.0f} tasks/s")
+        import distributed
+
+        with (
+            distributed.LocalCluster(
+                n_workers=jobs, threads_per_worker=1, dashboard_address=":0"
+            ) as cluster,
+            distributed.Client(cluster) as client,
+        ):
+            print(f"dask, {jobs} workers: {rate(backend='dask', client=client):.0f} tasks/s")
+
+
+if __name__ == "__main__":
+    main()
