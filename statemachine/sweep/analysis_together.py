@@ -11,7 +11,7 @@ import numpy as np
 from ..interface import Array
 from ..scenarios.runs import Progress, silent
 from .analysis_fit import FittedValue, Verdict, fit_curves, fit_scatter
-from .analysis_gaps import SweepRuns, SweepGaps, gap_between, joined, median
+from .analysis_gaps import SweepGaps, SweepRuns, gap_between, joined, median
 from .analysis_runs import CellRunner, Setting, evenly
 from .factors import Vary
 
