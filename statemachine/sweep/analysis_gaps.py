@@ -294,7 +294,7 @@ def joined(runs: Sequence[SweepRuns]) -> SweepRuns:
 
 
 def _alike(one: SweepRuns, two: SweepRuns) -> tuple[SweepRuns, SweepRuns]:
-    """Two SweepRuns with arrays of the same shapes, the shorter one filled up with NaN."""
+    """Both with arrays of the same shapes, the shorter one filled up with NaN."""
 
     def filled(values: Array, like: Array) -> Array:
         m, d = (max(values.shape[k], like.shape[k]) for k in (-2, -1))
