@@ -9,8 +9,10 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import mujoco
+import mujoco.batch
 import numpy as np
 
 import statemachine as sm
@@ -363,6 +365,47 @@ def worlds_memory(name: str, _rounds: int) -> list[Ratio]:
     ]
 
 
+def environments(name: str, rounds: int) -> list[Ratio]:
+    """A control step of 64 worlds of a task for Gymnasium, against the engine's own batch.
+
+    The baseline writes ctrl, steps and calls forward; the others observe and reward, too.
+    """
+    import gymnasium
+
+    import statemachine.gym  # noqa: F401  (registers the tasks)
+
+    n, workers = 64, 2
+    envs: Any = gymnasium.make_vec(name, num_envs=n, workers=workers)
+    loop = [gymnasium.make(name) for _ in range(n)]
+    task = envs.unwrapped.task
+    batch = mujoco.batch.Batch(task.model.raw, n, workers)
+    ctrl, ids = batch.bind("ctrl"), np.arange(n)
+    actions = np.zeros((n, task.model.nu), dtype=np.float32)
+    commands = task.ctrl(actions, actions.shape)
+    envs.reset(seed=0)
+    for world, env in enumerate(loop):
+        env.reset(seed=world)
+
+    def raw() -> None:
+        ctrl[:] = commands
+        batch.step(ids, task.frame_skip)
+        batch.forward(ids)
+
+    def one_by_one() -> None:
+        for env, action in zip(loop, actions, strict=True):
+            if env.step(action)[3]:
+                env.reset()
+
+    others = {
+        f"VectorEnv of {n}, {name}": lambda: envs.step(actions),
+        f"loop of {n} Envs, {name}": one_by_one,
+    }
+    ratios = interleaved(raw, others, rounds // 6 + 1)
+    for each in (envs, *loop):
+        each.close()
+    return ratios
+
+
 # What DESIGN asks of each: at most this, measured on a quiet machine.
 BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None]] = [
     (step, "so101", 1.025),
@@ -382,6 +425,8 @@ BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None]] = [
     (worlds_alone, "so101/scene_box", 1.03),
     (worlds_on_two, "so101", 1 / 1.9),
     (worlds_on_two, "so101/scene_box", 1 / 1.9),
+    (environments, "statemachine/Reach-v0", None),
+    (environments, "statemachine/HeldBox-v0", None),
 ]
 
 

@@ -151,6 +151,11 @@ PRINTS = {
     "docs/comparing.md": ("False the same ()",),
     "docs/it_works_there.md": ("[('gravity', 1.0)]",),
     "docs/freshness.md": ("Derived values of scene_box on mujoco", "1 of 1 reads were stale"),
+    "docs/gym.md": (
+        "HeldBox mujoco   random   within 1 cm:  0 of 16",
+        "HeldBox mujoco   scripted within 1 cm: 16 of 16, 150.0 steps",
+        "HeldBox pybullet scripted within 1 cm: 16 of 16, 150.0 steps",
+    ),
     "docs/interface.md": ("no joint named 'elbow'; known: ", "0.001\n", "options of replace: "),
     "docs/platforms.md": ("armature: emulated", "position servo: emulated"),
     "docs/randomised_worlds.md": ("the fingertip is ", "in world 7"),
@@ -165,10 +170,20 @@ PRINTS = {
 }
 
 
-@pytest.mark.parametrize("page", [name for name in PYTHON if PYTHON[name] and name != "README.md"])
+LONG = ("docs/gym.md",)  # what runs for seconds
+GUIDES = [
+    pytest.param(name, marks=[pytest.mark.slow] if name in LONG else [])
+    for name, code in PYTHON.items()
+    if code and name != "README.md"
+]
+
+
+@pytest.mark.parametrize("page", GUIDES)
 def test_the_code_of_a_guide_runs(page: str, tmp_path: Path) -> None:
-    if '"pybullet"' in PYTHON[page]:
+    if '"pybullet"' in PYTHON[page] or page in LONG:
         need_engine("pybullet")
+    if page in LONG:
+        need_engine("pinocchio")
     out = _output(PYTHON[page], tmp_path)
     for text in PRINTS[page]:
         assert text in out

@@ -78,6 +78,35 @@ def test_a_second_thread_is_refused_while_one_steps(model: sm.Model, name: str) 
         USES[name](model, data)  # afterwards nothing is held any more
 
 
+@pytest.mark.parametrize("name", USES)
+def test_a_reset_under_way_is_a_busy_data(
+    model: sm.Model, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not one that diverged: it is only in the middle of a reset."""
+    raised: list[Exception] = []
+
+    def use() -> None:
+        try:
+            USES[name](model, data)
+        except Exception as error:
+            raised.append(error)
+
+    with sm.make_data(model) as data:
+        right = type(data)._reset
+
+        def slow(self: Any, key: int | None) -> None:
+            thread = threading.Thread(target=use)
+            thread.start()
+            thread.join()
+            right(self, key)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(type(data), "_reset", slow)
+            sm.reset(model, data)
+        assert [type(error) for error in raised] == [errors.BusyDataError]
+        USES[name](model, data)
+
+
 def test_another_data_is_not_refused(model: sm.Model) -> None:
     """The Model, and what its Data share behind it, may be used by all threads."""
     with sm.make_data(model) as data, sm.make_data(model) as other:

@@ -257,9 +257,9 @@ class Data(ABC):
         if self._trouble == "closed":
             raise ClosedDataError("this Data is closed: make another with make_data")
         if self._trouble:
-            raise DivergedError(
-                f"this Data is not usable any more ({self._trouble}): reset it, or set_state"
-            )
+            in_use_here(self)  # or another thread is in the middle of a reset
+        if why := self._trouble:
+            raise DivergedError(f"this Data is not usable any more ({why}): reset it, or set_state")
 
     def _check_writable(self) -> None:
         """Raise ReadOnlyError where the caller made an input read-only."""

@@ -11,11 +11,12 @@ of its room, in a process of its own, which an OpenGL library that is missing ta
 from __future__ import annotations
 
 from .motion import Motion, models_of, motion_of, motion_through
-from .pictures import LONGEST, Timing, camera_for, drawn, frames, timing_of
+from .pictures import LONGEST, LivePictures, Timing, camera_for, drawn, frames, timing_of
 from .probe import Renderer, renderer_here, renderers
 
 __all__ = [
     "LONGEST",
+    "LivePictures",
     "Motion",
     "Renderer",
     "Timing",

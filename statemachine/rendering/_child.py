@@ -1,24 +1,28 @@
-"""The process that draws: a job comes in, pictures go out one after the other.
+"""The process that draws: poses come in, pictures go out one after the other.
 
-python -c '… main()'  < job.npz  > pictures
+The first line of standard input is JSON, what is to be drawn and how. Then come the poses of
+each picture: of each side (nbody, 7) float64, xpos and xquat of each body.
 """
 
 from __future__ import annotations
 
 import importlib
-import io
 import json
 import os
 import signal
 import sys
+import threading
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
 import numpy as np
 
 from ..drawing.camera import Camera
 from ..drawing.shots import Drawer
+from ..interface import Array
 from .compose import compose, halved
 
 
@@ -26,20 +30,18 @@ def main() -> None:
     """Draw what standard input asks for."""
     with suppress(ValueError, OSError):
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started this ends it
-    with np.load(io.BytesIO(sys.stdin.buffer.read()), allow_pickle=False) as file:
-        job = {name: file[name] for name in file.files}
+    facts = json.loads(sys.stdin.buffer.readline())
     # What a driver prints must not get in between the pictures.
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     with suppress(BrokenPipeError):  # nobody wants the rest
-        draw(job, out)
+        draw(facts, out)
         out.close()
     os._exit(0)  # a driver may take its time, or fail, in taking its things down
 
 
-def draw(job: dict[str, Any], out: Any) -> None:
-    """Write the pictures of a job, (height, width, 3) uint8 each, into `out`."""
-    facts = json.loads(job["facts"].astype(np.uint8).tobytes())
+def draw(facts: dict[str, Any], out: Any) -> None:
+    """Write a picture (height, width, 3) uint8 into `out` for each poses that come in."""
     camera = Camera(**facts["camera"])
     width, height = facts["size"]
     sharper = facts["sharper"]
@@ -47,10 +49,9 @@ def draw(job: dict[str, Any], out: Any) -> None:
         [Path(file) for file in facts["files"]], (width * sharper, height * sharper), camera
     )
     try:
-        for k in range(len(job["xpos0"])):
+        for sides in _poses(facts["bodies"]):
             shots = [
-                drawer.shot(side, job[f"xpos{side}"][k], job[f"xquat{side}"][k])
-                for side in range(len(facts["files"]))
+                drawer.shot(side, poses[:, :3], poses[:, 3:]) for side, poses in enumerate(sides)
             ]
             ghost = shots[1] if len(shots) > 1 else None
             picture = compose(shots[0], ghost, facts["bias"], sharper)
@@ -58,3 +59,20 @@ def draw(job: dict[str, Any], out: Any) -> None:
             out.flush()
     finally:
         drawer.close()
+
+
+def _poses(bodies: list[int]) -> Iterator[list[Array]]:
+    """What standard input tells, until it ends; read in a thread, so that no writer waits."""
+    told: SimpleQueue[bytes] = SimpleQueue()
+    size = 7 * 8 * sum(bodies)
+
+    def listen() -> None:
+        content = b"-"
+        while content:
+            content = sys.stdin.buffer.read(size)
+            told.put(content)
+
+    threading.Thread(target=listen, daemon=True).start()
+    while len(content := told.get()) == size:
+        rows = np.frombuffer(content).reshape(-1, 7)
+        yield np.split(rows, np.cumsum(bodies)[:-1])

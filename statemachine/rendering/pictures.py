@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
 import json
 import math
 import subprocess
 import sys
 import tempfile
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -165,45 +164,100 @@ def drawn(
     motions: list[Motion], size: tuple[int, int], camera: Camera, renderer: Renderer
 ) -> Generator[Pixels]:
     """Pictures of one motion, or of two in one place, as `frames` has them."""
-    width, height = size
-    facts = {
-        "renderer": renderer.room.__name__,
-        "sharper": renderer.room.SHARPER,
-        "files": [str(motion.file) for motion in motions],
-        "size": size,
-        "camera": asdict(camera),
-        "bias": _BIAS * 2 * camera.distance * math.tan(math.radians(camera.fovy) / 2) / height,
-    }
-    with tempfile.TemporaryFile() as job, tempfile.TemporaryFile() as said:
-        _write_job(job, facts, motions)
-        child = subprocess.Popen(
+    files = [motion.file for motion in motions]
+    bodies = [motion.xpos.shape[1] for motion in motions]
+    with LivePictures(files, bodies, size, camera, renderer) as pictures:
+        last = len(motions[0].xpos) - 1
+        for k in range(-1, last):
+            pictures.ask([(motion.xpos[k + 1], motion.xquat[k + 1]) for motion in motions])
+            if k >= 0:  # it draws the next one while somebody looks at this one
+                yield pictures.take()
+        yield pictures.take()
+
+
+class LivePictures:
+    """A process that draws bodies wherever they are told to be, one picture after the other.
+
+    A context manager.
+    """
+
+    def __init__(
+        self,
+        files: Sequence[Path],
+        bodies: Sequence[int],
+        size: tuple[int, int],
+        camera: Camera,
+        renderer: Renderer,
+    ) -> None:
+        """Start it.
+
+        Args:
+            files: The model of the solid side, and that of the ghost if there is one.
+            bodies: How many bodies each has.
+            size: Width and height in pixels, even.
+            camera: Where they are seen from.
+            renderer: What draws.
+        """
+        self._size = size
+        self._renderer = renderer
+        facts = {
+            "renderer": renderer.room.__name__,
+            "sharper": renderer.room.SHARPER,
+            "files": [str(file) for file in files],
+            "bodies": list(bodies),
+            "size": size,
+            "camera": asdict(camera),
+            "bias": _BIAS * 2 * camera.distance * math.tan(math.radians(camera.fovy) / 2) / size[1],
+        }
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115  (closed with the process)
+        self._child = subprocess.Popen(
             [sys.executable, "-P", "-c", _CHILD, str(_PACKAGES)],
-            stdin=job,
+            stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=said,
+            stderr=self._said,
             env=environment_of(renderer),
         )
-        assert child.stdout is not None
-        try:
-            for _ in range(len(motions[0].xpos)):
-                picture = child.stdout.read(3 * width * height)
-                if len(picture) < 3 * width * height:
-                    raise EngineError(_why(child, said, renderer))
-                yield np.frombuffer(picture, dtype=np.uint8).reshape(height, width, 3)
-        finally:  # also if nobody wants the rest, or Ctrl-C
-            child.kill()
-            child.stdout.close()
-            child.wait()
+        self._send(json.dumps(facts).encode() + b"\n")
 
+    def ask(self, poses: Sequence[tuple[Array, Array]]) -> None:
+        """Ask for a picture, which `take` gives: of each side xpos (nbody, 3), xquat (nbody, 4)."""
+        rows = np.vstack([np.hstack([xpos, xquat]) for xpos, xquat in poses])
+        self._send(rows.astype(np.float64).tobytes())
 
-def _write_job(job: Any, facts: dict[str, Any], motions: list[Motion]) -> None:
-    arrays: dict[str, Any] = {"facts": np.frombuffer(json.dumps(facts).encode(), dtype=np.uint8)}
-    for k, motion in enumerate(motions):
-        arrays |= {f"xpos{k}": motion.xpos, f"xquat{k}": motion.xquat}
-    packed = io.BytesIO()
-    np.savez(packed, **arrays)
-    job.write(packed.getvalue())
-    job.seek(0)
+    def take(self) -> Pixels:
+        """The picture (height, width, 3) uint8 that was asked for first.
+
+        Raises:
+            EngineError: The process gave up.
+        """
+        width, height = self._size
+        assert self._child.stdout is not None
+        picture = self._child.stdout.read(3 * width * height)
+        if len(picture) < 3 * width * height:
+            raise EngineError(_why(self._child, self._said, self._renderer))
+        return np.frombuffer(picture, dtype=np.uint8).reshape(height, width, 3)
+
+    def close(self) -> None:
+        """End the process, at once. Idempotent."""
+        self._child.kill()
+        for stream in (self._child.stdin, self._child.stdout):
+            if stream is not None:
+                with suppress(OSError):  # what it was still to be told
+                    stream.close()
+        self._child.wait()
+        self._said.close()
+
+    def __enter__(self) -> LivePictures:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    def _send(self, content: bytes) -> None:
+        assert self._child.stdin is not None
+        with suppress(OSError):  # it gave up: `take` says why
+            self._child.stdin.write(content)
+            self._child.stdin.flush()
 
 
 def _why(child: subprocess.Popen[bytes], said: Any, renderer: Renderer) -> str:

@@ -1,0 +1,414 @@
+"""The tasks for Gymnasium: its own checker, the bits of every world, policies, faults."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import warnings
+from contextlib import closing
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.error import ResetNeeded
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+
+import statemachine as sm
+import statemachine.gym  # registers the tasks
+from statemachine.errors import (
+    BadInputError,
+    ClosedDataError,
+    DivergedWarning,
+    UnknownNameError,
+)
+from statemachine.gym.policies import play, random_policy, scripted_policy
+from statemachine.gym.tasks import TASKS, HeldBox, Reach
+from statemachine.gym.vector import ArmVectorEnv
+from statemachine.rendering import renderer_here
+
+from .conftest import ROOT, need_engine
+
+IDS = [task.id for task in TASKS.values()]
+REACH, HELD_BOX = IDS
+pytestmark = pytest.mark.filterwarnings("error")
+
+
+def _make(task: str, backend: str, **options: Any) -> Any:
+    return gymnasium.make(task, backend=backend, **options)
+
+
+def _make_vec(task: str, backend: str, num_envs: int, **options: Any) -> Any:
+    return gymnasium.make_vec(task, num_envs=num_envs, backend=backend, **options)
+
+
+def _same(one: Any, two: Any) -> None:
+    """The same types, shapes and bits, all the way down."""
+    assert type(one) is type(two)
+    if isinstance(one, dict):
+        assert one.keys() == two.keys()
+        for key in one:
+            _same(one[key], two[key])
+    elif isinstance(one, tuple):
+        for each, other in zip(one, two, strict=True):
+            _same(each, other)
+    elif isinstance(one, np.ndarray):
+        assert (one.dtype, one.shape) == (two.dtype, two.shape)
+        if one.dtype == object:
+            for each, other in zip(one, two, strict=True):
+                _same(each, other)
+        else:
+            assert one.tobytes() == two.tobytes()
+    else:
+        assert one == two
+
+
+def _said(code: str, *words: str) -> str:
+    """What a process of its own prints."""
+    command = [sys.executable, "-c", code, *words]
+    return subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout
+
+
+@pytest.mark.parametrize("task", IDS)
+def test_gymnasium_finds_no_fault(task: str, backend: str) -> None:
+    with _make(task, backend) as env:
+        check_env(env.unwrapped, skip_render_check=True)
+        assert env.observation_space.dtype == np.float64
+        assert env.action_space.dtype == np.float32
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("task", IDS)
+def test_gymnasium_finds_no_fault_in_pictures(task: str, backend: str) -> None:
+    renderer_here()
+    with _make(task, backend, render_mode="rgb_array") as env:
+        check_env(env.unwrapped)
+        env.reset(seed=0)
+        before = env.render()
+        for _ in range(10):
+            env.step(env.action_space.sample())
+        assert before.shape == (360, 480, 3)
+        assert before.std() > 10
+        assert not np.array_equal(before, env.render())
+
+
+@pytest.mark.slow
+def test_each_world_has_its_picture() -> None:
+    renderer_here()
+    with closing(_make_vec(REACH, "mujoco", 2, render_mode="rgb_array")) as envs:
+        envs.reset(seed=0)
+        envs.step(np.array([[1.0] * 6, [-1.0] * 6], dtype=np.float32))
+        one, two = envs.render()
+        assert one.shape == two.shape == (360, 480, 3)
+        assert not np.array_equal(one, two)
+
+
+def test_an_observation_is_of_the_present(backend: str) -> None:
+    """The fingertip is that of the qpos beside it, not that of a timestep before."""
+    with _make(REACH, backend) as env, sm.make_data(env.unwrapped.model) as data:
+        env.reset(seed=1)
+        seen, reward, _, _, info = env.step(np.ones(6, dtype=np.float32))
+        model = env.unwrapped.model
+        data.qpos[:] = seen[:6]
+        sm.forward(model, data)
+        tip = data.site_xpos[model.site_id("gripperframe")]
+        assert np.array_equal(seen[12:15], tip)
+        assert np.array_equal(seen[18:21], seen[15:18] - tip)
+        assert np.abs(seen[6:12]).max() > 0.5
+        assert info["distance"] == pytest.approx(np.linalg.norm(seen[18:21]), rel=1e-12)
+        assert reward == -info["distance"]
+
+
+def test_actions_are_commands(backend: str) -> None:
+    with _make(REACH, backend) as env:
+        env.reset(seed=0)
+        low, high = env.unwrapped.model.actuator_ctrlrange.T
+        for action, ctrl in ((-1, low), (1, high), (0, (low + high) / 2)):
+            env.step(np.full(6, action, dtype=np.float32))
+            assert np.allclose(env.unwrapped.data.ctrl, ctrl, atol=1e-12)
+    task = HeldBox(backend, 4)
+    held = task.model.keyframes[0].ctrl
+    assert np.array_equal(task.ctrl(np.zeros(6), (6,)), held)
+    away = np.array([0.3, -0.2, 0.1, 0.0, 0.1, 0.05])
+    assert np.allclose(task.ctrl(task.action(held + away), (6,)), held + away, atol=1e-7)
+
+
+def test_targets_can_be_reached_and_are_the_same_on_every_backend(backend: str) -> None:
+    for kind in (Reach, HeldBox):
+        here, there = kind(backend, 4), kind("mujoco", 4)
+        for seed in range(20):
+            one, two = (task.start(np.random.default_rng(seed)) for task in (here, there))
+            assert np.array_equal(one.target, two.target)
+            assert 0.03 < one.target[2] < 0.6
+    with _make(HELD_BOX, backend) as env:
+        seen, info = env.reset(seed=4)
+        assert 0.04 < info["distance"] < 0.4
+        assert np.array_equal(seen[:13], env.unwrapped.model.keyframes[0].qpos)
+
+
+def test_the_box_is_held_by_the_action_0_and_dropped_by_open_jaws(backend: str) -> None:
+    with _make(HELD_BOX, backend) as env:
+        env.reset(seed=0)
+        for _ in range(40):
+            _, reward, terminated, truncated, info = env.step(np.zeros(6, dtype=np.float32))
+            assert not terminated
+            assert not truncated
+            assert reward == 1 - info["distance"]
+        steps, terminated, reward, info = 0, False, 0.0, {}
+        while not terminated:
+            _, reward, terminated, truncated, info = env.step(np.eye(6, dtype=np.float32)[5])
+            steps += 1
+            assert steps < 60
+        assert reward == -info["distance"]
+        assert not info["is_success"]
+        assert not info["diverged"]
+
+
+_BITS = """
+import hashlib, sys, gymnasium, statemachine.gym
+digest = hashlib.sha256()
+for task in ("Reach", "HeldBox"):
+    env = gymnasium.make(f"statemachine/{task}-v0", backend=sys.argv[1])
+    env.action_space.seed(5)
+    digest.update(env.reset(seed=5)[0].tobytes())
+    for _ in range(30):
+        seen, *_, ended, out, _ = env.step(0.2 * env.action_space.sample())
+        digest.update(seen.tobytes())
+    env.close()
+print(digest.hexdigest())
+"""
+
+
+@pytest.mark.slow
+def test_the_same_seed_gives_the_same_bits_in_another_process(backend: str) -> None:
+    said = [_said(_BITS, backend) for _ in range(2)]
+    assert said[0] == said[1]
+    assert len(said[0].strip()) == 64
+
+
+def test_what_was_before_decides_nothing(backend: str) -> None:
+    with _make(HELD_BOX, backend) as env:
+        runs = []
+        for _ in range(2):
+            env.action_space.seed(1)
+            run = [env.reset(seed=9)[0]]
+            run += [env.step(0.3 * env.action_space.sample())[0] for _ in range(10)]
+            runs.append(np.array(run))
+            env.step(np.ones(6, dtype=np.float32))
+        assert runs[0].tobytes() == runs[1].tobytes()
+
+
+def _against_single(task: str, backend: str, mode: AutoresetMode, workers: int, steps: int) -> int:
+    """Ours against Gymnasium's own loop over single ones; how many episodes ended."""
+    ours = _make_vec(task, backend, 3, workers=workers, autoreset_mode=mode, max_episode_steps=9)
+    theirs = _make_vec(
+        task, backend, 3, vectorization_mode="sync", max_episode_steps=9,
+        vector_kwargs={"autoreset_mode": mode},
+    )  # fmt: skip
+    assert isinstance(ours, ArmVectorEnv)
+    assert ours.metadata["autoreset_mode"] is mode
+    assert ours.single_observation_space == theirs.single_observation_space
+    assert ours.observation_space == theirs.observation_space
+    assert ours.action_space == theirs.action_space
+    with closing(ours), closing(theirs):
+        _same(ours.reset(seed=3), theirs.reset(seed=3))
+        ours.action_space.seed(0)
+        ended = 0
+        for _ in range(steps):
+            actions = ours.action_space.sample()
+            one, two = ours.step(actions), theirs.step(actions)
+            _same(one, two)
+            over = one[2] | one[3]
+            ended += int(over.sum())
+            if mode is AutoresetMode.DISABLED and over.any():
+                again = [each.reset(seed=[7, None, 2], options={"reset_mask": over.copy()})
+                         for each in (ours, theirs)]  # fmt: skip
+                _same(*again)
+        seeds: Any = ours.np_random_seed
+        assert tuple(seeds) == theirs.np_random_seed
+        _same(ours.reset(), theirs.reset())
+    return ended
+
+
+def test_a_world_is_a_single_env_bit_for_bit(backend: str) -> None:
+    assert _against_single(REACH, backend, AutoresetMode.NEXT_STEP, 2, 12) >= 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2, 3])
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+@pytest.mark.parametrize("task", IDS)
+def test_every_way_to_start_anew_is_gymnasiums(
+    task: str, mode: AutoresetMode, workers: int, backend: str
+) -> None:
+    assert _against_single(task, backend, mode, workers, 30) >= 6
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_a_world_that_diverges_starts_anew_and_the_others_go_on(mode: str, backend: str) -> None:
+    envs = _make_vec(REACH, backend, 3, autoreset_mode=mode)
+    with warnings.catch_warnings(), closing(envs):
+        warnings.simplefilter("error", DivergedWarning)
+        seen, _ = envs.reset(seed=0)
+        still = np.zeros((3, 6), dtype=np.float32)
+        envs.worlds.qvel[1] = 1e12
+        after, rewards, terminated, truncated, infos = envs.step(still)
+        assert truncated.tolist() == [False, True, False]
+        assert not terminated.any()
+        assert np.isfinite(after).all()
+        assert np.isfinite(rewards).all()
+        if mode == "SameStep":
+            assert infos["final_info"]["diverged"].tolist() == [False, True, False]
+            assert np.array_equal(infos["final_obs"][1], seen[1])
+        else:
+            assert infos["diverged"].tolist() == [False, True, False]
+            assert np.array_equal(after[1], seen[1])
+        after, _, _, truncated, infos = envs.step(still)
+        assert not truncated.any()
+        assert not infos["diverged"].any()
+        assert not envs.worlds.diverged
+        assert (after != seen).any(axis=1).all()
+
+
+def test_one_that_diverges_is_truncated(backend: str) -> None:
+    with _make(REACH, backend) as env:
+        seen, _ = env.reset(seed=0)
+        env.unwrapped.data.qvel[1] = 1e12
+        after, reward, terminated, truncated, info = env.step(np.zeros(6, dtype=np.float32))
+        assert (terminated, truncated, info["diverged"]) == (False, True, True)
+        assert np.array_equal(after, seen)
+        assert np.isfinite(reward)
+        env.reset(seed=0)
+        assert not env.step(np.zeros(6, dtype=np.float32))[3]
+
+
+def test_what_leaves_the_observation_space_has_diverged() -> None:
+    with _make(REACH, "mujoco") as env:
+        env.reset(seed=0)
+        env.unwrapped.data.qpos[0] = 5.0  # beyond its range, and finite
+        assert env.step(np.zeros(6, dtype=np.float32))[4]["diverged"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("task", IDS)
+def test_no_command_within_the_ranges_leaves_the_space(task: str, backend: str) -> None:
+    """The hardest ones: from end to end of every joint."""
+    with _make(task, backend) as env:
+        rng, action = np.random.default_rng(0), np.zeros(6, dtype=np.float32)
+        for seed in range(6):
+            env.reset(seed=seed)
+            for k in range(60):
+                if k % 8 == 0:
+                    action = rng.choice([-1.0, 1.0], 6).astype(np.float32)
+                seen, _, terminated, truncated, info = env.step(action)
+                assert seen in env.observation_space
+                assert not info["diverged"]
+                if terminated or truncated:
+                    break
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("task", IDS)
+def test_the_scripted_policy_comes_within_a_centimetre(task: str, backend: str) -> None:
+    need_engine("pinocchio")
+    with closing(_make_vec(task, backend, 16)) as envs:
+        scripted = play(envs, scripted_policy(envs.task), 100)
+        chance = play(envs, random_policy(envs.task, 0), 100)
+    assert (scripted.distance < 0.01).sum() >= 11
+    assert (chance.distance < 0.01).sum() <= 2
+    assert scripted.returned.mean() > chance.returned.mean() + 20
+    assert not scripted.diverged.any()
+    assert (scripted.steps == envs._most).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["SameStep", "Disabled"])
+def test_an_episode_is_the_same_however_the_next_one_starts(mode: str) -> None:
+    runs = []
+    for each in ("NextStep", mode):
+        with closing(
+            _make_vec(HELD_BOX, "mujoco", 4, autoreset_mode=each, max_episode_steps=6)
+        ) as envs:
+            zero = np.zeros((4, 6), dtype=np.float32)
+            runs.append(play(envs, lambda _seen, zero=zero: zero, 0))
+    for name in ("returned", "distance", "success", "steps", "diverged"):
+        assert np.array_equal(*(getattr(run, name) for run in runs))
+
+
+def test_faults_are_one_clear_line(backend: str) -> None:
+    with pytest.raises(UnknownNameError, match=r"no backend named 'mujcoo'.*Did you mean"):
+        _make(REACH, "mujcoo")
+    with pytest.raises(UnknownNameError, match="no backend named"):
+        _make_vec(REACH, "mujcoo", 2)
+    with pytest.raises(UnknownNameError, match=r"no task named 'reech'.*'reach'"):
+        gymnasium.make(REACH, task="reech")
+    with pytest.raises(UnknownNameError, match="no autoreset mode named 'Never'"):
+        _make_vec(REACH, backend, 2, autoreset_mode="Never")
+    with pytest.raises(BadInputError, match="frame_skip must be a whole number"):
+        _make(REACH, backend, frame_skip=0)
+    with pytest.raises(BadInputError, match="num_envs must be a whole number"):
+        _make_vec(REACH, backend, 0)
+    env, envs = _make(REACH, backend).unwrapped, _make_vec(REACH, backend, 2)
+    still = np.zeros(6, dtype=np.float32)
+    for each, action in ((env, still), (envs, np.tile(still, (2, 1)))):
+        with pytest.raises(ResetNeeded, match="call reset before step"):
+            each.step(action)
+        each.reset(seed=0)
+        with pytest.raises(BadInputError, match=r"action wants .* got shape \(5,\)"):
+            each.step(np.zeros(5, dtype=np.float32))
+        bad = action.copy()
+        bad[..., 2] = np.nan
+        before = (env.data if each is env else envs.worlds).ctrl.copy()
+        with pytest.raises(BadInputError, match=r"action\[\d+\] = nan is not a finite number"):
+            each.step(bad)
+        # The engine never saw it: the next step is as if nothing had been.
+        assert np.array_equal((env.data if each is env else envs.worlds).ctrl, before)
+        assert np.isfinite(each.step(action)[0]).all()
+    with pytest.raises(BadInputError, match="seed wants 2 seeds"):
+        envs.reset(seed=[1, 2, 3])
+    with pytest.raises(BadInputError, match="reset_mask wants 2 bools"):
+        envs.reset(options={"reset_mask": np.array([False, False])})
+    for each in (env, envs):
+        each.close()
+        each.close()
+    with pytest.raises(ClosedDataError):
+        env.step(still)
+
+
+def test_an_ended_world_must_be_reset_where_nobody_else_does() -> None:
+    with closing(
+        _make_vec(REACH, "mujoco", 2, autoreset_mode="Disabled", max_episode_steps=1)
+    ) as envs:
+        envs.reset(seed=0)
+        actions = np.zeros((2, 6), dtype=np.float32)
+        envs.step(actions)
+        with pytest.raises(ResetNeeded, match=r"worlds \[0, 1\] have ended"):
+            envs.step(actions)
+
+
+def test_without_gymnasium_the_extra_is_named() -> None:
+    code = (
+        "import sys; sys.modules['gymnasium'] = None\n"
+        "try:\n    import statemachine.gym\n"
+        "except ImportError as error:\n    print(type(error).__name__, error)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    assert done.stdout.strip() == (
+        "MissingEngineError the tasks need Gymnasium: pip install 'statemachine-sim[gym]'"
+    )
+
+
+def test_help_knows_nothing_of_it() -> None:
+    code = (
+        "import sys, statemachine.cli as cli\n"
+        "try:\n    cli.main(['--help'])\nexcept SystemExit:\n    pass\n"
+        "heavy = ('gymnasium', 'statemachine.gym')\n"
+        "print([name for name in sys.modules if name.startswith(heavy)])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    assert done.stdout.splitlines()[-1] == "[]"
