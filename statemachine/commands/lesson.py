@@ -164,7 +164,8 @@ def run(options: argparse.Namespace) -> int:
     if options.plot is not None:
         from ..report.figures import write_pictures
 
-        write_pictures(page.blocks, Path(options.plot))
+        size = write_pictures(page.blocks, Path(options.plot))
+        print(f"wrote {options.plot} ({size / 1e3:.0f} kB)", file=sys.stderr)
     names = list(LESSONS)
     later = names[names.index(lesson.name) + 1 :]
     following = f"{PROGRAM} lesson {later[0]}" if later else "python exercises/step_loop.py"

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from . import _sweep_report
 from ._common import SAYS_NO, add_json, add_menagerie, complain, show
 from .compare import add_defaults, experiments
 
@@ -28,16 +29,19 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.epilog = (
         f"experiments:\n{experiments()}\n\n"
-        "Exit code 1: a cell failed. docs/sweeps.md has the columns of the dataset."
+        "Exit code 1: a cell failed; of a report, that two engines do not agree in all "
+        "settings.\ndocs/sweeps.md has the columns of the dataset."
     )
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("what", metavar="WHAT", help="an experiment, or FILE.py:FUNCTION")
+    parser.add_argument(
+        "what", nargs="?", metavar="WHAT", help="an experiment, or FILE.py:FUNCTION"
+    )
     parser.add_argument(
         "--vary", action="append", default=[], metavar="NAME=VALUES", help="what changes; see above"
     )
     parser.add_argument(
         "--out",
-        required=True,
+        default=None,
         metavar="DIR",
         help="the folder of the dataset; a new one, or to go on",
     )
@@ -110,12 +114,17 @@ def add(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="let the dataset in DIR grow by values, seeds, engines",
     )
-    add_json(parser, "summary")
+    _sweep_report.add_options(parser)
+    add_json(parser, "summary, or the report,")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run what is missing, and say what there is."""
+    """Run what is missing, and say what there is, or what it says of two engines."""
+    _sweep_report.check(options)
+    if options.report not in (None, True):
+        found, page = _sweep_report.report(options, options.report)
+        return show(page, found, options.json)
     from ..report import sweep as words
     from ..report.progress import progress
     from ..sweep import prepared, run_sweep
@@ -138,8 +147,19 @@ def run(options: argparse.Namespace) -> int:
         if out.is_dir():
             return complain(f"stopped; {out} has what was done. Type the same to go on", 130)
         raise
+    if options.report:
+        return _reported(options, out, words.page(ready, summary), summary)
     show(words.page(ready, summary), summary, options.json)
     return SAYS_NO if summary.failed else 0
+
+
+def _reported(options: argparse.Namespace, out: Path, page: Any, summary: Any) -> int:
+    """Show what was run, then what it says."""
+    if not options.json:
+        show(page, summary, False)
+    found, answer = _sweep_report.report(options, out)
+    code = show(answer, {"summary": summary, "report": found}, options.json)
+    return SAYS_NO if summary.failed else code
 
 
 def _asked(options: argparse.Namespace) -> Any:

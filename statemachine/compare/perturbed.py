@@ -185,7 +185,7 @@ def perturbed_runs(
         qpos = _displaced(rerun.model, qpos, uncertain, np.random.default_rng([seed, k // 2]), k)
         yield rerun.record(
             controller=_nudged_controller(rerun.controller(rerun.model), draw),
-            qpos=_nudged_pose(rerun.model, qpos, draw),
+            qpos=nudged_pose(rerun.model, qpos, draw),
             qvel=_nudged(qvel, draw),
             derive=derive,
             progress=part_of(progress, k / runs, 1 / runs),
@@ -208,7 +208,7 @@ def _displaced(
     return qpos
 
 
-def _nudged_pose(model: Model, qpos: Array, draw: np.random.Generator) -> Array:
+def nudged_pose(model: Model, qpos: Array, draw: np.random.Generator) -> Array:
     """Positions (nq,) changed by rounding; a quaternion stays one."""
     nudged = _nudged(qpos, draw)
     for _, place in model._quaternions:

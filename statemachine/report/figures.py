@@ -10,29 +10,38 @@ from typing import Any, cast
 import numpy as np
 
 from ..errors import BadInputError, MissingEngineError
-from ..page import Block, Pipeline, Slots, Traces
+from ..page import Bars, Block, HeatMap, Pipeline, Slots, Traces
 from ..traces.whole import replace_file
 from .log_axis import LogAxis
 
 _COLOURS = ("#1f5fa8", "#c2571a", "#2f8f4e", "#8a4fa0", "#b03a48", "#6b6b6b", "#3aa6a6")
 _INK, _PAPER, _BELOW = "#222222", "#ffffff", "#f0f0f0"  # the last: behind the level of zero
-_DOTS = 200  # a PNG has to an inch
+_WIDE = 30.0  # times the least value: beyond, colours are logarithmic
+_WRITTEN, _LONG = 150, 60  # cells whose figures are written; letters that fit under a map
 _POWERS = 8  # that a log axis names, at most
 
-Figure = Traces | Slots | Pipeline
+
+Drawn = Traces | Slots | Pipeline | HeatMap | Bars
+_DOTS = 150  # a PNG has to an inch
+# The same figures give the same bytes: no date, no version.
+_METADATA: dict[str, dict[str, Any]] = {
+    "svg": {"Date": None},
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
+}
 
 
-def svg(picture: Figure) -> str:
+def svg(picture: Drawn) -> str:
     """A picture as SVG; the same figures give the same text.
 
     Raises:
         MissingEngineError: matplotlib is not installed.
     """
-    return _drawn([picture], "svg").decode()
+    return drawn([picture], "svg").decode()
 
 
 def write_pictures(blocks: Sequence[Block], path: Path) -> int:
-    """Write all pictures among these blocks into one file, one below the other; how many.
+    """Write all pictures among some blocks into one file, one above the other; its bytes.
 
     Args:
         blocks: Of a page.
@@ -42,38 +51,44 @@ def write_pictures(blocks: Sequence[Block], path: Path) -> int:
         BadInputError: There is no picture among them.
         MissingEngineError: matplotlib is not installed.
     """
-    pictures = [block for block in blocks if isinstance(block, Traces | Slots | Pipeline)]
+    pictures = [block for block in blocks if isinstance(block, Drawn)]
     if not pictures:
-        raise BadInputError("this lesson has no picture to write")
-    content = _drawn(pictures, path.suffix.lower().lstrip("."))
+        raise BadInputError("there is no picture to write")
+    content = drawn(pictures, path.suffix.lower().lstrip("."))
     replace_file(path, lambda out: out.write(content))
-    return len(pictures)
+    return len(content)
 
 
-def _drawn(pictures: Sequence[Figure], form: str) -> bytes:
+def drawn(pictures: Sequence[Drawn], form: str) -> bytes:
+    """Pictures one above the other, as svg, png or pdf.
+
+    Raises:
+        MissingEngineError: matplotlib is not installed.
+    """
     try:
         import matplotlib
-        from matplotlib.figure import Figure as Sheet
+        from matplotlib.figure import Figure
     except ImportError as error:
         raise MissingEngineError(
             "pictures need matplotlib: pip install 'statemachine-sim[docs]'", engine="matplotlib"
         ) from error
     sizes = [_SIZES[type(picture)](picture) for picture in pictures]
+    heights = [height for _, height in sizes]
     # Text as paths would be twice as large; without a salt and a date each run differs.
     with matplotlib.rc_context(
         {"svg.fonttype": "none", "svg.hashsalt": "statemachine", "text.parse_math": False}
     ):
-        size = max(width for width, _ in sizes), sum(height for _, height in sizes)
-        sheet = Sheet(figsize=size, facecolor=_PAPER, layout=None if len(sizes) == 1 else "tight")
-        ratios = {"height_ratios": [height for _, height in sizes]}
-        every = sheet.subplots(len(sizes), squeeze=False, gridspec_kw=ratios)
-        for axes, picture in zip(every[:, 0], pictures, strict=True):
+        size = max(width for width, _ in sizes), sum(heights)
+        figure = Figure(
+            figsize=size, facecolor=_PAPER, layout="constrained" if heights[1:] else None
+        )
+        rows = figure.subplots(len(pictures), height_ratios=heights, squeeze=False)[:, 0]
+        for axes, picture in zip(rows, pictures, strict=True):
             cast("Callable[[Any, Any], None]", _DRAW[type(picture)])(axes, picture)
-            if len(sizes) > 1:
-                axes.set_title(picture.title, loc="left", fontsize="medium")
+            if heights[1:]:
+                axes.set_title(picture.title, fontsize="medium", loc="left")
         out = io.BytesIO()
-        date = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form)
-        sheet.savefig(out, format=form, dpi=_DOTS, bbox_inches="tight", metadata=date)
+        figure.savefig(out, format=form, dpi=_DOTS, bbox_inches="tight", metadata=_METADATA[form])
     return out.getvalue()
 
 
@@ -166,15 +181,93 @@ def _pipeline(axes: Any, picture: Pipeline) -> None:
     axes.axis("off")
 
 
+def _heat_map(axes: Any, picture: HeatMap) -> None:
+    """Cells with their figures; hatched where they are not to be read."""
+    import matplotlib
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LogNorm, Normalize
+    from matplotlib.patches import Rectangle
+
+    values = np.array([[np.nan if v is None else v for v in row] for row in picture.values])
+    known = values[np.isfinite(values) & ~np.array(picture.hatched, dtype=bool)]
+    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
+    wide = low > 0 and high > _WIDE * low
+    norm = (LogNorm if wide else Normalize)(low if wide else 0.0, high or 1.0)
+    colours = matplotlib.colormaps["YlOrBr"]
+    axes.set_facecolor(_BELOW)
+    small = values.size <= _WRITTEN
+    for r, c in np.ndindex(*values.shape):
+        value = values[r, c]
+        if not np.isfinite(value):
+            axes.text(c, r, "no run", ha="center", va="center", fontsize=6, color=_INK)
+            continue
+        hatched = picture.hatched[r][c]
+        face = _PAPER if hatched else colours(0.85 * float(norm(np.clip(value, low, high))))
+        axes.add_patch(
+            Rectangle((c - 0.5, r - 0.5), 1, 1, facecolor=face, edgecolor="#999999",
+                      linewidth=0.3, hatch="////" if hatched else None)
+        )  # fmt: skip
+        if picture.framed[r][c]:
+            axes.add_patch(
+                Rectangle((c - 0.46, r - 0.46), 0.92, 0.92, fill=False, edgecolor=_COLOURS[2],
+                          linewidth=1.6)
+            )  # fmt: skip
+        if small:
+            dark = not hatched and float(norm(np.clip(value, low, high))) > 0.7
+            axes.text(c, r, f"{value:.3g}", ha="center", va="center", fontsize=7,
+                      color=_PAPER if dark else _INK)  # fmt: skip
+    axes.set_xlim(-0.5, values.shape[1] - 0.5)
+    axes.set_ylim(-0.5, values.shape[0] - 0.5)
+    axes.set_xticks(range(len(picture.columns)), picture.columns, fontsize=8,
+                    rotation=45 if len("".join(picture.columns)) > _LONG else 0)  # fmt: skip
+    axes.set_yticks(range(len(picture.rows)), picture.rows, fontsize=8)
+    axes.set_xlabel(picture.across)
+    axes.set_ylabel(picture.up)
+    scale = ScalarMappable(norm, colours.resampled(256))
+    bar = axes.figure.colorbar(scale, ax=axes, shrink=0.9, pad=0.02)
+    if wide:
+        steps = [m * 10.0**e for e in range(-15, 16) for m in (1, 2, 5)]
+        bar.set_ticks([step for step in steps if low <= step <= high], minor=False)
+        bar.ax.minorticks_off()
+    bar.ax.yaxis.set_major_formatter(lambda tick, _place: f"{tick:g}")
+    bar.set_label(picture.unit)
+
+
+def _bars(axes: Any, picture: Bars) -> None:
+    """Bars from left to right, those of a name one below the other."""
+    high = 0.8 / len(picture.bars)
+    for k, (what, bars) in enumerate(picture.bars.items()):
+        places = [n + (k + 0.5) * high - 0.4 for n in range(len(bars))]
+        axes.barh(places, [max(0.0, length) for length, _ in bars], high * 0.9,
+                  color=_COLOURS[k], alpha=0.75, label=what)  # fmt: skip
+        for place, (_, interval) in zip(places, bars, strict=True):
+            if interval is not None:
+                axes.plot(interval, [place, place], color=_INK, linewidth=1.2)
+    axes.set_yticks(range(len(picture.names)), picture.names)
+    axes.invert_yaxis()
+    axes.set_xlabel(picture.across)
+    axes.grid(alpha=0.3, axis="x")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(fontsize="small", frameon=False, loc="upper left", bbox_to_anchor=(1.01, 1.0))
+
+
 def _box(x: float, y: float, width: float, height: float, colour: str) -> Any:
     from matplotlib.patches import Rectangle
 
     return Rectangle((x, y), width, height, facecolor=colour + "30", edgecolor=colour)
 
 
-_DRAW = {Traces: _traces, Slots: _slots, Pipeline: _pipeline}
+_DRAW = {
+    Traces: _traces,
+    Slots: _slots,
+    Pipeline: _pipeline,
+    HeatMap: _heat_map,
+    Bars: _bars,
+}
 _SIZES: dict[type, Callable[[Any], tuple[float, float]]] = {
     Traces: lambda _: (7.0, 3.4),
     Slots: lambda _: (7.5, 2.6),
+    HeatMap: lambda p: (7.0, 1.3 + 0.33 * min(14, max(2, len(p.rows)))),
+    Bars: lambda p: (7.0, 0.9 + 0.42 * len(p.names)),
     Pipeline: lambda p: (7.5, 0.26 * max(len(content) for _, content in p.stages) + 1.6),
 }

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..compare.perturbed import Uncertainty
+from ..compare.perturbed import Uncertainty, nudged_pose
 from ..comparison import ContactNames
 from ..errors import BadInputError, TimedOutError
 from ..interface import Array, Data, Model, forward, make_data, reset, step
@@ -35,6 +35,7 @@ class SweepCell:
         values: One for each factor of the sweep.
         seed: What is drawn from; 0 draws no start.
         backend: The engine.
+        nudge: What a change of the start by rounding is drawn from; 0 for none.
     """
 
     id: str
@@ -42,6 +43,7 @@ class SweepCell:
     values: tuple[Value, ...]
     seed: int
     backend: str
+    nudge: int = 0
 
 
 @dataclass(frozen=True)
@@ -164,6 +166,9 @@ def _begin(
     for place, value in qvel.items():
         data.qvel[place] = value
     data.qpos = drawn_start(model, data.qpos, rules.spread, cell.seed)
+    if cell.nudge:
+        draw = np.random.default_rng([cell.nudge, cell.seed])
+        data.qpos = nudged_pose(model, data.qpos, draw)
 
 
 def _advance(

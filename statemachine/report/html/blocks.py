@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import base64
 import itertools
 from collections.abc import Callable, Iterable, Sequence
 
+from ...errors import MissingEngineError
 from ...page import (
     LETTERS,
+    Bars,
     Block,
     Code,
     Heading,
     Headline,
+    HeatMap,
     Interactive,
     Items,
     Printed,
@@ -19,8 +23,10 @@ from ...page import (
     Table,
     TableCell,
     Text,
+    Traces,
     Verdict,
 )
+from ..figures import svg
 from .markup import Html, joined, kept, tag
 
 _SIGNS = {"agrees": "○", "settles": "◐", "differs": "●"}  # so that a verdict needs no colour
@@ -66,8 +72,21 @@ def _block(block: Block, draw: Draw, level: int) -> Html:
             return _section(block, draw, level)
         case Interactive():
             return draw(block)
+        case HeatMap() | Bars() | Traces():
+            return _picture(block)
         case _:
-            return Html("")  # a picture that matplotlib draws
+            return Html("")
+
+
+def _picture(picture: HeatMap | Bars | Traces) -> Html:
+    """What matplotlib draws, as an image within the page; nothing where it is not installed."""
+    try:
+        drawing = svg(picture)
+    except MissingEngineError:
+        return Html("")
+    source = base64.b64encode(drawing.encode()).decode()
+    image = tag("img", src=f"data:image/svg+xml;base64,{source}", alt=picture.title)
+    return tag("figure", image, tag("figcaption", picture.title), class_="drawn")
 
 
 def _section(block: Section, draw: Draw, level: int) -> Html:

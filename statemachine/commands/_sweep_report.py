@@ -1,0 +1,156 @@
+"""`statemachine sweep --report`: what a sweep says of two engines."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from ..errors import BadInputError
+from ._common import complain, file_name
+
+# Options of a report alone, and what they are where they are not given.
+_DEFAULTS: dict[str, Any] = {
+    "quantity": None,
+    "tolerance": [],
+    "fit": [],
+    "varied": None,
+    "floor_cells": None,
+    "no_runs": False,
+    "html": None,
+    "plot": None,
+}
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Those of the report."""
+    group = parser.add_argument_group("from a sweep to an answer")
+    group.add_argument(
+        "--report",
+        nargs="?",
+        const=True,
+        default=None,
+        metavar="DIR",
+        help="of the dataset in DIR, or of that which was just run: where two engines agree, what "
+        "the gap is sensitive to, which value brings them together",
+    )
+    group.add_argument(
+        "--quantity",
+        default=None,
+        metavar="NAME",
+        help="whose gap: tip, tip-end, qpos, qpos-end, touch (tip)",
+    )
+    group.add_argument(
+        "--tolerance",
+        action="append",
+        default=[],
+        metavar="KIND=SIZE",
+        help="another tolerance, such as tip=2mm, joint=0.5deg, contact=10ms",
+    )
+    group.add_argument(
+        "--fit",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="the parameter that is to bring them together (the most sensitive one)",
+    )
+    group.add_argument(
+        "--varied",
+        choices=("right", "both"),
+        default=None,
+        help="right: the left engine keeps the model's own value; both: both have the same "
+        "(right, of an option of the model)",
+    )
+    group.add_argument(
+        "--floor-cells", type=int, default=None, metavar="N", help="run for the chaos floor (64)"
+    )
+    group.add_argument(
+        "--no-runs", action="store_true", help="no floor and no check: nothing is run for a report"
+    )
+    group.add_argument(
+        "--html", type=file_name, default=None, metavar="PAGE.html", help="write it as one page"
+    )
+    group.add_argument(
+        "--plot", type=file_name, default=None, metavar="FILE", help="write its pictures: .png, …"
+    )
+
+
+def check(options: argparse.Namespace) -> None:
+    """Whether what is asked for goes together, before anything is run.
+
+    Raises:
+        BadInputError: It does not, or a file cannot be written.
+    """
+    if options.report is None:
+        for name, default in _DEFAULTS.items():
+            if getattr(options, name) != default:
+                raise BadInputError(f"--{name.replace('_', '-')} goes with --report")
+        if options.what is None or options.out is None:
+            raise BadInputError(
+                "a sweep wants WHAT and --out DIR; the report of a dataset --report DIR"
+            )
+        return
+    if options.report is True and (options.what is None or options.out is None):
+        raise BadInputError("--report wants the folder of a dataset, or WHAT and --out DIR to run")
+    if options.report is not True and (options.what is not None or options.out is not None):
+        raise BadInputError(
+            "--report DIR is of a dataset that is there; with WHAT and --out it takes no folder"
+        )
+    if options.floor_cells is not None and options.floor_cells < 0:
+        raise BadInputError(f"--floor-cells must not be negative; got {options.floor_cells}")
+    if options.html is not None:
+        from ..report.html import check_target
+
+        check_target(options.html)
+    if options.plot is not None:
+        from ..report.plot import check_suffix
+
+        check_suffix(options.plot)
+
+
+def report(options: argparse.Namespace, folder: str | Path) -> tuple[Any, Any]:
+    """The report of a dataset, and its page; what is to be written is written."""
+    from ..comparison import parse_tolerances
+    from ..report import sweep_report as words
+    from ..report.progress import progress
+    from ..sweep.analysis import FLOOR_CELLS, sweep_report
+
+    cells = FLOOR_CELLS if options.floor_cells is None else options.floor_cells
+    with progress("report") as told:
+        found = sweep_report(
+            folder,
+            backends=[name for name in options.backend or () if name != "all"],
+            quantity=options.quantity,
+            tolerances=parse_tolerances(options.tolerance),
+            fit=options.fit,
+            varied=options.varied,
+            floor_cells=cells,
+            run=not options.no_runs,
+            menagerie=options.menagerie,
+            jobs=options.jobs,
+            progress=told,
+        )
+    page = words.page(found)
+    if options.html is not None:
+        from ..report.html import report as as_html
+        from ..report.html import write_report
+
+        text = as_html(page)
+        target = write_report(options.html, text)
+        print(f"wrote {target} ({len(text.encode()) / 1e6:.2f} MB)", file=sys.stderr)
+    if options.plot is not None:
+        from ..report.sweep_pictures import pictures
+
+        _plot(pictures(found), options.plot)
+    return found, page
+
+
+def _plot(pictures: Any, target: Path) -> None:
+    from ..report.figures import write_pictures
+
+    if not pictures:
+        complain("nothing is varied: there is no picture", 0)
+        return
+    size = write_pictures(pictures, target)
+    print(f"wrote {target} ({size / 1e3:.0f} kB)", file=sys.stderr)

@@ -1,0 +1,119 @@
+"""The pictures of what a sweep says: the gap as a map, shares of its variance, a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..comparison.text import listed, reading, significant
+from ..page import Bars, HeatMap, Traces
+from ..sweep.analysis import SweepReport
+from ..sweep.analysis_map import GapMap
+from ..sweep.analysis_together import BroughtTogether
+
+
+def pictures(found: SweepReport) -> list[HeatMap | Bars | Traces]:
+    """The pictures of the page, in its order."""
+    chosen = [map_picture(found), bars(found), *(fit_curve(found, t) for t in found.together)]
+    return [each for each in chosen if each is not None]
+
+
+def map_picture(found: SweepReport) -> HeatMap | Traces | None:
+    chart, main = found.map, found.quantity
+    if chart is None:
+        return None
+    scale, unit = reading(main.unit)
+    title = f"Gap of the {main.says} between {listed(list(found.sides))}"
+    numbers = [value for value in chart.columns if not isinstance(value, (bool, str))]
+    if not chart.up and len(numbers) == len(chart.columns) > 1:
+        return _curve(found, chart, title)
+    framed = [[v is not None and v <= main.tolerance for v in row] for row in chart.gap]
+    title += f"; median over {listed(chart.others)}" if chart.others else ""
+    if any(map(any, framed)):
+        title += f"; framed: within {size_word(main.tolerance, main.unit)}"
+    if any(map(any, chart.inside)):
+        title += "; hatched: inside the chaos floor"
+    return HeatMap(
+        title,
+        chart.across,
+        chart.up,
+        [value_word(value) for value in chart.columns],
+        [value_word(value) for value in chart.rows] or [""],
+        [[None if v is None else v * scale for v in row] for row in chart.gap],
+        unit.strip(),
+        chart.inside,
+        framed,
+    )
+
+
+def _curve(found: SweepReport, chart: GapMap, title: str) -> Traces:
+    """The gap over one parameter."""
+    main, scale = found.quantity, reading(found.quantity.unit)[0]
+    place = found.parameters.index(chart.across)
+    by = sorted(
+        (float(s.values[place]), s)
+        for s in found.settings
+        if s.median is not None
+    ) if not chart.sampled else []  # fmt: skip
+    x = [v for v, _ in by]
+    curves: dict[str, tuple[Sequence[float], Sequence[float]]] = {}
+    if by:
+        curves["median of the seeds"] = (x, [(s.median or 0.0) * scale for _, s in by])
+        if found.seeds > 1:
+            curves["worst seed"] = (x, [(s.worst or 0.0) * scale for _, s in by])
+        if found.floor is not None:
+            curves["chaos floor"] = (x, [(s.floor or 0.0) * scale for _, s in by])
+    else:
+        pairs = [
+            (float(v), g * scale)
+            for v, g in zip(chart.columns, chart.gap[0], strict=True)
+            if g is not None
+        ]
+        x = [v for v, _ in pairs]
+        curves["median"] = (x, [g for _, g in pairs])
+    curves["tolerance"] = ([x[0], x[-1]], [main.tolerance * scale] * 2)
+    return Traces(title, chart.across, f"gap [{reading(main.unit)[1].strip()}]", curves)
+
+
+def bars(found: SweepReport) -> Bars | None:
+    shares = found.sensitivity
+    if shares is None or shares.method == "rank":
+        return None
+    return Bars(
+        "What the gap is sensitive to",
+        "share of the gap's variance",
+        [each.label for each in shares.indices],
+        {
+            "first order": [(each.first, each.first_interval) for each in shares.indices],
+            "total": [(each.total, each.total_interval) for each in shares.indices],
+        },
+    )
+
+
+def fit_curve(found: SweepReport, each: BroughtTogether) -> Traces | None:
+    """The predicted gap over a parameter, and what was measured."""
+    if each.fit is None:
+        return None
+    scale, unit = reading(found.quantity.unit)
+    x, y = each.fit.scan
+    curves: dict[str, tuple[Sequence[float], Sequence[float]]] = {
+        "predicted": (x, [value * scale for value in y]),
+        "tolerance": ([x[0], x[-1]], [found.quantity.tolerance * scale] * 2),
+    }
+    value = each.fit.value
+    if each.measured is not None:
+        width = 0.01 * (x[-1] - x[0])
+        curves["run there"] = ([value - width, value + width], [each.measured * scale] * 2)
+    across = each.label + (" [times the model's own]" if each.times else "")
+    side = found.sides[1] if each.varied == "right" else "both"
+    return Traces(f"The gap over {each.label} in {side}", across, f"gap [{unit.strip()}]", curves)
+
+
+def value_word(value: object) -> str:
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def size_word(value: float, unit: str) -> str:
+    scale, name = reading(unit)
+    return f"{significant(value * scale, 2)}{name}"

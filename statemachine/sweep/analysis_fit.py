@@ -1,0 +1,224 @@
+"""Which value of a parameter brings two sides together: the least gap between its design points."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from ..interface import Array
+from .analysis_gaps import length
+
+_SCAN = 401  # values that are looked at between the bounds, before the minimum is refined
+_RESAMPLES = 400
+_LEAST_CURVES = 3  # of which a bootstrap says something
+_LEAST_LEVELS = 3
+_EDGE = 0.005  # of the range
+_LESS = 0.9  # of the gap before: what is above it is no improvement
+MOST_CURVES = 200
+
+Verdict = Literal["together", "closer", "edge", "none"]
+
+
+@dataclass(frozen=True, eq=False)
+class FittedValue:
+    """The value of a parameter at which the gap is least.
+
+    Attributes:
+        value: Of the parameter.
+        error: Its standard error; of: what that is from.
+        of: See error.
+        gap: What is predicted there, the mean of the curves [SI].
+        bounds: The range of the design.
+        edge: Whether it is at the end of the range.
+        curves: From how many curves; of a sampled design, from how many settings.
+        scan: (n,) values between the bounds, and (n,) the predicted gap there.
+        each: (c,) what is predicted at the value for each curve that was given; NaN without one.
+    """
+
+    value: float
+    error: float | None
+    of: str
+    gap: float
+    bounds: tuple[float, float]
+    edge: bool
+    curves: int
+    scan: tuple[tuple[float, ...], tuple[float, ...]] = field(repr=False, metadata={"json": False})
+    each: Array = field(default_factory=lambda: np.empty(0), repr=False, metadata={"json": False})
+
+    def at(self, value: float) -> float:
+        """The predicted gap at a value within the bounds."""
+        return float(np.interp(value, *self.scan))
+
+    def verdict(self, gap: float, before: float | None, good: float) -> Verdict:
+        """What a value does.
+
+        Args:
+            gap: The gap there, as measured or predicted.
+            before: The gap with the parameter as it is; None where that is not known.
+            good: The gap that is as good as none.
+        """
+        before = max(self.scan[1]) if before is None else before
+        if gap > good and gap > _LESS * before:
+            return "none"
+        if self.edge:
+            return "edge"
+        return "together" if gap <= good else "closer"
+
+
+def fit_curves(
+    name: str, levels: Array, left: Array, right: Array, seeds: Sequence[int]
+) -> FittedValue | None:
+    """The least gap over a parameter, from runs at some of its values.
+
+    Each number of a run is interpolated over the parameter (PCHIP, which does not overshoot), and
+    the gap is computed from what that gives: a gap itself has a kink where it is least, and the
+    runs do not.
+
+    Args:
+        name: Of the quantity.
+        levels: (k,) values of the parameter, increasing.
+        left: (c, k, m, d) curves of the one side; (c, 1, m, d) where it keeps its own value.
+        right: (c, k, m, d) of the other. NaN where there is no run.
+        seeds: (c,) that of each curve: the curves of a seed are no independent figures.
+
+    Returns:
+        The value; None if there are fewer than three values or no whole curve.
+    """
+    if len(levels) < _LEAST_LEVELS:
+        return None
+    count = len(right)
+    whole = [k for k in range(count) if _whole(left[k]) and _whole(right[k])]
+    if not whole:
+        return None
+    chosen = np.array(whole)[
+        np.linspace(0, len(whole) - 1, min(len(whole), MOST_CURVES)).astype(int)
+    ]
+    used = ~np.isnan(right[chosen]).all(axis=(0, 1)) & ~np.isnan(left[chosen]).all(axis=(0, 1))
+    left, right = (np.where(used, each[chosen], 0.0) for each in (left, right))
+    interpolate = importlib.import_module("scipy.interpolate")
+    difference = interpolate.PchipInterpolator(levels, right - left, axis=1)
+
+    def gaps(values: Array) -> Array:
+        """(n, c)"""
+        return length(name, np.moveaxis(difference(values), 1, 0))
+
+    low, high = float(levels[0]), float(levels[-1])
+    scan = np.linspace(low, high, _SCAN)
+    table = gaps(scan)
+    centre = table.mean(axis=1)
+    value = _refined(lambda x: float(gaps(np.array([x])).mean()), scan, centre)
+    slope = difference.derivative()
+    each = np.full(count, np.nan)
+    each[chosen] = gaps(np.array([value]))[0]
+    own_seeds = np.array(seeds)[chosen]
+    drawn = np.unique(own_seeds)
+    if len(drawn) >= _LEAST_CURVES:
+        by_seed = np.array([table[:, own_seeds == seed].mean(axis=1) for seed in drawn]).T
+        error = float(np.std(_drawn_again(scan, by_seed)))
+        of = f"{len(drawn)} seeds drawn again"
+    elif len(chosen) >= _LEAST_CURVES:
+        error = float(np.std(_drawn_again(scan, table)))
+        of = f"{len(chosen)} curves drawn again"
+    else:
+        error = _curvature(difference(value), slope(value))
+        of = "the curvature"
+    return FittedValue(
+        value=value,
+        error=error,
+        of=of,
+        gap=float(np.nanmean(each)),
+        bounds=(low, high),
+        edge=not low + _EDGE * (high - low) < value < high - _EDGE * (high - low),
+        curves=len(chosen),
+        scan=(tuple(scan.tolist()), tuple(centre.tolist())),
+        each=each,
+    )
+
+
+def fit_scatter(values: Array, gaps: Array) -> FittedValue | None:
+    """The same from settings that differ in everything: a parabola through the squared gaps.
+
+    Where a run is linear in its parameters the squared length of a difference is a parabola.
+
+    Args:
+        values: (n,) of the parameter.
+        gaps: (n,) at these settings; NaN where there is none.
+    """
+    known = np.isfinite(gaps)
+    values, gaps = values[known], gaps[known]
+    if len(values) < 8 or not np.ptp(values):
+        return None
+    low, high = float(values.min()), float(values.max())
+    scan = np.linspace(low, high, _SCAN)
+
+    def curve(rows: Any) -> Array:
+        scaled = 2 * (values[rows] - low) / (high - low) - 1
+        parabola = np.polynomial.polynomial.polyfit(scaled, gaps[rows] ** 2, 2)
+        unit = 2 * (scan - low) / (high - low) - 1
+        return np.asarray(np.polynomial.polynomial.polyval(unit, parabola), dtype=np.float64)
+
+    found = curve(slice(None))
+    place = int(np.argmin(found))
+    draw = np.random.default_rng(0)
+    again = [
+        scan[int(np.argmin(curve(draw.integers(0, len(values), len(values)))))]
+        for _ in range(_RESAMPLES)
+    ]
+    predicted = np.sqrt(np.maximum(found, 0.0))
+    value = float(scan[place])
+    return FittedValue(
+        value=value,
+        error=float(np.std(again)),
+        of=f"{len(values)} settings drawn again",
+        gap=float(predicted[place]),
+        bounds=(low, high),
+        edge=place in (0, _SCAN - 1),
+        curves=len(values),
+        scan=(tuple(scan.tolist()), tuple(predicted.tolist())),
+    )
+
+
+def _whole(curve: Array) -> bool:
+    """Whether a curve (k, m, d) has a run at every value."""
+    return bool(np.isfinite(curve).any(axis=(1, 2)).all())
+
+
+def _refined(gap: Any, scan: Array, centre: Array) -> float:
+    """The minimum of a function near the least value of its scan."""
+    place = int(np.argmin(centre))
+    low, high = scan[max(0, place - 1)], scan[min(len(scan) - 1, place + 1)]
+    optimize = importlib.import_module("scipy.optimize")
+    found = optimize.minimize_scalar(gap, bounds=(low, high), method="bounded",
+                                     options={"xatol": 1e-6 * (scan[-1] - scan[0])})  # fmt: skip
+    value = float(found.x) if found.fun < centre[place] else float(scan[place])
+    return value
+
+
+def _drawn_again(scan: Array, table: Array) -> Array:
+    """The best value (n,) of curves that are drawn again from those there are."""
+    draw = np.random.default_rng(0)
+    count = table.shape[1]
+    found = []
+    for _ in range(_RESAMPLES):
+        centre = table[:, draw.integers(0, count, count)].mean(axis=1)
+        place = int(np.argmin(centre))
+        shift = 0.0
+        if 0 < place < len(scan) - 1:
+            a, b, c = centre[place - 1 : place + 2] ** 2  # a parabola, unlike the gap itself
+            bend = a - 2 * b + c
+            shift = 0.5 * (a - c) / bend if bend > 0 else 0.0
+        found.append(scan[place] + shift * (scan[1] - scan[0]))
+    return np.array(found)
+
+
+def _curvature(difference: Array, slope: Array) -> float | None:
+    """The standard error of one unknown in a least-squares fit, from what is left of it."""
+    bend = float((slope**2).sum())
+    count = int(difference.size)
+    if not bend or count < 2:
+        return None
+    return float(np.sqrt((difference**2).sum() / (count - 1) / bend))

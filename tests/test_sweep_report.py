@@ -1,0 +1,427 @@
+"""From a sweep to an answer: agreement, sensitivity and fits against closed forms."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from statemachine.cli import main
+from statemachine.errors import BadInputError, UnknownNameError
+from statemachine.page import HeatMap, Page, Traces
+from statemachine.report.as_json import plain
+from statemachine.report.sweep_pictures import pictures
+from statemachine.report.sweep_report import page
+from statemachine.report.terminal import show
+from statemachine.sweep import Design, Sweep, Vary, run_sweep
+from statemachine.sweep.analysis import SweepReport, sweep_report
+from statemachine.sweep.analysis_indices import variance_shares
+from statemachine.sweep.cell import DONE, FAILED
+from statemachine.sweep.folder import SCHEMA
+from statemachine.sweep.rows import RowWriter
+
+SIDES = ("mujoco", "pybullet")
+TIMES = 5  # moments of a made-up run
+TipOf = Callable[..., Any]
+
+
+def made_up(
+    folder: Path,
+    design: Design,
+    left: TipOf,
+    right: TipOf,
+    seeds: int = 1,
+    fails: Callable[[str, tuple[Any, ...], int], bool] = lambda *_: False,
+) -> Path:
+    """A dataset whose fingertips are functions of values and seed: (3,) [m]."""
+    folder.mkdir()
+    factors = [{**asdict(vary), "label": vary.label} for vary in design.factors]
+    request = {"what": "made up", "model": None, "spread": ["1deg"], "moments": TIMES}
+    manifest = {
+        "schema": SCHEMA,
+        "request": request,
+        "files": {"no-such-model": ""},
+        "function": "",
+        "versions": {"statemachine": "0", **dict.fromkeys(SIDES, "0")},
+        "design": {
+            "vary": [], "seeds": seeds, "backends": SIDES, "samples": design.samples,
+            "indices": design.indices, "design_seed": design.seed, "factors": factors,
+        },
+    }  # fmt: skip
+    (folder / "sweep.json").write_text(json.dumps(manifest))
+    writer = RowWriter(folder, design.factors, {})
+    for backend, tip_of in zip(SIDES, (left, right), strict=True):
+        rows: list[dict[str, Any]] = []
+        for point in design.points():
+            for seed in range(seeds):
+                row = {
+                    "cell": f"{point.id}{seed}{backend}",
+                    "point": point.id,
+                    "seed": seed,
+                    "backend": backend,
+                    "values": point.values,
+                }
+                if fails(backend, point.values, seed):
+                    rows.append({**row, "status": FAILED, "error_class": "DivergedError"})
+                    continue
+                tip = np.broadcast_to(tip_of(*point.values, seed), (TIMES, 3)).tolist()
+                angles = [[0.0]] * TIMES
+                rows.append(
+                    {**row, "status": DONE, "steps": 100, "time": 1.0, "sample_tip": tip,
+                     "sample_qpos": angles}
+                )  # fmt: skip
+        writer.add(rows)
+    writer.flush()
+    return folder
+
+
+def along_x(length: float) -> list[float]:
+    return [float(length), 0.0, 0.0]
+
+
+def nowhere(*_: Any) -> list[float]:
+    return [0.0, 0.0, 0.0]
+
+
+def grid(name: str, low: float, high: float, count: int, **more: Any) -> Vary:
+    return Vary(name, values=tuple(np.linspace(low, high, count).tolist()), **more)
+
+
+def of(folder: Path, **given: Any) -> SweepReport:
+    return sweep_report(folder, run=False, **given)
+
+
+def text(shown: Page) -> str:
+    """What a terminal shows of a page."""
+    out = io.StringIO()
+    with redirect_stdout(out):
+        show(shown)
+    return out.getvalue()
+
+
+def shares(found: SweepReport) -> dict[str, tuple[float, float]]:
+    assert found.sensitivity is not None
+    return {each.label: (each.first, each.total) for each in found.sensitivity.indices}
+
+
+def ishigami(x: float, y: float, z: float, _seed: int) -> list[float]:
+    """T. Ishigami and T. Homma, 1990, with a = 7, b = 0.1; moved above 0, for a gap."""
+    return along_x(20 + np.sin(x) + 7 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x))
+
+
+# Of its closed form: V = a²/8 + b π⁴/5 + b² π⁸/18 + 1/2.
+_V = 49 / 8 + 0.1 * np.pi**4 / 5 + 0.01 * np.pi**8 / 18 + 0.5
+_VX = 0.5 * (1 + 0.1 * np.pi**4 / 5) ** 2
+_VXZ = 0.01 * np.pi**8 * (1 / 18 - 1 / 50)
+ISHIGAMI = {
+    "x": (_VX / _V, (_VX + _VXZ) / _V),
+    "y": (49 / 8 / _V, 49 / 8 / _V),
+    "z": (0.0, _VXZ / _V),
+}
+
+
+def test_sobol_indices_are_those_of_the_ishigami_function(tmp_path: Path) -> None:
+    factors = tuple(Vary(name, bounds=(-np.pi, np.pi)) for name in "xyz")
+    design = Design(factors, samples=1024, indices=True, seed=1)
+    found = of(made_up(tmp_path / "s", design, nowhere, ishigami))
+    assert found.sensitivity is not None
+    assert found.sensitivity.method == "sobol"
+    assert found.sensitivity.samples == 1024
+    assert shares(found).keys() == ISHIGAMI.keys()
+    for each in found.sensitivity.indices:
+        first, total = ISHIGAMI[each.label]
+        assert each.first == pytest.approx(first, abs=0.03), each
+        assert each.total == pytest.approx(total, abs=0.03), each
+        for value, interval in ((first, each.first_interval), (total, each.total_interval)):
+            assert interval is not None
+            low, high = interval
+            assert low - 0.02 < value < high + 0.02  # 95 %, six of them
+            assert 0 < high - low < 0.3
+    assert found.sensitivity.indices[0].label == "x"
+    assert found.map is not None
+    assert (found.map.across, found.map.up, found.map.others) == ("x", "y", ("z",))
+
+
+def test_failed_cells_leave_their_samples_out_of_the_indices(tmp_path: Path) -> None:
+    factors = tuple(Vary(name, bounds=(-np.pi, np.pi)) for name in "xyz")
+    design = Design(factors, samples=256, indices=True, seed=1)
+    points = list(design.points())
+    gone = points[300].values
+    folder = made_up(
+        tmp_path / "s", design, nowhere, ishigami, fails=lambda b, v, _: b == "mujoco" and v == gone
+    )
+    found = of(folder)
+    assert found.failed == {"DivergedError": 1}
+    assert found.quantity.counts["no runs"] == 1
+    assert found.sensitivity is not None
+    assert found.sensitivity.samples == 128
+    assert "1 of 256 samples" in found.sensitivity.notes[0]
+    said = text(page(found))
+    assert "1 cell failed (1 DivergedError)" in said
+    assert shares(found)["y"][0] == pytest.approx(ISHIGAMI["y"][0], abs=0.15)
+
+
+def test_a_full_factorial_is_taken_apart_as_its_closed_form(tmp_path: Path) -> None:
+    # f = 10 + 3 x + 2 y + x y + 0 z over levels -1, 0, 1, whose variance is 2/3.
+    design = Design(tuple(grid(name, -1, 1, 3) for name in "xyz"))
+    folder = made_up(
+        tmp_path / "s", design, nowhere, lambda x, y, z, _: along_x(10 + 3 * x + 2 * y + x * y)
+    )
+    found = of(folder)
+    whole = (9 + 4) * 2 / 3 + 4 / 9
+    x, y, both = 6 / whole, 8 / 3 / whole, 4 / 9 / whole
+    expected = {"x": (x, x + both), "y": (y, y + both), "z": (0.0, 0.0)}
+    for name, pair in shares(found).items():
+        assert pair == pytest.approx(expected[name], abs=1e-9)
+    assert found.sensitivity is not None
+    assert found.sensitivity.method == "factorial"
+    assert found.sensitivity.indices[0].first_interval is None  # of one seed
+
+
+def test_a_factorial_with_holes_keeps_the_rest(tmp_path: Path) -> None:
+    design = Design(tuple(grid(name, -1, 1, 3) for name in "xy"))
+    folder = made_up(
+        tmp_path / "s", design, nowhere, lambda x, y, _: along_x(10 + 3 * x),
+        fails=lambda _b, v, _s: v[1] == 1,
+    )  # fmt: skip
+    found = of(folder)
+    assert shares(found)["x"] == pytest.approx((1, 1))
+    assert shares(found)["y"] == pytest.approx((0, 0))
+    assert found.sensitivity is not None
+    assert "y = 1.0" in found.sensitivity.notes[0]
+    assert found.failed == {"DivergedError": 6}
+
+
+def test_variance_shares_of_a_product_are_all_interaction() -> None:
+    x = np.array([-1.0, 1.0])
+    first, total = variance_shares(x[:, None] * x)
+    assert first == pytest.approx([0, 0])
+    assert total == pytest.approx([1, 1])
+
+
+def agreement(folder: Path, seeds: int = 2) -> Path:
+    """Gaps of 0 to 4 mm over x, and one seed that is 2 mm worse where y is 1."""
+    design = Design((grid("x", 0, 4, 5, kind="parameter"), grid("y", 0, 1, 2)))
+    return made_up(
+        folder, design, nowhere,
+        lambda x, y, seed: along_x(1e-3 * (x + (2 * seed if y else 0))), seeds,
+        fails=lambda backend, values, _: backend == "pybullet" and values == (3.0, 0.0),
+    )  # fmt: skip
+
+
+def test_settings_agree_by_the_tolerance(tmp_path: Path) -> None:
+    found = of(agreement(tmp_path / "s"), tolerances={"tip": 1.5e-3}, quantity="tip")
+    # y = 0: x = 0, 1 agree, 2 and 4 differ, 3 has no runs; y = 1: of two seeds the better one
+    # agrees at 0 and 1.
+    assert found.quantity.counts == {"agrees": 2, "some seeds": 2, "differs": 5, "no runs": 1}
+    assert found.agreed == 2
+    by = {each.values: each for each in found.settings}
+    assert by[2.0, 1.0].median == pytest.approx(3e-3)
+    assert by[2.0, 1.0].worst == pytest.approx(4e-3)
+    assert by[3.0, 0.0].median is None
+    assert found.map is not None
+    gap = {
+        (x, y): found.map.gap[r][c]
+        for r, y in enumerate(found.map.rows)
+        for c, x in enumerate(found.map.columns)
+    }
+    flipped = found.map.across == "y"
+    for pair, value in gap.items():
+        x, y = pair[::-1] if flipped else pair
+        expected = None if (x, y) == (3.0, 0.0) else pytest.approx(1e-3 * (float(x) + float(y)))
+        assert value == expected
+    said = text(page(found))
+    assert "In 2 of 10 settings mujoco and pybullet agree within 1.5 mm" in said
+    assert "2 cells failed (2 DivergedError)" in said
+    assert "1 setting thereby has no gap" in said
+    assert max(map(len, said.splitlines())) <= 80
+
+
+def test_a_gap_inside_the_chaos_floor_is_no_difference(tmp_path: Path) -> None:
+    from statemachine.sweep import analysis
+    from statemachine.sweep.analysis_gaps import gaps_of
+    from statemachine.sweep.analysis_runs import ModelFacts
+    from statemachine.sweep.folder import read_manifest
+    from statemachine.sweep.request import design_of
+    from statemachine.sweep.rows import read_cells
+
+    folder = agreement(tmp_path / "s", seeds=1)
+    design = design_of(read_manifest(folder))
+    gaps = gaps_of(read_cells(folder), design, SIDES, 1)
+    width = np.full(10, 2.5e-3)
+    found, settings = analysis._agreement(gaps, "tip", width, ModelFacts(), {"tip": 1.5e-3})
+    verdicts = {each.values[0]: each.verdict for each in settings if each.values[1] == 0}
+    assert verdicts == {0: "agrees", 1: "agrees", 2: "chaos", 3: "no runs", 4: "differs"}
+    chart = analysis.gap_map(gaps, analysis.median(gaps.gap("tip")), width, None)
+    assert chart is not None
+    assert chart.inside[0] == (True, True, True, False, False)
+    assert found.counts["chaos"] == 2
+
+
+def fitted(
+    folder: Path, best: float, least: float = 0.0, seeds: int = 4, spread: float = 0.0
+) -> SweepReport:
+    """Left and right part by 5 mm for each unit of gain from the best one, and by `least`."""
+    design = Design((grid("gain", 0, 2, 9, kind="parameter"), grid("y", 0, 1, 2)))
+
+    def right(gain: float, _y: float, seed: int) -> list[float]:
+        shift = best + spread * (seed - (seeds - 1) / 2)
+        return [5e-3 * (gain - shift), least, 0.0]
+
+    folder = made_up(folder, design, nowhere, right, seeds)
+    return of(folder, tolerances={"tip": 0.2e-3}, fit=["gain"])
+
+
+def test_the_value_that_brings_them_together_is_found(tmp_path: Path) -> None:
+    (found,) = fitted(tmp_path / "s", best=0.61, least=0.1e-3).together
+    assert found.varied == "both"  # a parameter of a function is no side's own
+    assert found.fit is not None
+    assert found.fit.value == pytest.approx(0.61, abs=1e-3)
+    assert found.fit.gap == pytest.approx(0.1e-3, rel=1e-3)
+    assert found.fit.error == pytest.approx(0.0, abs=1e-3)  # the seeds are alike
+    assert found.verdict == "together"
+    assert found.measured is None
+    assert found.fit.at(1.61) == pytest.approx(np.hypot(5e-3, 0.1e-3), rel=0.01)
+
+
+def test_its_error_is_that_of_the_seeds(tmp_path: Path) -> None:
+    seeds, spread = 16, 0.02
+    report = fitted(tmp_path / "s", best=0.9, least=5e-3, seeds=seeds, spread=spread)
+    (found,) = report.together
+    assert found.fit is not None
+    assert found.fit.value == pytest.approx(0.9, abs=0.02)
+    # The gap is a parabola here, so that the value is the mean of 16 that are evenly spread;
+    # the curves of a seed at 2 values of y are the same, and count once.
+    deviation = spread * np.sqrt((seeds**2 - 1) / 12)
+    assert found.fit.error == pytest.approx(deviation / np.sqrt(seeds), rel=0.15)
+    assert found.fit.of == "16 seeds drawn again"
+    assert found.verdict == "closer"
+    said = text(page(report))
+    assert "brings mujoco and pybullet closer, not together" in " ".join(said.split())
+
+
+def test_at_the_edge_and_no_value(tmp_path: Path) -> None:
+    report = fitted(tmp_path / "edge", best=5.0)
+    assert report.together[0].verdict == "edge"
+    assert "at the edge of the range" in " ".join(text(page(report)).split())
+    report = fitted(tmp_path / "none", best=1.0, least=0.5)
+    assert report.together[0].verdict == "none"
+    assert "No value of gain is better" in " ".join(text(page(report)).split())
+
+
+def test_one_curve_has_its_error_from_the_curvature(tmp_path: Path) -> None:
+    design = Design((grid("gain", 0, 2, 9, kind="parameter"),))
+    folder = made_up(
+        tmp_path / "s", design, nowhere, lambda gain, _: [5e-3 * (gain - 1), 1e-3, 0.0]
+    )
+    (found,) = of(folder).together
+    assert found.fit is not None
+    # One unknown: s² = 5 · 1e-6 / 14 left over, Σ slope² = 5 · 25e-6.
+    assert found.fit.error == pytest.approx(np.sqrt(5e-6 / 14 / (5 * 25e-6)), rel=0.02)
+
+
+def test_a_sampled_range_is_fitted_by_a_parabola(tmp_path: Path) -> None:
+    ranges = (Vary("gain", kind="parameter", bounds=(0.0, 2.0)), Vary("y", bounds=(0.0, 1.0)))
+    folder = made_up(
+        tmp_path / "s", Design(ranges, samples=64), nowhere,
+        lambda gain, y, _: [5e-3 * (gain - 0.7), 1e-3 * y, 0.0],
+    )  # fmt: skip
+    report = of(folder, fit=["gain"])
+    (found,) = report.together
+    assert found.fit is not None
+    assert found.fit.value == pytest.approx(0.7, abs=0.02)
+    assert report.sensitivity is not None
+    assert report.sensitivity.method == "rank"
+    assert "run it with --indices" in report.sensitivity.notes[0]
+
+
+def test_pictures_and_page_are_of_the_same_figures(tmp_path: Path) -> None:
+    folder = agreement(tmp_path / "s")
+    found = of(folder, tolerances={"tip": 1.5e-3})
+    chart = next(each for each in pictures(found) if isinstance(each, HeatMap))
+    framed = sum(map(sum, chart.framed))
+    assert framed == sum(
+        v is not None and v <= 1.5 for row in chart.values for v in row
+    )  # fmt: skip
+    html, plot = tmp_path / "r.html", tmp_path / "r.png"
+    arguments = ["sweep", "--report", str(folder), "--no-runs", "--tolerance", "tip=1.5mm"]
+    assert main([*arguments, "--html", str(html), "--plot", str(plot)]) == 1
+    page_text = html.read_text("utf-8")
+    assert page_text.count("data:image/svg+xml;base64,") == 3
+    assert "In 2 of 10 settings" in page_text
+    assert plot.read_bytes().startswith(b"\x89PNG")
+    assert plain(found)["agreed"] == 2
+
+
+def test_one_parameter_is_a_curve(tmp_path: Path) -> None:
+    design = Design((grid("x", 0, 4, 5),))
+    folder = made_up(tmp_path / "s", design, nowhere, lambda x, _: along_x(1e-3 * x))
+    curve = pictures(of(folder))[0]
+    assert isinstance(curve, Traces)
+    assert curve.curves["median of the seeds"] == ([0, 1, 2, 3, 4], pytest.approx([0, 1, 2, 3, 4]))
+
+
+def test_what_does_not_go_together_is_said(tmp_path: Path, capsys: Any) -> None:
+    folder = str(agreement(tmp_path / "s"))
+
+    def says(*words: str) -> str:
+        assert main(["sweep", *words]) == 2
+        return str(capsys.readouterr().err)
+
+    assert "goes with --report" in says("hold", "--out", folder, "--fit", "x")
+    assert "--report DIR" in says("hold")
+    assert "takes no folder" in says("hold", "--out", "there", "--report", folder)
+    assert "is no sweep" in says("--report", str(tmp_path))
+    with pytest.raises(UnknownNameError, match="parameter"):
+        of(Path(folder), fit=["z"])
+    with pytest.raises(UnknownNameError, match="quantity"):
+        of(Path(folder), quantity="touch")
+    with pytest.raises(BadInputError, match="two engines"):
+        of(Path(folder), backends=["mujoco"])
+
+
+def test_a_report_of_ten_thousand_rows_has_no_loop_over_moments(tmp_path: Path) -> None:
+    """Read as arrays and row by row, the runs are the same."""
+    from statemachine.sweep.analysis_gaps import _read, runs_of
+    from statemachine.sweep.rows import read_cells
+
+    table = read_cells(agreement(tmp_path / "s"))
+    done = table.filter(np.array([s == DONE for s in table["status"].to_pylist()]))
+    one, two = _read(done, None), runs_of(done.to_pylist())
+    for name in one.__dataclass_fields__:
+        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+
+
+@pytest.mark.slow
+def test_a_real_sweep_is_answered(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    pytest.importorskip("pybullet")
+    from statemachine import load
+
+    own = load("so101/scene", backend="mujoco").dof_damping
+    sweep = Sweep(
+        "hold", vary=("damping=0.6x:1.4x:5",), backends=SIDES, seeds=2, seconds=0.2,
+        spread=("0.5deg",),
+    )  # fmt: skip
+    run_sweep(sweep, tmp_path / "s", jobs=1)
+    found = sweep_report(tmp_path / "s", floor_cells=4, jobs=1)
+    assert found.floor is not None
+    assert (found.floor.cells, found.floor.settings) == (4, 2)
+    assert 0 < max(each.floor or 0 for each in found.settings) < 1e-6
+    (fit,) = found.together
+    assert (fit.label, fit.varied, fit.own) == ("damping", "right", 1.0)
+    assert own.any()
+    assert fit.fit is not None
+    # Both engines have the same model: its own damping, or one near it, is the best.
+    assert fit.fit.value == pytest.approx(1.0, abs=0.15)
+    assert fit.measured is not None
+    assert fit.pairs == 2
+    assert fit.measured < fit.fit.at(0.6)
+    assert found.ran == found.floor.cells + fit.cells
