@@ -287,6 +287,9 @@ def test_the_value_that_brings_them_together_is_found(tmp_path: Path) -> None:
     assert found.fit.gap == pytest.approx(0.1e-3, rel=1e-3)
     assert found.fit.error == pytest.approx(0.0, abs=1e-3)  # the seeds are alike
     assert found.verdict == "together"
+    reach = np.sqrt(0.2**2 - 0.1**2) / 5  # where hypot(5 mm · reach, 0.1 mm) is 0.2 mm
+    assert found.fit.within(0.2e-3) == pytest.approx((0.61 - reach, 0.61 + reach), abs=6e-3)
+    assert found.fit.within(0.05e-3) is None
     assert found.measured is None
     assert found.fit.at(1.61) == pytest.approx(np.hypot(5e-3, 0.1e-3), rel=0.01)
 

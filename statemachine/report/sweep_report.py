@@ -325,6 +325,11 @@ def _how(found: SweepReport, each: BroughtTogether) -> str:
         f"Least gap between {_times(each, fit.bounds[0])} and {_times(each, fit.bounds[1])}, "
         f"in the mean of {count(fit.curves, 'curve')} over settings and seeds{error}."
     )
+    if (fine := fit.within(found.quantity.tolerance)) is not None:
+        said.append(
+            f"The predicted gap is within tolerance between {_times(each, fine[0])} and "
+            f"{_times(each, fine[1])}."
+        )
     if each.measured is None:
         said.append(f"It is not checked by a run: {each.why_not}.")
     else:

@@ -53,6 +53,11 @@ class FittedValue:
         """The predicted gap at a value within the bounds."""
         return float(np.interp(value, *self.scan))
 
+    def within(self, good: float) -> tuple[float, float] | None:
+        """The least and the largest value whose predicted gap is at most so much; None if none."""
+        fine = [value for value, gap in zip(*self.scan, strict=True) if gap <= good]
+        return (fine[0], fine[-1]) if fine else None
+
     def verdict(self, gap: float, before: float | None, good: float) -> Verdict:
         """What a value does.
 
