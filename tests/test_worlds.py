@@ -601,7 +601,7 @@ import warnings, numpy as np, statemachine as sm
 from statemachine import worlds as many
 warnings.simplefilter("ignore")
 worlds = many.make_worlds(sm.load("so101/scene_box"), 64, workers=4)
-for _ in range(20):
+for _ in range(5):
     worlds.ctrl[::2, 3] = np.nan
     worlds.qvel[1::4] = 1e9
     many.step(worlds, 10)

@@ -213,11 +213,12 @@ def _seen_data(telling: str | None, original: Callable[..., None]) -> Callable[.
 
     @functools.wraps(original)
     def seen(data: Any, model: Any, advance: Callable[..., None], *more: Any) -> None:
-        def advanced(nstep: int = 1) -> None:
+        def advanced(raw_model: Any, raw: Any, nstep: int = 1) -> None:
+            step = functools.partial(advance, raw_model, raw, nstep)
             if _watch is None:
-                advance(nstep)
+                step()
             else:
-                _watch.step(model, data, functools.partial(advance, nstep), nstep)
+                _watch.step(model, data, step, nstep)
 
         original(data, model, advance if model.backend == telling else advanced, *more)
         if _watch is not None:
