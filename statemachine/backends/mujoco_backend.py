@@ -16,23 +16,20 @@ import numpy as np
 
 from ..errors import BadInputError, UnsupportedError
 from ..interface import (
-    BEHAVIOURS,
     FORCES,
     INPUTS,
-    OPTIONS,
     POSES,
     Array,
-    Behaviour,
-    Capabilities,
     Contacts,
     Data,
     Model,
     State,
 )
-from ..interface.checks import HUGE, TINY, check_finite
+from ..interface.checks import TINY, check_finite
 from ._delays import hold
 from ._edits import CONSTANTS_FOLLOW, varied
-from ._mujoco_alarms import AlarmError, Alarms, ended, gave_up, pass_on, resets_itself
+from ._mujoco_alarms import AlarmError, Alarms, ended, gave_up, pass_on
+from ._mujoco_record import INTEGRATORS, capabilities
 from .compiled import (
     check_numbers,
     compile_file,
@@ -44,12 +41,6 @@ from .compiled import (
 )
 
 _DISABLE = mujoco.mjtDisableBit
-# Not RK4: after its step the derived values are neither of the state before nor after.
-_INTEGRATORS = {
-    "euler": mujoco.mjtIntegrator.mjINT_EULER,
-    "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
-    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
-}
 _CONSTRAINT = mujoco.mjtConstraint
 _PARTS = {
     "qfrc_contact": (
@@ -69,48 +60,6 @@ _COMPONENTS = {
     and int(bit).bit_count() == 1
     and int(bit) & int(mujoco.mjtState.mjSTATE_INTEGRATION)
 }
-_NATIVE = Behaviour("native", "the engine's own")
-_NOTES = {
-    "position servo": Behaviour(
-        "native", "the engine's own; an infinite ctrl is clamped to its range, or refused"
-    ),
-    "latency": Behaviour(
-        "native",
-        "the engine's own delay of an actuator, in whole engine steps; before a keyframe the "
-        "command was that of the keyframe, where the engine has zero",
-    ),
-    "forces by part": Behaviour("native", "rows of the constraint solver, by their type"),
-    "exact restore": Behaviour("native", "mjSTATE_INTEGRATION, warm start included"),
-    "no automatic reset": Behaviour(
-        "native",
-        "the engine's flag mjDSBL_AUTORESET; DivergedError where qpos, qvel or qacc is beyond "
-        f"{HUGE:g}, the engine's own bound",
-    ),
-}
-_WITH_RK4 = Behaviour("unsupported", "with RK4 derived values are those of its fourth stage")
-_WITH_SLEEP = Behaviour("unsupported", "the counters of sleeping bodies are in no State")
-_WITH_RESET = Behaviour(
-    "unsupported", "the engine's default: it resets, and the divergence is raised after"
-)
-
-
-def _capabilities(raw: mujoco.MjModel) -> Capabilities:
-    """The record of one compiled model: two of its own settings show in it."""
-    behaviours = {name: _NOTES.get(name, _NATIVE) for name in BEHAVIOURS}
-    if raw.opt.integrator == int(mujoco.mjtIntegrator.mjINT_RK4):
-        behaviours["stale after a step"] = _WITH_RK4
-    if resets_itself(raw):
-        behaviours["no automatic reset"] = _WITH_RESET
-    asleep = bool(raw.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP))
-    if asleep:
-        behaviours["exact restore"] = _WITH_SLEEP
-    return Capabilities(
-        options=tuple(name for name in OPTIONS if name != "max_qvel"),
-        integrators=tuple(_INTEGRATORS),
-        behaviours=behaviours,
-        shared_model=True,
-        exact_restore=not asleep,
-    )
 
 
 def load(
@@ -146,7 +95,7 @@ class MujocoModel(Model):
             engine_version=mujoco.__version__,
             path=path,
             raw=raw,
-            capabilities=_capabilities(raw),
+            capabilities=capabilities(raw),
             timestep=float(raw.opt.timestep) * substeps,
             substeps=substeps,
             **facts(raw),
@@ -192,7 +141,7 @@ class MujocoModel(Model):
         # As `_replace` would, so that a timestep is the same to the last bit.
         base = self._replace({"substeps": int(substeps[0])})
         if "integrator" in given:
-            given["integrator"] = np.array([int(_INTEGRATORS[n]) for n in options["integrator"]])
+            given["integrator"] = np.array([int(INTEGRATORS[n]) for n in options["integrator"]])
         if "timestep" in given:
             lengths = [step_length(length, base.substeps, {}) for length in options["timestep"]]
             given["timestep"] = np.array(lengths)
@@ -218,7 +167,7 @@ class MujocoModel(Model):
         except (MemoryError, mujoco.FatalError) as error:
             raise gave_up(error) from error
         if "integrator" in options:
-            raw.opt.integrator = int(_INTEGRATORS[options["integrator"]])
+            raw.opt.integrator = int(INTEGRATORS[options["integrator"]])
         substeps = options.get("substeps", self.substeps)
         raw.opt.timestep = step_length(self.timestep, substeps, options)
         return MujocoModel(with_room(raw), self.path, substeps)

@@ -131,6 +131,7 @@ def overview(_options: argparse.Namespace) -> int:
         "",
         "And beside them:",
         f"  {PROGRAM} compare hold --why   where two engines part, and why",
+        f"  {PROGRAM} sweep --help     an experiment at many settings, on every engine",
         f"  {PROGRAM} trace record hold    a run in a file, to open without an engine",
         f"  {PROGRAM} view --ghost pybullet    live, in a browser, with sliders",
         f"  {PROGRAM} fingertip        the engine against an independent witness",
