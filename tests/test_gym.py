@@ -130,6 +130,7 @@ def test_actions_are_commands(backend: str) -> None:
     task = HeldBox(backend, 4)
     held = task.model.keyframes[0].ctrl
     assert np.array_equal(task.ctrl(np.zeros(6), (6,)), held)
+    assert np.array_equal(task.ctrl(np.full(6, 2.0), (6,)), task.ctrl(np.ones(6), (6,)))
     away = np.array([0.3, -0.2, 0.1, 0.0, 0.1, 0.05])
     assert np.allclose(task.ctrl(task.action(held + away), (6,)), held + away, atol=1e-7)
 

@@ -619,3 +619,39 @@ worlds.close()
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_time_that_is_no_number_is_refused(model: sm.Model) -> None:
+    with many.make_worlds(model, 2) as worlds:
+        worlds.time[1] = np.nan
+        for use in (many.step, many.forward, lambda w: many.record(w, 2)):
+            with pytest.raises(BadInputError, match=r"time\[1\] = nan"):
+                use(worlds)
+        many.step(worlds, ids=[0])
+        many.reset(worlds)
+        many.step(worlds)
+
+
+def test_there_is_a_model_of_each_world_and_no_other(model: sm.Model) -> None:
+    for options in ({}, {"damping": [0.1, 0.2]}):
+        with many.make_worlds(model, 2, **options) as worlds:
+            assert worlds.model_of(np.int64(1)).nv == model.nv
+            for world in (2, -1, "x", 1.5, True):
+                with pytest.raises(BadInputError, match="there is no world"):
+                    worlds.model_of(world)  # pyright: ignore[reportArgumentType]
+        with pytest.raises(ClosedDataError):
+            worlds.model_of(0)
+
+
+@pytest.mark.parametrize("values", [{700.0: 0, 900.0: 1}, {700.0, 900.0}, "ab", 3.0, np.array(3.0)])
+def test_values_of_an_option_are_in_order(mujoco_: None, values: object) -> None:
+    with pytest.raises(BadInputError, match="kp wants 2 values"):
+        many.make_worlds(sm.load("so101/so101"), 2, kp=values)
+
+
+def test_shapes_are_counted_right(mujoco_: None) -> None:
+    with many.make_worlds(sm.load("so101/so101"), 2) as worlds:
+        with pytest.raises(BadInputError, match=r"ctrl wants 12 numbers, shape \(2, 6\)"):
+            worlds.ctrl = np.zeros((3, 6))
+        with pytest.raises(BadInputError, match="names of fields are wanted"):
+            many.record(worlds, 2, None)  # pyright: ignore[reportArgumentType]

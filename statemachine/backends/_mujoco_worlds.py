@@ -93,10 +93,9 @@ class MujocoWorlds(Worlds):
         super().__init__(model, *size, derived, arrays)
         listen_for(self)
 
-    def model_of(self, world: int) -> Model:
+    def _model_of(self, world: int) -> Model:
         if not self._varied:
             return self._base
-        self._refuse_if_troubled()
         return self._base.with_compiled(self._batch.get_model(world))
 
     def _close(self) -> None:

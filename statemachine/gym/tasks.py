@@ -85,12 +85,12 @@ class Task(ABC):
         return self.model.timestep * self.frame_skip
 
     def ctrl(self, action: ArrayLike, shape: tuple[int, ...]) -> Array:
-        """Commands [rad] for actions of a shape (…, nu).
+        """Commands [rad] for actions of a shape (…, nu); beyond -1 to 1 the nearest counts.
 
         Raises:
             BadInputError: The shape is another one, or an entry is not finite.
         """
-        return self._middle + self._half * as_vector(action, shape, "action")
+        return self._middle + self._half * np.clip(as_vector(action, shape, "action"), -1, 1)
 
     def action(self, ctrl: Array) -> NDArray[np.float32]:
         """The actions for commands [rad]."""

@@ -226,6 +226,8 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
             return [None] * self.num_envs
         if isinstance(seed, int | np.integer):
             return [int(seed) + world for world in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise BadInputError(f"seed wants {self.num_envs} seeds, or one; got {len(seed)}")
+        listed = isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str)
+        if not listed or len(seed) != self.num_envs:
+            got = len(seed) if listed else shown(seed)
+            raise BadInputError(f"seed wants {self.num_envs} seeds, or one; got {got}")
         return list(seed)

@@ -55,7 +55,7 @@ def as_vector(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
     """`value` as finite float64 of exactly this shape, in a new array, or BadInputError."""
     array = as_numbers(value, name)
     if array.shape != shape:
-        wanted = f"{shape[0]} numbers, shape {shape}" if shape else "one number"
+        wanted = f"{math.prod(shape)} numbers, shape {shape}" if shape else "one number"
         raise BadInputError(f"{name} wants {wanted}; got shape {array.shape}")
     array = array.astype(np.float64)
     check_entries(array, name)

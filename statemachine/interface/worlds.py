@@ -10,8 +10,16 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from ..errors import BadInputError, ClosedDataError, ReadOnlyError, StateMachineError
-from .checks import HUGE, TINY, as_numbers, as_vector, check_entries, check_writable
+from ..errors import BadInputError, ClosedDataError, ReadOnlyError, StateMachineError, shown
+from .checks import (
+    HUGE,
+    TINY,
+    as_numbers,
+    as_vector,
+    check_entries,
+    check_writable,
+    whole_number,
+)
 from .data import alone
 from .model import Model
 from .records import FORCES, INPUTS, POSES, Array, Ints, State, read_only
@@ -115,9 +123,15 @@ class Worlds(ABC):
         """The error of each world that is left out, by its number."""
         return MappingProxyType(self._errors)
 
-    @abstractmethod
     def model_of(self, world: int) -> Model:
-        """The Model of one world: `model`, with the options that were given for this world."""
+        """The Model of one world: `model`, with the options that were given for this world.
+
+        Raises:
+            BadInputError: There is no such world.
+            ClosedDataError: The Worlds are closed.
+        """
+        self._refuse_if_troubled()
+        return self._model_of(self._world(world))
 
     def close(self) -> None:
         """Give back threads, processes and memory. Idempotent.
@@ -144,6 +158,10 @@ class Worlds(ABC):
     # `diverged`. `ids` are world numbers, each once and in order; where time passes, none of
     # them has diverged. One thread calls at a time. Whoever implements them writes into the
     # arrays given to `__init__`.
+
+    @abstractmethod
+    def _model_of(self, world: int) -> Model:
+        """The Model of a world that there is."""
 
     @abstractmethod
     def _close(self) -> None:
@@ -195,6 +213,23 @@ class Worlds(ABC):
     def _refuse_if_troubled(self) -> None:
         if self._trouble:
             raise ClosedDataError("these Worlds are closed: make others with make_worlds")
+
+    def _world(self, world: int) -> int:
+        """The number of one world, or BadInputError."""
+        number = whole_number(world)
+        if number is None or not 0 <= number < self.n:
+            raise BadInputError(f"there is no world {shown(world)}: they are 0 to {self.n - 1}")
+        return number
+
+    def _check_time(self, ids: Ints) -> None:
+        """Raise BadInputError for the first of these worlds whose time is no finite number."""
+        for world in ids[~np.isfinite(self.time[ids])][:1].tolist():
+            raise BadInputError(
+                f"time[{world}] = {self.time[world]} is not a finite number",
+                quantity="time",
+                index=world,
+                world=world,
+            )
 
     def _check_inputs(self, ids: Ints) -> None:
         """Raise BadInputError for the first entry of these worlds that is no finite number."""

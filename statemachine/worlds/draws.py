@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import BadInputError, shown, unknown_name
 from ..interface import Array, Model
-from ..interface.checks import as_count, as_scalar, whole_number
+from ..interface.checks import as_count, as_scalar, kind_of, whole_number
 
 # Options of `Model.replace` that can be drawn, and their value in a Model. One that is drawn
 # as it is, and multiplies nothing, has none.
@@ -97,6 +97,8 @@ def draw(
         UnknownNameError: An option is none that can be drawn.
         BadInputError: `n`, `seed` or a range is no such value.
     """
+    if not isinstance(model, Model):
+        raise TypeError(f"draw wants a Model, from statemachine.load; got {kind_of(model)}")
     n = as_count(n, "n")
     number = whole_number(seed)
     if number is None or number < 0:

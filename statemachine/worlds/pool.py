@@ -103,7 +103,7 @@ class PoolWorlds(Worlds):
             self._end()
             raise
 
-    def model_of(self, world: int) -> Model:
+    def _model_of(self, world: int) -> Model:
         if not self._options:
             return self.model
         if world not in self._replaced:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from ..errors import (
     unknown_name,
 )
 from ..interface import Array, Ints, Model, State
-from ..interface.checks import as_count, as_vector, check_state, kind_of, whole_number
+from ..interface.checks import as_count, as_vector, check_state, kind_of
 from ..interface.data import alone
 from ..interface.options import checked_options
 from ..interface.worlds import BATCHED, WRITABLE, Worlds, in_world
@@ -144,7 +144,7 @@ def get_state(worlds: Worlds, world: int) -> State:
         BusyDataError, ClosedDataError: As in `step`.
     """
     _admit(worlds)
-    return alone(worlds, _get_state, worlds, _world(worlds, world))
+    return alone(worlds, _get_state, worlds, worlds._world(world))
 
 
 def _get_state(worlds: Worlds, world: int) -> State:
@@ -167,7 +167,7 @@ def set_state(worlds: Worlds, world: int, state: State) -> None:
         BusyDataError, ClosedDataError: As in `step`.
     """
     _admit(worlds)
-    number = _world(worlds, world)
+    number = worlds._world(world)
     check_state(state, worlds.model, *worlds._state_layout(number))
     alone(worlds, _set_state, worlds, number, state)
 
@@ -231,6 +231,7 @@ def _run(worlds: Worlds, call: Any, *args: Any) -> None:
 
 def _kept(worlds: Worlds, call: Any, args: tuple[Any, ...]) -> Mapping[int, Exception]:
     worlds._check_writable()
+    worlds._check_time(args[1] if call is _forward else args[0])
     errors = call(*args)
     if errors:
         worlds._errors.update(errors)
@@ -300,15 +301,12 @@ def _numbers(worlds: Worlds, ids: ArrayLike | None) -> Ints:
     return numbers.astype(np.int64)
 
 
-def _world(worlds: Worlds, world: int) -> int:
-    number = whole_number(world)
-    if number is None or not 0 <= number < worlds.n:
-        raise BadInputError(f"there is no world {shown(world)}: they are 0 to {worlds.n - 1}")
-    return number
-
-
 def _names(names: Sequence[str], kind: str, known: tuple[str, ...]) -> tuple[str, ...]:
     """Names that are known, each once, as given."""
+    if not isinstance(names, Iterable):
+        raise BadInputError(
+            f"names of {kind}s are wanted, of {', '.join(known)}; got {shown(names)}"
+        )
     listed = (names,) if isinstance(names, str) else tuple(names)
     for name in listed:
         if not isinstance(name, str) or name not in known:
@@ -320,8 +318,10 @@ def _options(model: Model, n: int, options: Mapping[str, Any]) -> dict[str, list
     """Each option of `Model.replace` as a checked value for each world."""
     checked = {}
     for name, values in options.items():
-        if isinstance(values, str) or not hasattr(values, "__len__") or len(values) != n:
-            got = f"{len(values)}" if hasattr(values, "__len__") else shown(values)
+        listed = isinstance(values, Sequence) and not isinstance(values, str | bytes)
+        listed |= isinstance(values, np.ndarray) and values.ndim > 0
+        if not listed or len(values) != n:
+            got = f"{len(values)}" if listed else shown(values)
             raise BadInputError(f"{name} wants {n} values, one for each world; got {got}")
         checked[name] = []
         for world, value in enumerate(values):
