@@ -633,12 +633,15 @@ def test_a_time_that_is_no_number_is_refused(model: sm.Model) -> None:
 
 
 def test_there_is_a_model_of_each_world_and_no_other(model: sm.Model) -> None:
-    for options in ({}, {"damping": [0.1, 0.2]}):
+    every: list[dict[str, Any]] = [{}, {"damping": [0.1, 0.2]}]
+    for options in every:
         with many.make_worlds(model, 2, **options) as worlds:
-            assert worlds.model_of(np.int64(1)).nv == model.nv
-            for world in (2, -1, "x", 1.5, True):
+            one: Any = np.int64(1)
+            assert worlds.model_of(one).nv == model.nv
+            bad: list[Any] = [2, -1, "x", 1.5, True]
+            for world in bad:
                 with pytest.raises(BadInputError, match="there is no world"):
-                    worlds.model_of(world)  # pyright: ignore[reportArgumentType]
+                    worlds.model_of(world)
         with pytest.raises(ClosedDataError):
             worlds.model_of(0)
 
