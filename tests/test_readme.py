@@ -55,7 +55,7 @@ SAYS_NO = (
     "statemachine check exercises/step_loop.py",
     "statemachine check --mutants exercises/test_arm.py",
     "python exercises/step_loop.py --gravity",
-    "statemachine sweep hold --vary damping=0.6x:1.4x:5 --seconds 0.2 --out sweep-damping --report "
+    "statemachine sweep hold --vary damping=0.6x:1.4x:5 --seconds 0.4 --out sweep-damping --report "
     "--floor-cells 4",
 )
 # The engines differ there.
