@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from statemachine.cli import main
 from statemachine.errors import BadInputError, UnknownNameError
@@ -22,6 +23,7 @@ from statemachine.report.sweep_report import page
 from statemachine.report.terminal import show
 from statemachine.sweep import Design, Sweep, Vary, run_sweep
 from statemachine.sweep.analysis import SweepReport, sweep_report
+from statemachine.sweep.analysis_fit import fit_curves
 from statemachine.sweep.analysis_indices import variance_shares
 from statemachine.sweep.cell import DONE, FAILED
 from statemachine.sweep.folder import SCHEMA
@@ -328,6 +330,36 @@ def test_one_curve_has_its_error_from_the_curvature(tmp_path: Path) -> None:
     assert found.fit is not None
     # One unknown: s² = 5 · 1e-6 / 14 left over, Σ slope² = 5 · 25e-6.
     assert found.fit.error == pytest.approx(np.sqrt(5e-6 / 14 / (5 * 25e-6)), rel=0.02)
+
+
+def moments(x: list[float], steps: int, d: int = 2) -> NDArray[np.float64]:
+    """(1, k, m, d) a curve whose runs keep so many moments; NaN before them."""
+    made = np.full((1, len(x), 4, d), np.nan)
+    made[0, :, 4 - steps :] = np.array(x)[:, None, None]
+    return made
+
+
+def test_runs_that_keep_fewer_moments_are_fitted_by_those_they_have() -> None:
+    levels = np.array([0.0, 1.0, 2.0])
+    right = np.concatenate([moments([-1, 0, 1], steps) for steps in (4, 2)])
+    found = fit_curves("qpos", levels, 0 * right, right, [0, 0])
+    assert found is not None
+    assert (found.value, found.curves) == (pytest.approx(1.0, abs=1e-3), 2)
+    assert found.scan[1][-1] == pytest.approx(1.0)
+
+
+def test_of_a_curve_with_runs_of_several_lengths_the_end_is_fitted() -> None:
+    """As where the timestep itself is fitted: the moments before are no longer the same."""
+    levels = np.array([0.0, 1.0, 2.0])
+    right = moments([-1, 0, 1], 4)
+    right[0, :, :-1] = 7.0
+    right[0, 0, :2] = np.nan
+    found = fit_curves("qpos", levels, 0 * np.nan_to_num(right), right, [0])
+    assert found is not None
+    assert (found.value, found.gap) == (
+        pytest.approx(1.0, abs=1e-3),
+        pytest.approx(0.0, abs=1e-3),
+    )
 
 
 def test_a_sampled_range_is_fitted_by_a_parabola(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..interface import Array
-from .analysis_gaps import length
+from .analysis_gaps import Flags, length
 
 _SCAN = 401  # values that are looked at between the bounds, before the minimum is refined
 _RESAMPLES = 400
@@ -81,7 +81,7 @@ def fit_curves(
 
     Each number of a run is interpolated over the parameter (PCHIP, which does not overshoot), and
     the gap is computed from what that gives: a gap itself has a kink where it is least, and the
-    runs do not.
+    runs do not. What of a curve is not there at every value is left out.
 
     Args:
         name: Of the quantity.
@@ -96,14 +96,13 @@ def fit_curves(
     if len(levels) < _LEAST_LEVELS:
         return None
     count = len(right)
-    whole = [k for k in range(count) if _whole(left[k]) and _whole(right[k])]
-    if not whole:
+    used = _comparable(left, right)
+    whole = np.flatnonzero(used.any(axis=(1, 2)))
+    if not len(whole):
         return None
-    chosen = np.array(whole)[
-        np.linspace(0, len(whole) - 1, min(len(whole), MOST_CURVES)).astype(int)
-    ]
-    used = ~np.isnan(right[chosen]).all(axis=(0, 1)) & ~np.isnan(left[chosen]).all(axis=(0, 1))
-    left, right = (np.where(used, each[chosen], 0.0) for each in (left, right))
+    chosen = whole[np.linspace(0, len(whole) - 1, min(len(whole), MOST_CURVES)).astype(int)]
+    used = used[chosen]
+    left, right = (np.where(used[:, None], each[chosen], 0.0) for each in (left, right))
     interpolate = importlib.import_module("scipy.interpolate")
     difference = interpolate.PchipInterpolator(levels, right - left, axis=1)
 
@@ -129,7 +128,7 @@ def fit_curves(
         error = float(np.std(_drawn_again(scan, table)))
         of = f"{len(chosen)} curves drawn again"
     else:
-        error = _curvature(difference(value), slope(value))
+        error = _curvature(difference(value)[used], slope(value)[used])
         of = "the curvature"
     return FittedValue(
         value=value,
@@ -187,9 +186,17 @@ def fit_scatter(values: Array, gaps: Array) -> FittedValue | None:
     )
 
 
-def _whole(curve: Array) -> bool:
-    """Whether a curve (k, m, d) has a run at every value."""
-    return bool(np.isfinite(curve).any(axis=(1, 2)).all())
+def _comparable(left: Array, right: Array) -> Flags:
+    """(c, m, d): which numbers of a curve both sides have at every value, at the same moment.
+
+    A short run keeps fewer moments. Where the runs of a curve have not the same number of them,
+    only the last one is the same.
+    """
+    there = [np.isfinite(each) for each in (left, right)]
+    counts = np.concatenate([each.any(axis=3).sum(axis=2) for each in there], axis=1)
+    used = np.array(np.concatenate(there, axis=1).all(axis=1), dtype=bool)
+    used[np.ptp(counts, axis=1) > 0, :-1] = False
+    return used
 
 
 def _refined(gap: Any, scan: Array, centre: Array) -> float:

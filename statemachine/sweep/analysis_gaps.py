@@ -249,7 +249,7 @@ def gaps_of(
     if not (left.done & right.done).any():
         raise BadInputError(f"no setting of this sweep has a run on both {sides[0]} and {sides[1]}")
     missing = 2 * len(points) * seeds - count
-    left, right = _alike(left, right)
+    left, right = alike(left, right)
     return SweepGaps(
         sides, design, points, tuple(range(seeds)), left, right,
         dict(failed.most_common()), missing,
@@ -285,7 +285,7 @@ def joined(runs: Sequence[SweepRuns]) -> SweepRuns:
     """Runs (n,) one after the other, with arrays of the same shapes."""
     found = runs[0]
     for other in runs[1:]:
-        pair = _alike(found, other)
+        pair = alike(found, other)
         names = found.__dataclass_fields__
         found = SweepRuns(
             *(np.concatenate([getattr(each, name) for each in pair]) for name in names)
@@ -293,7 +293,7 @@ def joined(runs: Sequence[SweepRuns]) -> SweepRuns:
     return found
 
 
-def _alike(one: SweepRuns, two: SweepRuns) -> tuple[SweepRuns, SweepRuns]:
+def alike(one: SweepRuns, two: SweepRuns) -> tuple[SweepRuns, SweepRuns]:
     """Both with arrays of the same shapes, the shorter one filled up with NaN."""
 
     def filled(values: Array, like: Array) -> Array:

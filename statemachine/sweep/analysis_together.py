@@ -11,7 +11,7 @@ import numpy as np
 from ..interface import Array
 from ..scenarios.runs import Progress, silent
 from .analysis_fit import FittedValue, Verdict, fit_curves, fit_scatter
-from .analysis_gaps import SweepGaps, SweepRuns, gap_between, joined, median
+from .analysis_gaps import SweepGaps, SweepRuns, alike, gap_between, joined, median
 from .analysis_runs import CellRunner, Setting, evenly
 from .factors import Vary
 
@@ -158,7 +158,9 @@ class _Case:
                 runs = self._references([settings[k] for k in chosen])
                 if runs is None:
                     return None
-                left, right = runs.vectors(self.quantity)[:, None], right[chosen]
+                runs, others = alike(runs, self.gaps.right)
+                left = runs.vectors(self.quantity)[:, None]
+                right = self._curves(others.vectors(self.quantity))[chosen]
                 settings = [settings[k] for k in chosen]
         self.kept = settings
         seeds = [seed for _, seed in settings]
@@ -175,7 +177,7 @@ class _Case:
         runs = self._references(self.kept)
         if runs is None:
             return None
-        gap = gap_between(self.quantity, runs, self.gaps.right[chosen, 0])
+        gap = gap_between(self.quantity, *alike(runs, self.gaps.right[chosen, 0]))
         return fit_scatter(values[chosen], gap)
 
     def _references(self, settings: Sequence[Setting]) -> SweepRuns | None:
