@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine.cli import main
 from statemachine.errors import BadInputError, MissingEngineError, StateMachineError
 from statemachine.scenarios import scenario
 from statemachine.sweep import (
@@ -152,6 +153,12 @@ def test_other_requests_that_are_refused(policy: str) -> None:
         (small("hold", every=5), "--every is of a FUNCTION"),
         (small("hold", seeds=0), "--seeds must be at least 1"),
         (small("hold", samples=8), "none is varied"),
+        (small("hold", "model="), "--vary model= names no model"),
+        (small("hold", "damping=0:1", samples=3, indices=True), "wants a power of two"),
+        (
+            small("hold", "damping=0:1:1000000", "frictionloss=0:1:1000000"),
+            "more than a sweep can hold",
+        ),
         (small("hold", backends=("mujocco",)), "Did you mean 'mujoco'"),
         (small("hold", spread=("1",)), "an uncertainty reads like"),
         (small(f"{policy}:still", "gian=1"), "Did you mean 'gain'"),
@@ -161,6 +168,12 @@ def test_other_requests_that_are_refused(policy: str) -> None:
     ):
         with pytest.raises(StateMachineError, match=re.escape(says)):
             prepared(sweep)
+
+
+def test_many_cells_are_told_beforehand(capsys: pytest.CaptureFixture[str]) -> None:
+    assert any("20,000 cells" in line for line in prepared(small("hold", seeds=20_000)).said)
+    assert main(["sweep", "hold", "--out", ""]) == 2
+    assert "has no name" in capsys.readouterr().err
 
 
 def test_the_points_of_a_design() -> None:

@@ -82,6 +82,8 @@ def check(options: argparse.Namespace) -> None:
     Raises:
         BadInputError: It does not, or a file cannot be written.
     """
+    if options.out == "" or options.report == "":
+        raise BadInputError("the folder of a sweep has no name: say --out DIR, or --report DIR")
     if options.report is None:
         for name, default in _DEFAULTS.items():
             if getattr(options, name) != default:

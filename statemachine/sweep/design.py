@@ -81,6 +81,11 @@ class Design:
         return tuple(vary for vary in self.factors if vary.bounds is None)
 
     def __len__(self) -> int:
+        return self.size
+
+    @property
+    def size(self) -> int:
+        """Number of points, where it is too large for `len`, too."""
         blocks = len(self.sampled) + 2 if self.indices else 1
         count = blocks * self.samples if self.sampled else 1
         for vary in self.listed:

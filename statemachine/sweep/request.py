@@ -35,6 +35,7 @@ from .worker import digest_of
 
 SPREAD = ("1deg", "1mm")
 MODEL_OF_A_FUNCTION = "so101/scene"
+_MANY, _MOST = 10_000, 10**8  # cells that are told beforehand, and that the driver can remember
 _LOOKED_AT = 1000  # values of a factor; of more, the ends
 
 
@@ -219,7 +220,19 @@ def prepared(sweep: Sweep) -> PreparedSweep:
     if design.sampled:
         require_qmc()
         if sweep.samples & (sweep.samples - 1):
+            if sweep.indices:
+                raise BadInputError(
+                    f"--indices wants a power of two of --samples; got {sweep.samples}"
+                )
             said.append(f"{sweep.samples} samples are no power of two: a Sobol sequence wants one")
+    cells = design.size * sweep.seeds * len(backends)
+    if cells > _MOST:
+        raise BadInputError(
+            f"{cells:.3g} cells are more than a sweep can hold, which is {_MOST:,}: vary less, or "
+            "divide it into several"
+        )
+    if cells > _MANY:
+        said.append(f"{cells:,} cells")
     rules = dataclasses.replace(rules, factors=factors)
     for vary in factors:
         said += _check_values(vary, models)
@@ -255,6 +268,8 @@ def _rules(sweep: Sweep) -> CellRules:
     parameters = parameters_of(sweep.what) if function else ()
     usual = MODEL_OF_A_FUNCTION if function else scenario(sweep.what).model
     names = [word.partition("=")[2] for word in sweep.vary if word.startswith(f"{MODEL}=")]
+    if names and not names[0].strip(" ,"):
+        raise BadInputError(f"--vary {MODEL}= names no model")
     if names and sweep.model is not None:
         raise BadInputError("--model says one model and --vary model=… several: leave one out")
     names = names[0].split(",") if names else [sweep.model or usual]
