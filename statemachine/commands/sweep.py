@@ -14,23 +14,24 @@ from .compare import add_defaults, experiments
 def add(parser: argparse.ArgumentParser) -> None:
     """Its options."""
     parser.description = (
-        "Run an experiment at every combination of settings, from several starts, on every\n"
-        "engine, and write a row for each run into a partitioned Parquet dataset. A run that\n"
-        "fails is a row with its error. Typed again, it runs only what is missing.\n\n"
+        "Run an experiment at every combination of settings, from several starts, on\n"
+        "every engine, and write a row for each run into a partitioned Parquet dataset.\n"
+        "A run that fails is a row with its error. Typed again, it runs only what is\n"
+        "missing.\n\n"
         "What --vary takes:\n"
-        "  timestep=0.001,0.005      a list; also contacts=on,off and integrator=euler,implicit\n"
+        "  timestep=0.001,0.005      a list; also contacts=on,off, integrator=euler\n"
         "  damping=0.5:1.5:11        a grid: from, to, count\n"
         "  damping=0.5x:2x:5         times the model's own values\n"
         "  damping[elbow_flex]=0:1:3 of one joint; mass[gripper], gravity[z], …\n"
         "  frictionloss=0:0.1        a range, sampled with --samples\n"
         "  model=so101/scene,A.xml   variants of the model\n"
         "  qpos[elbow_flex]=-1:1:5   where the run starts; qvel[…] too\n"
-        "  gain=1,2,5                a keyword argument of FUNCTION(model, data, gain=…)"
+        "  gain=1,2,5                a keyword of FUNCTION(model, data, gain=…)"
     )
     parser.epilog = (
         f"experiments:\n{experiments()}\n\n"
-        "Exit code 1: a cell failed; of a report, that two engines do not agree in all "
-        "settings.\ndocs/sweeps.md has the columns of the dataset."
+        "Exit code 1: a cell failed; of a report, that two engines do not agree in "
+        "all\nsettings. docs/sweeps.md has the columns of the dataset."
     )
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument(

@@ -231,8 +231,8 @@ def page(results: Mapping[str, WorldsSpeed], session: Session) -> Any:
     blocks.append(
         Traces(
             "What a step of one world costs",
-            "number of worlds, as a power of 2",
-            "wall time [µs]",
+            "number of worlds: 2 to the power of",
+            "wall time of a step of one world [µs]",
             {
                 f"{name}: a step of one world": (
                     [math.log2(c.n) for c in result.costs],
@@ -265,8 +265,8 @@ def _shared(results: Mapping[str, WorldsSpeed]) -> str:
     yes = [name for name, result in results.items() if result.shared]
     texts = [f"On {listed(yes)} all Data share the compiled model."] if yes else []
     texts += [
-        f"On {name} they share its description only: {result.most}. So there are at most "
-        f"{result.costs[-1].n} here, in processes."
+        f"On {name} they share its description only: {result.most}. So this goes to "
+        f"{count(result.costs[-1].n, 'world')} only, in processes."
         for name, result in results.items()
         if not result.shared
     ]

@@ -76,7 +76,7 @@ def _curve(found: SweepReport, chart: GapMap, title: str) -> Traces:
 
 def bars(found: SweepReport) -> Bars | None:
     shares = found.sensitivity
-    if shares is None or shares.method == "rank":
+    if shares is None or shares.method == "rank" or len(shares.indices) == 1:
         return None
     return Bars(
         "What the gap is sensitive to",

@@ -64,7 +64,9 @@ def _headline(found: SweepReport) -> Headline:
     )
     causes = []
     shares = found.sensitivity
-    if shares is not None and shares.indices:
+    if found.only_rounding:
+        causes.append("Every gap is inside the chaos floor: no more than rounding makes of a run.")
+    elif shares is not None and len(shares.indices) > 1:
         top = shares.indices[0]
         how = "goes most with" if shares.method == "rank" else "is most sensitive to"
         share = "" if shares.method == "rank" else f" (total {_index(top.total)})"
@@ -229,6 +231,10 @@ def _setting(found: SweepReport, setting: SettingGap) -> str:
 
 def _sensitive(found: SweepReport) -> list[Block]:
     shares = found.sensitivity
+    if found.only_rounding:
+        return [Text("To nothing: every gap is inside the chaos floor.")]
+    if shares is not None and len(shares.indices) == 1:
+        return [Text("One parameter was varied: what changes the gap is that alone.")]
     if shares is None:
         return [Text("Nothing can be said: the gap is the same everywhere, or there are too few.")]
     rank = shares.method == "rank"
@@ -262,6 +268,8 @@ def _sensitive(found: SweepReport) -> list[Block]:
 
 
 def _together(found: SweepReport) -> list[Block]:
+    if not found.together and found.only_rounding:
+        return [Text("Nothing is to be brought together: every gap is inside the chaos floor.")]
     if not found.together:
         return [Text("No parameter has three numbers or a range: nothing is fitted.")]
     blocks: list[Block] = []

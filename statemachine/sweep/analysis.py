@@ -131,6 +131,11 @@ class SweepReport:
         """In how many settings both sides agree at every seed."""
         return self.quantity.counts.get("agrees", 0)
 
+    @property
+    def only_rounding(self) -> bool:
+        """Whether every gap is inside the chaos floor, so that nothing has a cause to look for."""
+        return _only_rounding(self.settings)
+
 
 def sweep_report(
     folder: str | Path,
@@ -195,8 +200,9 @@ def sweep_report(
     }
     agreement, settings = found[main]
     figures = gaps.gap(main)
-    shares = sensitivity(design, gaps.points, figures)
-    together = _together(
+    rounding = _only_rounding(settings)
+    shares = None if rounding else sensitivity(design, gaps.points, figures)
+    together = () if rounding and not fit else _together(
         gaps, shares, agreement, widths.get(main), facts, fit, varied,
         runner if isinstance(runner, CellRunner) else None, part_of(progress, 0.5, 0.5),
     )  # fmt: skip
@@ -219,6 +225,14 @@ def sweep_report(
         together=together,
         ran=(floor.cells if floor else 0) + sum(each.cells for each in together),
         design=design,
+    )
+
+
+def _only_rounding(settings: Sequence[SettingGap]) -> bool:
+    known = [each for each in settings if each.median is not None]
+    return bool(known) and all(
+        each.floor is not None and each.median is not None and each.median <= each.floor
+        for each in known
     )
 
 
