@@ -9,8 +9,9 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Self
 
@@ -722,3 +723,22 @@ def test_nobody_opens_a_tunnel_from_here(monkeypatch: pytest.MonkeyPatch) -> Non
         assert opened == []
     finally:
         serving.stop(server)
+
+
+def test_an_interrupt_that_is_swallowed_ends_it_all_the_same() -> None:
+    """NumPy swallows a Ctrl-C that falls into a comparison."""
+    ran: list[int] = []
+    stop: list[int] = []
+
+    class Turning(Live):
+        def __init__(self) -> None:
+            self._clock = time.monotonic
+
+        def turn(self) -> None:
+            ran.append(1)
+            with suppress(KeyboardInterrupt):
+                stop.append(signal.SIGINT)
+                raise KeyboardInterrupt
+
+    Turning().run(None, stop)
+    assert len(ran) == 1

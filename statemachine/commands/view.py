@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import socket
 import sys
+import threading
 from contextlib import suppress
 from typing import Any
 
@@ -88,6 +90,19 @@ def _simulate(options: argparse.Namespace, port: int) -> int:
     return 0
 
 
+def _interrupts() -> list[int]:
+    """A list that each Ctrl-C is noted in: NumPy swallows one that falls into a comparison."""
+    noted: list[int] = []
+
+    def note(number: int, frame: Any) -> None:
+        noted.append(number)
+        signal.default_int_handler(number, frame)
+
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, note)
+    return noted
+
+
 def _play(options: argparse.Namespace, port: int) -> int:
     """One recording or two."""
     from ..backends import load
@@ -148,7 +163,7 @@ def _serve(
         _announce(options, server.get_port(), door.token, what, drawing)
         if not options.paused:
             session.apply(Play())
-        Live(session, front, options.speed).run(options.seconds)
+        Live(session, front, options.speed).run(options.seconds, _interrupts())
     except KeyboardInterrupt:
         if sys.stdout.isatty():
             print()  # after the terminal's ^C

@@ -100,10 +100,10 @@ class Live:
         """Simulated seconds that are wanted in a second of the clock."""
         return self._pacer.speed
 
-    def run(self, seconds: float | None = None) -> None:
-        """Turn until interrupted, or for so many seconds of the clock."""
+    def run(self, seconds: float | None = None, stop: Sequence[object] = ()) -> None:
+        """Turn until interrupted, until `stop` has an entry, or for some seconds of the clock."""
         end = None if seconds is None else self._clock() + seconds
-        while end is None or self._clock() < end:
+        while not stop and (end is None or self._clock() < end):
             self.turn()
 
     def turn(self) -> None:
