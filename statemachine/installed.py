@@ -14,6 +14,7 @@ import sys
 from contextlib import suppress
 from dataclasses import dataclass
 from types import ModuleType
+from typing import Any
 
 from .errors import MissingEngineError, unknown_name
 from .silence import silence
@@ -166,6 +167,27 @@ def require(name: str) -> ModuleType:
             engine=name,
         )
     return module
+
+
+def require_extra(module: str, what: str, package: str, extra: str) -> Any:
+    """A module of a package that an extra brings.
+
+    Args:
+        module: Its full name.
+        what: What needs it: "a sweep".
+        package: What it is called: "SciPy".
+        extra: Of this library.
+
+    Raises:
+        MissingEngineError: It is not installed; the message names the extra.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise MissingEngineError(
+            f"{what} needs {package}: pip install 'statemachine-sim[{extra}]'",
+            engine=module.partition(".")[0],
+        ) from error
 
 
 def available() -> tuple[list[str], list[MissingEngineError]]:

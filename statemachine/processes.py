@@ -8,6 +8,9 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
+# The environment of several processes that run at once, each on one processor.
+ALONE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+
 
 def fresh_python(module: str, *arguments: str) -> tuple[list[str], dict[str, str]]:
     """Command and environment that run a module in a fresh Python, which finds what this one does.

@@ -24,7 +24,7 @@ _POWERS = 8  # that a log axis names, at most
 Drawn = Traces | Slots | Pipeline | HeatMap | Bars
 _DOTS = 150  # a PNG has to an inch
 # The same figures give the same bytes: no date, no version.
-_METADATA: dict[str, dict[str, Any]] = {
+METADATA: dict[str, dict[str, Any]] = {
     "svg": {"Date": None},
     "png": {"Software": None},
     "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
@@ -88,7 +88,7 @@ def drawn(pictures: Sequence[Drawn], form: str) -> bytes:
             if heights[1:]:
                 axes.set_title(picture.title, fontsize="medium", loc="left")
         out = io.BytesIO()
-        figure.savefig(out, format=form, dpi=_DOTS, bbox_inches="tight", metadata=_METADATA[form])
+        figure.savefig(out, format=form, dpi=_DOTS, bbox_inches="tight", metadata=METADATA[form])
     return out.getvalue()
 
 

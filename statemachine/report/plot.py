@@ -11,15 +11,11 @@ from ..errors import BadInputError, MissingEngineError
 from ..traces import Trace
 from ..traces.whole import replace_file
 from . import plot_panels
+from .figures import METADATA
 from .plot_panels import Plot
 
 SUFFIXES = (".svg", ".png", ".pdf")
-# The same figures give the same bytes: no date, no random names, no settings of the user's.
-_METADATA: dict[str, dict[str, Any]] = {
-    "svg": {"Date": None},
-    "png": {"Software": None},
-    "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
-}
+# The same figures give the same bytes: no random names, no settings of the user's.
 _SETTINGS = {
     "svg.fonttype": "none",  # text stays text: small, and found by a search
     "svg.hashsalt": "statemachine",
@@ -79,7 +75,7 @@ def drawn(figure: Plot, form: str) -> bytes:
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_SETTINGS)
         out = io.BytesIO()
-        draw(figure).savefig(out, format=form, dpi=_DOTS, metadata=_METADATA[form])
+        draw(figure).savefig(out, format=form, dpi=_DOTS, metadata=METADATA[form])
     return out.getvalue()
 
 

@@ -115,10 +115,7 @@ def _floor(found: SweepReport) -> str:
     if floor is None:
         return f"The chaos floor is not known: {found.no_floor}."
     widths = [each.floor for each in found.settings if each.floor is not None]
-    inside = sum(
-        each.median is not None and each.floor is not None and each.median <= each.floor
-        for each in found.settings
-    )
+    inside = sum(each.inside_floor for each in found.settings)
     where = "each setting" if floor.settings == len(found.settings) else (
         f"{floor.settings} of {len(found.settings)} settings (the others have that of the nearest "
         "one)"

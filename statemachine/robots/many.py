@@ -20,7 +20,7 @@ from ..grading import sandbox
 from ..grading.parallel import checked_jobs, in_parallel
 from ..grading.unwinding import unwinding
 from ..installed import DEFAULT, ENGINES, engine_version, require
-from ..processes import fresh_python
+from ..processes import ALONE, fresh_python
 from ..scenarios.runs import Progress, silent
 from . import table as tables
 from .files import ModelFile
@@ -29,7 +29,6 @@ from .records import ExaminedModel, Survey
 
 SECONDS = 60.0  # for a model
 _MEMORY = 8 * sandbox.GB  # address space, of which engines reserve far more than they use
-_ALONE = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")  # several processes run at once
 
 
 def examine_all(
@@ -145,7 +144,7 @@ def _examined(
             cpu=4 * seconds + 60,
             wall=seconds,
             cwd=folder,  # engines leave logs where they run
-            env={**environment, **dict.fromkeys(_ALONE, "1")},
+            env={**environment, **ALONE},
             memory_most=_MEMORY,
             stop=stop,
         )

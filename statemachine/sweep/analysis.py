@@ -57,6 +57,11 @@ class SettingGap:
     floor: float | None
     verdict: SettingVerdict
 
+    @property
+    def inside_floor(self) -> bool:
+        """Whether there is a gap, and it is inside the chaos floor."""
+        return self.median is not None and self.floor is not None and self.median <= self.floor
+
 
 @dataclass(frozen=True)
 class QuantityAgreement:
@@ -230,10 +235,7 @@ def sweep_report(
 
 def _only_rounding(settings: Sequence[SettingGap]) -> bool:
     known = [each for each in settings if each.median is not None]
-    return bool(known) and all(
-        each.floor is not None and each.median is not None and each.median <= each.floor
-        for each in known
-    )
+    return bool(known) and all(each.inside_floor for each in known)
 
 
 def _sides(there: Sequence[str], asked: Sequence[str]) -> tuple[str, str]:

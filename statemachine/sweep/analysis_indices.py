@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..errors import MissingEngineError
+from ..installed import require_extra
 from ..interface import Array
 from .analysis_gaps import median
 from .design import Design, DesignPoint
@@ -66,13 +65,7 @@ def require_stats() -> Any:
     Raises:
         MissingEngineError: SciPy is not installed; the message names the extra.
     """
-    try:
-        return importlib.import_module("scipy.stats")
-    except ImportError as error:
-        raise MissingEngineError(
-            "a report of a sweep needs SciPy: pip install 'statemachine-sim[sweep]'",
-            engine="scipy",
-        ) from error
+    return require_extra("scipy.stats", "a report of a sweep", "SciPy", "sweep")
 
 
 def sensitivity(

@@ -13,14 +13,15 @@ from contextlib import contextmanager, suppress
 from itertools import islice
 from typing import Any
 
-from ..errors import MissingEngineError, WorkerEndedError
+from ..errors import WorkerEndedError
+from ..installed import require_extra
+from ..processes import ALONE
 from .cell import CellRules, SweepCell, timed_out
 from .worker import Row, failed_row, run_batch
 
 Batch = Sequence[SweepCell]
 Results = Generator[list[Row], None, None]
 _GRACE = 30.0  # seconds beyond what a batch may take; its process ends itself before
-ALONE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # several processes run at once
 _TRACKERS = (
     "multiprocessing.resource_tracker",
     "joblib.externals.loky.backend.resource_tracker",
@@ -33,12 +34,7 @@ def require_joblib() -> Any:
     Raises:
         MissingEngineError: It is not installed; the message names the extra.
     """
-    try:
-        return importlib.import_module("joblib")
-    except ImportError as error:
-        raise MissingEngineError(
-            "a sweep needs joblib: pip install 'statemachine-sim[sweep]'", engine="joblib"
-        ) from error
+    return require_extra("joblib", "a sweep", "joblib", "sweep")
 
 
 @contextmanager

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import importlib
 import inspect
 import itertools
 import json
@@ -14,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInputError, MissingEngineError
+from ..errors import BadInputError
+from ..installed import require_extra
 from ..interface import Array
 from .factors import Value, Vary, is_number
 
@@ -141,12 +141,7 @@ def require_qmc() -> Any:
     Raises:
         MissingEngineError: SciPy is not installed; the message names the extra.
     """
-    try:
-        return importlib.import_module("scipy.stats.qmc")
-    except ImportError as error:
-        raise MissingEngineError(
-            "sampling a range needs SciPy: pip install 'statemachine-sim[sweep]'", engine="scipy"
-        ) from error
+    return require_extra("scipy.stats.qmc", "sampling a range", "SciPy", "sweep")
 
 
 def digest(content: object) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import itertools
 import math
 import os
@@ -16,9 +15,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInputError, MissingEngineError, StateMachineError
+from ..errors import BadInputError, StateMachineError
 from ..grading.parallel import checked_jobs
 from ..grading.unwinding import unwinding
+from ..installed import require_extra
 from ..scenarios.runs import Progress, silent
 from .apart import Batch, Results, apart, deaf, require_joblib
 from .cell import DONE, CellRules
@@ -254,12 +254,7 @@ def _connected(address: str, rules: CellRules) -> Iterator[Any]:
         MissingEngineError: The package distributed is not installed; the message names the extra.
         BadInputError: Nobody answers, there is no worker, or one has other versions or files.
     """
-    try:
-        distributed = importlib.import_module("distributed")
-    except ImportError as error:
-        raise MissingEngineError(
-            "--scheduler needs Dask: pip install 'statemachine-sim[cluster]'", engine="distributed"
-        ) from error
+    distributed = require_extra("distributed", "--scheduler", "Dask", "cluster")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:

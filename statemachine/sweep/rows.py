@@ -9,7 +9,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInputError, MissingEngineError
+from ..errors import BadInputError
+from ..installed import require_extra
 from ..traces.whole import replace_file
 from .factors import Vary
 
@@ -59,12 +60,9 @@ def require_parquet() -> tuple[Any, Any]:
     Raises:
         MissingEngineError: It is not installed; the message names the extra.
     """
-    try:
-        return importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
-    except ImportError as error:
-        raise MissingEngineError(
-            "a sweep needs pyarrow: pip install 'statemachine-sim[sweep]'", engine="pyarrow"
-        ) from error
+    names = ("pyarrow", "pyarrow.parquet")
+    arrow, parquet = (require_extra(name, "a sweep", "pyarrow", "sweep") for name in names)
+    return arrow, parquet
 
 
 def schema_of(factors: Sequence[Vary], provenance: Mapping[str, Any]) -> Any:

@@ -56,14 +56,21 @@ def run_batch(rules: CellRules, cells: Sequence[SweepCell], own: bool) -> list[R
 def failed_row(cell: SweepCell, error: Exception) -> Row:
     """The row of a cell that gave none."""
     return {
+        **_named(cell),
+        "status": FAILED,
+        "error_class": type(error).__name__,
+        "error": " ".join(str(error).split()) or type(error).__name__,
+    }
+
+
+def _named(cell: SweepCell) -> Row:
+    """What every row of a cell has."""
+    return {
         "cell": cell.id,
         "point": cell.point,
         "seed": cell.seed,
         "backend": cell.backend,
         "values": cell.values,
-        "status": FAILED,
-        "error_class": type(error).__name__,
-        "error": " ".join(str(error).split()) or type(error).__name__,
         "library_version": __version__,
     }
 
@@ -79,20 +86,12 @@ def _row(rules: CellRules, cell: SweepCell, own: bool) -> Row:
             model, options, doing = _model(rules, cell, rules.scenario_of(cell), row)
         with _limited(rules.timeout, own):
             run_cell(rules, cell, model, options, doing, row)
-        told: Row = {"status": DONE}
+        told: Row = {**_named(cell), "status": DONE}
     except _OutOfTimeError:
         told = failed_row(cell, timed_out(rules.timeout))
     except Exception as error:  # of any kind: it belongs into the row
         told = failed_row(cell, error)
-    plain = {
-        "cell": cell.id,
-        "point": cell.point,
-        "seed": cell.seed,
-        "backend": cell.backend,
-        "values": cell.values,
-        "library_version": __version__,
-    }
-    return {**plain, **row, **told, "wall_seconds": time.perf_counter() - began}
+    return {**row, **told, "wall_seconds": time.perf_counter() - began}
 
 
 def digest_of(function: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -100,7 +101,7 @@ def forward(worlds: Worlds, *, ids: ArrayLike | None = None) -> None:
         BusyDataError, ClosedDataError: As in `step`.
     """
     _admit(worlds)
-    _run(worlds, _forward, worlds, _chosen(worlds, ids))
+    _run(worlds, partial(_forward, worlds), _chosen(worlds, ids))
 
 
 def _forward(worlds: Worlds, ids: Ints) -> Mapping[int, Exception]:
@@ -222,17 +223,17 @@ def record(
     return arrays
 
 
-def _run(worlds: Worlds, call: Any, *args: Any) -> None:
+def _run(worlds: Worlds, call: Any, ids: Ints, *args: Any) -> None:
     """Call a hook, and tell of the worlds that are left out from now on."""
-    errors = alone(worlds, _kept, worlds, call, args)
+    errors = alone(worlds, _kept, worlds, call, ids, args)
     if errors:
         warnings.warn(_told(worlds, errors), DivergedWarning, stacklevel=3)
 
 
-def _kept(worlds: Worlds, call: Any, args: tuple[Any, ...]) -> Mapping[int, Exception]:
+def _kept(worlds: Worlds, call: Any, ids: Ints, args: tuple[Any, ...]) -> Mapping[int, Exception]:
     worlds._check_writable()
-    worlds._check_time(args[1] if call is _forward else args[0])
-    errors = call(*args)
+    worlds._check_time(ids)
+    errors = call(ids, *args)
     if errors:
         worlds._errors.update(errors)
     return errors
