@@ -442,7 +442,7 @@ def test_a_real_sweep_is_answered(tmp_path: Path) -> None:
 
     own = load("so101/scene", backend="mujoco").dof_damping
     sweep = Sweep(
-        "hold", vary=("damping=0.6x:1.4x:5",), backends=SIDES, seeds=2, seconds=0.2,
+        "hold", vary=("damping=0.6x:1.4x:5",), backends=SIDES, seeds=2, seconds=0.4,
         spread=("0.5deg",),
     )  # fmt: skip
     run_sweep(sweep, tmp_path / "s", jobs=1)
