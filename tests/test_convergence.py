@@ -109,6 +109,7 @@ def test_a_run_that_ends_early_is_no_limit(tmp_path: Path) -> None:
         convergence(run)
 
 
+@pytest.mark.slow
 def test_the_command_line_answers_both_questions(cli: Cli) -> None:
     need_engine("pybullet")
     asked = ("compare", "fall", "--seconds", "0.3")

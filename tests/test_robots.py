@@ -167,6 +167,7 @@ def _empty(folder: Path) -> Path:
     return folder / "empty"
 
 
+@pytest.mark.slow
 def test_a_table_of_all_that_can_go_wrong(folder: Path, sabotage: Path, tmp_path: Path) -> None:
     need_engine("pybullet")
     for name in ("crash", "hang", "memory"):
