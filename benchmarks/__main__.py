@@ -18,7 +18,10 @@ import numpy as np
 import statemachine as sm
 from benchmarks.interleave import Ratio, interleaved
 from statemachine import __version__
+from statemachine.compare.why import explain
+from statemachine.compare.why.causes import built
 from statemachine.processes import resident_memory
+from statemachine.scenarios import scenario
 from statemachine.scenarios.runs import silent
 from statemachine.traces import recorder
 from statemachine.worlds import make_worlds
@@ -414,6 +417,26 @@ def environments(name: str, rounds: int) -> list[Ratio]:
     return ratios
 
 
+def why_in_forks(name: str, rounds: int) -> list[Ratio]:
+    """22 differences explained in two processes, against one: `compare --why --jobs 2`."""
+    left = sm.load(name)
+    edits = [("body_mass", (k,), left.compiled.body_mass[k] * 1.05) for k in range(1, 5)]
+    for field in ("dof_damping", "dof_armature", "dof_frictionloss"):
+        values = getattr(left.compiled, field)
+        edits += [(field, (k,), values[k] * 1.1 + 1e-3) for k in range(6)]
+    right = built(left, tuple(edits))
+    hold = scenario("hold")
+
+    def explained(jobs: int) -> None:
+        explain(left, right, hold, seconds=1.0, budget=20, finer=True, jobs=jobs)
+
+    return interleaved(
+        partial(explained, 1),
+        {f"22 differences, 2 processes, {name}": partial(explained, 2)},
+        rounds // 100 + 1,
+    )
+
+
 # What DESIGN asks of each: at most this, measured on a quiet machine.
 BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None]] = [
     (step, "so101", 1.025),
@@ -435,6 +458,7 @@ BUDGET: list[tuple[Callable[[str, int], list[Ratio]], str, float | None]] = [
     (worlds_on_two, "so101/scene_box", 1 / 1.9),
     (environments, "statemachine/Reach-v0", None),
     (environments, "statemachine/HeldBox-v0", None),
+    (why_in_forks, "so101", None),
 ]
 
 

@@ -1,4 +1,4 @@
-"""Fresh processes of Python, and how much memory is left for them."""
+"""Fresh processes of Python, how many at once, and how much memory is left for them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+
+from .errors import BadInputError
 
 # The environment of several processes that run at once, each on one processor.
 ALONE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
@@ -23,6 +25,19 @@ def fresh_python(module: str, *arguments: str) -> tuple[list[str], dict[str, str
     paths = [os.fspath(package), *(path or os.getcwd() for path in sys.path)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(dict.fromkeys(paths))}
     return [sys.executable, "-P", "-m", module, *arguments], environment
+
+
+def checked_jobs(jobs: int | None, processors: int = 1) -> int:
+    """How many at once: as asked for, or one for so many processors.
+
+    Raises:
+        BadInputError: It is less than 1.
+    """
+    if jobs is None:
+        return max(1, (os.cpu_count() or 1) // processors)
+    if jobs < 1:
+        raise BadInputError(f"jobs must be at least 1; got {jobs}")
+    return jobs
 
 
 def free_memory() -> int | None:

@@ -159,7 +159,7 @@ def test_the_ruler_of_causes_has_a_floor_too(tmp_path: Path) -> None:
     ruler = Ruler(run.model, trace, trace)
     curves = ruler.curves(trace)
     assert curves is not None
-    floor = ruler.floor(curves, perturbed_runs(run, derive=False))
+    floor = ruler.floor(curves, map(ruler.curves, perturbed_runs(run, derive=False)))
     assert 0 < floor["joints"].worst < 1e-9
     assert floor["joints"].unit == "rad"
 

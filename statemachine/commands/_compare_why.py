@@ -9,6 +9,8 @@ from typing import Any
 from ..errors import BadInputError
 from ._common import PROGRAM, complain, show
 
+_OF_SIDES = ("measure", "finer", "budget", "jobs")
+
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Those of --why."""
@@ -35,6 +37,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="how many sets of causes may be run where they interact (200)",
     )
+    group.add_argument(
+        "--jobs", type=int, default=None, metavar="N", help="processes here (one a processor)"
+    )
 
 
 def check(options: argparse.Namespace) -> None:
@@ -45,8 +50,8 @@ def check(options: argparse.Namespace) -> None:
     """
     if options.quantity and not (options.why or options.html):
         raise BadInputError("--quantity belongs to --why")
-    for name in ("measure", "finer", "budget"):
-        if getattr(options, name) and not options.why:
+    for name in _OF_SIDES:
+        if getattr(options, name) not in (None, False) and not options.why:
             raise BadInputError(f"--{name} belongs to --why")
     if options.budget is not None and options.budget < 1:
         raise BadInputError(f"--budget wants a number of runs, at least 1; got {options.budget}")
@@ -72,8 +77,8 @@ def run(options: argparse.Namespace, request: Any) -> int:
         with progress("why") as told:
             result = of_sides(options, request, told)
         return show(explained.page(result), result, options.json)
-    for name in ("measure", "finer", "budget"):
-        if getattr(options, name):
+    for name in _OF_SIDES:
+        if getattr(options, name) not in (None, False):
             raise BadInputError(
                 f"--{name} is of two sides: {PROGRAM} compare {request.what[0]} LEFT RIGHT --why"
             )
@@ -123,6 +128,7 @@ def of_sides(options: argparse.Namespace, request: Any, progress: Any) -> Any:
         budget=200 if options.budget is None else options.budget,
         labels=None if labels[0] == labels[1] else labels,
         uncertain=uncertain_of(options),
+        jobs=options.jobs,
         progress=progress,
     )
 

@@ -177,19 +177,39 @@ def perturbed_runs(
     """
     if runs < 1:
         raise BadInputError(f"the chaos floor wants at least one run; got {runs}")
-    if seed < 0:
-        raise BadInputError(f"seed must not be negative; got {seed}")
     for k in range(runs):
-        draw = np.random.default_rng([seed, k])
-        qpos, qvel = rerun.start()
-        qpos = _displaced(rerun.model, qpos, uncertain, np.random.default_rng([seed, k // 2]), k)
-        yield rerun.record(
-            controller=_nudged_controller(rerun.controller(rerun.model), draw),
-            qpos=nudged_pose(rerun.model, qpos, draw),
-            qvel=_nudged(qvel, draw),
+        yield perturbed_run(
+            rerun,
+            k,
+            seed=seed,
+            uncertain=uncertain,
             derive=derive,
             progress=part_of(progress, k / runs, 1 / runs),
         )
+
+
+def perturbed_run(
+    rerun: Rerun,
+    k: int,
+    *,
+    seed: int = 0,
+    uncertain: Uncertainty = EXACT,
+    derive: bool = True,
+    progress: Progress = silent,
+) -> Trace:
+    """The run with the number `k` of `perturbed_runs`, which depends on no other."""
+    if seed < 0:
+        raise BadInputError(f"seed must not be negative; got {seed}")
+    draw = np.random.default_rng([seed, k])
+    qpos, qvel = rerun.start()
+    qpos = _displaced(rerun.model, qpos, uncertain, np.random.default_rng([seed, k // 2]), k)
+    return rerun.record(
+        controller=_nudged_controller(rerun.controller(rerun.model), draw),
+        qpos=nudged_pose(rerun.model, qpos, draw),
+        qvel=_nudged(qvel, draw),
+        derive=derive,
+        progress=progress,
+    )
 
 
 def _displaced(

@@ -11,10 +11,11 @@ from functools import cache, partial
 from pathlib import Path
 
 from ..errors import BadInputError
+from ..processes import checked_jobs
 from .class_table import ClassEntry, read, write
 from .exercise import LARGEST, TIME_LIMIT, ExerciseJudge, Grade
 from .judges import JUDGES
-from .parallel import checked_jobs, in_parallel
+from .parallel import in_parallel
 
 _NAMES = ("step_loop.py", "test_arm.py")  # of the exercise's own files
 

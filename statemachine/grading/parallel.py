@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from typing import TypeVar
-
-from ..errors import BadInputError
 
 T = TypeVar("T")
 
@@ -38,16 +35,3 @@ def in_parallel(
         finally:
             stop()
             pool.shutdown(wait=False, cancel_futures=True)
-
-
-def checked_jobs(jobs: int | None, processors: int = 1) -> int:
-    """How many at once: as asked for, or one for so many processors.
-
-    Raises:
-        BadInputError: It is less than 1.
-    """
-    if jobs is None:
-        return max(1, (os.cpu_count() or 1) // processors)
-    if jobs < 1:
-        raise BadInputError(f"jobs must be at least 1; got {jobs}")
-    return jobs

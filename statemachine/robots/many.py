@@ -17,10 +17,10 @@ from pathlib import Path
 from .. import __version__
 from ..errors import BadInputError, MissingEngineError
 from ..grading import sandbox
-from ..grading.parallel import checked_jobs, in_parallel
+from ..grading.parallel import in_parallel
 from ..grading.unwinding import unwinding
 from ..installed import DEFAULT, ENGINES, engine_version, require
-from ..processes import ALONE, fresh_python
+from ..processes import ALONE, checked_jobs, fresh_python
 from ..scenarios.runs import Progress, silent
 from . import table as tables
 from .files import ModelFile

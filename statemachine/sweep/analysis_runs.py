@@ -11,8 +11,8 @@ import numpy as np
 
 from ..backends import load
 from ..errors import StateMachineError
-from ..grading.parallel import checked_jobs
 from ..interface import Ints, JointType, Model, forward, make_data, reset
+from ..processes import checked_jobs
 from ..scenarios.runs import Progress, silent
 from ..traces.controllers import is_function
 from .analysis_gaps import SweepRuns, runs_of

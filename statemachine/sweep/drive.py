@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError, StateMachineError
-from ..grading.parallel import checked_jobs
 from ..grading.unwinding import unwinding
 from ..installed import require_extra
+from ..processes import checked_jobs
 from ..scenarios.runs import Progress, silent
 from .apart import Batch, Results, apart, deaf, require_joblib
 from .cell import DONE, CellRules

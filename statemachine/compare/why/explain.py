@@ -133,6 +133,7 @@ def explain(
     budget: int = 200,
     labels: tuple[str, str] | None = None,
     uncertain: Uncertainty | None = EXACT,
+    jobs: int | None = None,
     progress: Progress = silent,
 ) -> Explanation:
     """Bring what two sides differ in to the same, one by one, and run both again.
@@ -150,11 +151,13 @@ def explain(
         budget: How many sets of causes may be run, as far as orders are drawn.
         labels: What the sides are called.
         uncertain: What is not known of the start, for the chaos floor; None for no floor.
+        jobs: How many processes make the runs; None for one a processor where that pays. Where
+            the system has no forks the runs are made in this process. The figures are the same.
         progress: Told the fraction that is done.
 
     Raises:
         EndedEarlyError: As they come, a side does not reach the end.
-        BadInputError: Nothing can be measured.
+        BadInputError: Nothing can be measured, or `jobs` is less than 1.
         UnknownNameError: There is no such quantity, or name.
     """
     began, scenario = time.perf_counter(), scenario.on(one)
@@ -170,6 +173,7 @@ def explain(
         scenario.seconds if seconds is None else seconds,
         seed,
         known.one_more,
+        jobs,
     )
     units = trials.ruler.units
     if quantity is not None and quantity not in units:
@@ -203,7 +207,9 @@ def explain(
         floor = _figure(trials.floor(uncertain)[quantity], measure)
     nothing = gap <= max(negligible, floor)
     known.expected = 3 * len(able) + 2
-    found = shapley([] if nothing else able, value, gap or 1.0, budget=budget, seed=seed)
+    found = shapley(
+        [] if nothing else able, value, gap or 1.0, budget=budget, seed=seed, ahead=trials.ahead
+    )
     brought = gap if nothing else value(frozenset(able))
     engines = None
     if not nothing and not _alike(*models):

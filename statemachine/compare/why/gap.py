@@ -251,19 +251,19 @@ class Ruler:
         """In every quantity."""
         return {name: self.gap(name, one, two) for name in self.units}
 
-    def floor(self, run: Curves, perturbed: Iterable[Trace]) -> dict[str, Deviation]:
+    def floor(self, run: Curves, perturbed: Iterable[Curves | None]) -> dict[str, Deviation]:
         """The chaos floor of every quantity: a gap that is no larger says nothing.
 
         Args:
             run: The side as it comes.
-            perturbed: The same side from `perturbed_runs`. One that ends early leaves no bound.
+            perturbed: The same side from `perturbed_runs`; None, which leaves no bound, for a run
+                that ended early.
 
         Returns:
             Of each figure the largest that a perturbed run has to `run`.
         """
         found = {name: Deviation(unit, 0.0, 0.0, 0.0, 0.0) for name, unit in self.units.items()}
-        for trace in perturbed:
-            curves = self.curves(trace)
+        for curves in perturbed:
             for name, most in found.items():
                 gap = (
                     Deviation(most.unit, np.inf, 0.0, np.inf, np.inf)

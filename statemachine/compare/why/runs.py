@@ -73,7 +73,7 @@ class Runs:
             scenario.keyframe,
         )
         runs = perturbed_runs(rerun, seed=self._seed, uncertain=uncertain, derive=False)
-        return self.ruler.floor(first, runs)
+        return self.ruler.floor(first, map(self.ruler.curves, runs))
 
     def done(self) -> None:
         """Say that all is done."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -18,6 +18,7 @@ import numpy as np
 
 Method = Literal["nothing", "one at a time", "all sets", "drawn orders"]
 Value = Callable[[frozenset[str]], float | None]
+Ahead = Callable[[Iterable[frozenset[str]]], None]
 
 _ADDS_UP = 0.01  # of the gap: causes that interact by less add up
 _DUMMY = 1e-7  # of the gap: a cause that takes away less, first and last, takes away nothing
@@ -50,8 +51,10 @@ class Shares:
 class _Game:
     """The gap with sets of causes brought to the same, as parts of the first gap."""
 
-    def __init__(self, causes: Sequence[str], value: Value, gap: float) -> None:
-        self.causes, self._value, self._gap = list(causes), value, gap
+    def __init__(
+        self, causes: Sequence[str], value: Value, gap: float, ahead: Ahead | None
+    ) -> None:
+        self.causes, self._value, self._gap, self._ahead = list(causes), value, gap, ahead
         self._known: dict[frozenset[str], float | None] = {frozenset(): 1.0}
         self.evaluated = 0
 
@@ -61,6 +64,11 @@ class _Game:
             found = self._value(brought)
             self._known[brought] = None if found is None else found / self._gap
         return self._known[brought]
+
+    def expect(self, wanted: Iterable[frozenset[str]]) -> None:
+        """Say which sets are evaluated next."""
+        if self._ahead is not None:
+            self._ahead(brought for brought in wanted if brought not in self._known)
 
     def takes(self, cause: str, before: frozenset[str]) -> float | None:
         """What a cause takes away after others."""
@@ -73,7 +81,13 @@ class _Game:
 
 
 def shapley(
-    causes: Sequence[str], value: Value, gap: float, *, budget: int = 200, seed: int = 0
+    causes: Sequence[str],
+    value: Value,
+    gap: float,
+    *,
+    budget: int = 200,
+    seed: int = 0,
+    ahead: Ahead | None = None,
 ) -> Shares:
     """Divide a gap among its causes.
 
@@ -83,8 +97,12 @@ def shapley(
         gap: That of the empty set, above zero.
         budget: How many sets may be evaluated, as far as orders are drawn.
         seed: Of the orders.
+        ahead: Told which sets are evaluated next, where that is known of several.
     """
-    game, everything = _Game(causes, value, gap), frozenset(causes)
+    game, everything = _Game(causes, value, gap, ahead), frozenset(causes)
+    if causes:
+        ones = [frozenset({cause}) for cause in causes]
+        game.expect([*ones, *(everything - one for one in ones), everything])
     alone = {cause: game.takes(cause, frozenset()) for cause in causes}
     last = {cause: game.takes(cause, everything - {cause}) for cause in causes}
     share: dict[str, float | None] = dict.fromkeys(causes, 0.0)
@@ -97,6 +115,8 @@ def shapley(
         share |= {c: (_known(alone[c]) + _known(last[c])) / 2 for c in active}
     elif active and len(active) <= _ALL_SETS:
         method = "all sets"
+        sizes = range(len(active) + 1)
+        game.expect(frozenset(s) for n in sizes for s in itertools.combinations(active, n))
         share |= {c: _exact(game, c, active) for c in active}
     elif active:
         method = "drawn orders"
@@ -155,6 +175,8 @@ def _drawn(
     start, failed = game.evaluated, 0
     while failed < 10:
         order = [active[int(k)] for k in random.permutation(len(active))]
+        orders = order, order[::-1]
+        game.expect(frozenset(each[:n]) for each in orders for n in range(len(each) + 1))
         there, back = _along(game, order), _along(game, order[::-1])
         if there is None or back is None:
             failed += 1

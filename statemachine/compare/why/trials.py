@@ -1,12 +1,15 @@
 """Runs of two sides with some of their differences brought to the same, each made once.
 
-They are made one after the other. Threads are no faster, since the loop of a run is Python's: six
-runs took 1.1 times as long on two. Processes would want controllers that can be pickled.
+Runs that are wanted together are shared among forks of this process. Threads are no faster, since
+the loop of a run is Python's: six runs took 1.1 times as long on two.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -17,16 +20,34 @@ from ...errors import DivergedError, EngineError, ModelError, UnsupportedError
 from ...installed import DEFAULT
 from ...interface import Array, Model
 from ...scenarios import Controller, Scenario
-from ...traces import Trace, record
+from ...traces import Trace
 from ..alike import beginning_with, retold
+from ..forks import forks_for, in_forks
 from ..matching import Matched, start_of
-from ..perturbed import Rerun, Uncertainty, perturbed_runs
+from ..perturbed import RUNS, Rerun, Uncertainty, perturbed_run
 from .causes import Cause, built
 from .gap import Curves, Deviation, Ruler
 
 Measure = Literal["worst", "end", "rms"]
+_Run = tuple[int, frozenset[str]]  # a side, and the causes that change it
 START, ORDER = "start", "order of ctrl"
 _SAME = 1e-12
+_LOST = "its process ended before it was done, twice"
+
+
+@dataclass(frozen=True, eq=False)
+class _Outcome:
+    """What became of a run.
+
+    Attributes:
+        curves: None if it could not be made or did not stand.
+        reason: Why not.
+        ran: Whether it was begun.
+    """
+
+    curves: Curves | None
+    reason: str = ""
+    ran: bool = True
 
 
 class Trials:
@@ -40,6 +61,10 @@ class Trials:
         seconds: Simulated time.
         seed: Of what the scenario draws.
         ran: Called after each run.
+        jobs: How many runs are made at once; None for one a processor where that pays.
+
+    Raises:
+        BadInputError: `jobs` is less than 1.
     """
 
     def __init__(
@@ -51,8 +76,10 @@ class Trials:
         seconds: float,
         seed: int,
         ran: Callable[[], None],
+        jobs: int | None = None,
     ) -> None:
-        self._models, self._matched = (one, two), matched
+        forks_for(1, 0.0, jobs)  # refuses what is no number of them
+        self._models, self._matched, self._jobs = (one, two), matched, jobs
         self.seconds, self.seed, self._ran = seconds, seed, ran
         self._scenario = scenario
         key, left = scenario.keyframe, start_of(one, scenario.keyframe)
@@ -61,16 +88,20 @@ class Trials:
         self._keyframes = key, key if known else None
         right = start_of(two, self._keyframes[1])
         self._starts = left, right if known else matched.start(left, right)
-        self.count, self.ended = 0, ""
-        self._runs: dict[tuple[int, frozenset[str]], Curves | None] = {}
-        self._reasons: dict[tuple[int, frozenset[str]], str] = {}
+        self.count, self.ended = 2, ""
+        self._runs: dict[_Run, _Outcome] = {}  # those that were asked for
+        self._ahead: dict[_Run, _Outcome] = {}  # those that will be
         self._by_name: dict[str, Cause] = {}
+        began = time.perf_counter()
         traces = [self._trace(k, self._models[k], frozenset()) for k in (0, 1)]
         self.traces: tuple[Trace, Trace] = traces[0], traces[1]
         self.ruler = Ruler(one, traces[0], traces[1], matched)
         for k, trace in enumerate(traces):
-            self._runs[k, frozenset()] = self._curves(k, self._models[k], trace)
+            curves = self._curves(k, self._models[k], trace)
+            self._runs[k, frozenset()] = _Outcome(curves)
             self.ended = self.ended or trace.header.ended
+            ran()
+        self._took = (time.perf_counter() - began) / 2
 
     def of_the_run(self) -> tuple[ModelDifference, ...]:
         """What of the run itself differs: where it starts, and what is commanded."""
@@ -155,20 +186,43 @@ class Trials:
         one, two = self.curves(0, names), self.curves(1, names)
         return self.ruler.gaps(one, two) if one and two else {}
 
+    def ahead(self, wanted: Iterable[frozenset[str]]) -> None:
+        """Make the runs now that `gaps` of some sets of causes will want, several at once."""
+        keys = dict.fromkeys(
+            (side, self._acting(side, brought)) for brought in wanted for side in (0, 1)
+        )
+        new = [key for key in keys if key not in self._runs and key not in self._ahead]
+        jobs = forks_for(len(new), self._took, self._jobs)
+        if jobs == 1:
+            return
+        outcomes = in_forks([partial(self._outcome, *key) for key in new], jobs, self._ran)
+        for key, outcome in zip(new, outcomes, strict=True):
+            self._ahead[key] = outcome or _Outcome(None, _LOST)
+
     def curves(self, side: int, brought: frozenset[str]) -> Curves | None:
         """A run of one side; None, with a reason in `ended`, if it cannot be or did not stand."""
         key = side, self._acting(side, brought)
         if key not in self._runs:
-            try:
-                model = self.model(side, key[1])
-                trace = self._trace(side, model, key[1])
-                self._runs[key] = self._curves(side, model, trace)
-                self._reasons[key] = trace.header.ended or "it left every bound"
-            except (DivergedError, EngineError, ModelError, UnsupportedError) as error:
-                self._runs[key], self._reasons[key] = None, str(error)
-        if self._runs[key] is None:
-            self.ended = self._reasons.get(key, self.ended)
-        return self._runs[key]
+            if key not in self._ahead:
+                self._ahead[key] = self._outcome(*key)
+                self._ran()
+            self._runs[key] = self._ahead.pop(key)
+            self.count += self._runs[key].ran
+        found = self._runs[key]
+        if found.curves is None:
+            self.ended = found.reason or self.ended
+        return found.curves
+
+    def _outcome(self, side: int, brought: frozenset[str]) -> _Outcome:
+        ran = False
+        try:
+            model = self.model(side, brought)
+            ran = True
+            trace = self._trace(side, model, brought)
+            reason = trace.header.ended or "it left every bound"
+            return _Outcome(self._curves(side, model, trace), reason)
+        except (DivergedError, EngineError, ModelError, UnsupportedError) as error:
+            return _Outcome(None, str(error), ran)
 
     def model(self, side: int, brought: Iterable[str]) -> Model:
         """A side's Model with causes brought to the same."""
@@ -188,23 +242,22 @@ class Trials:
         return any(each.kind == "run" for each in self._by_name[name].differences)
 
     def _trace(self, side: int, model: Model, brought: frozenset[str]) -> Trace:
-        self.count += 1
-        self._ran()
+        return self._rerun(side, model, brought).record(derive=False)
+
+    def _rerun(self, side: int, model: Model, brought: frozenset[str]) -> Rerun:
         start = self._starts[side]
         qpos, qvel = start.qpos, start.qvel
         if START in brought:
             first = self._starts[0]
             qpos = self._matched.qpos(first.qpos, qpos)
             qvel = self._matched.qvel(first.qvel, qvel)
-        controller = self._controller(side, model, brought)
-        return record(
+        return Rerun(
             model,
-            controller,
+            lambda model: self._controller(side, model, brought),
             self.seconds,
             keyframe=self._keyframes[side],
             qpos=qpos,
             qvel=qvel,
-            derive=False,
         )
 
     def _controller(self, side: int, model: Model, brought: frozenset[str]) -> Controller:
@@ -224,16 +277,20 @@ class Trials:
 
     def floor(self, uncertain: Uncertainty) -> dict[str, Deviation]:
         """The chaos floor of each quantity: a gap that is no larger says nothing."""
-        first = self._runs[0, frozenset()]
+        first = self._runs[0, frozenset()].curves
         assert first is not None  # it has gaps
-        rerun = Rerun(
-            self._models[0],
-            lambda model: self._scenario.controller(model, self.seed),
-            self.seconds,
-            self._keyframes[0],
-        )
-        runs = perturbed_runs(rerun, seed=self.seed, uncertain=uncertain, derive=False)
-        return self.ruler.floor(first, runs)
+        rerun = self._rerun(0, self._models[0], frozenset())
+
+        def run(k: int) -> tuple[Curves | None]:
+            trace = perturbed_run(rerun, k, seed=self.seed, uncertain=uncertain, derive=False)
+            return (self.ruler.curves(trace),)
+
+        runs = [partial(run, k) for k in range(RUNS)]
+        jobs = forks_for(RUNS, self._took, self._jobs)
+        found = in_forks(runs, jobs, lambda: None) if jobs > 1 else [call() for call in runs]
+        if None in found:
+            raise EngineError(f"a run for the chaos floor could not be made: {_LOST}")
+        return self.ruler.floor(first, [each[0] for each in found if each])
 
     def _curves(self, side: int, model: Model, trace: Trace) -> Curves | None:
         return self.ruler.curves(trace, self._posed(model), side)

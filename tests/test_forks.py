@@ -1,0 +1,206 @@
+"""Runs of `compare --why` shared among forks: the same figures, and no fork that stays."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+import statemachine as sm
+from statemachine.cli import main
+from statemachine.compare.forks import forks_for, in_forks
+from statemachine.compare.why import Explanation
+from statemachine.errors import BadInputError
+from statemachine.report.as_json import dumps
+
+from .conftest import ROOT, need_engine
+from .explained import ALONE, ARM, SWING, changed, explained, write
+
+forks = pytest.mark.skipif(forks_for(2, 1.0, 2) == 1, reason="no forks here")
+FEW = ("mass", "gains", "gravity", "damping")
+
+
+def _apart(text: str, names: tuple[str, ...] = FEW) -> str:
+    return changed(text, *(ALONE[name] for name in names))
+
+
+def _figures(found: Explanation) -> str:
+    engines = found.engines and replace(found.engines, provenance=())
+    return dumps(replace(found, took=0.0, provenance=(), engines=engines))
+
+
+def _feedback(model: sm.Model, _seed: int) -> Callable[[float, sm.Data], list[float]]:
+    """A closure over the Model and over what it remembers: nothing that can be pickled."""
+    last, place = [0.0], model.joint_id("shoulder")
+
+    def controller(_time: float, data: sm.Data) -> list[float]:
+        error = 0.5 - float(data.qpos[model.jnt_qposadr[place]])
+        last[0] += 0.01 * error
+        return [error + last[0]] * model.nu
+
+    return controller
+
+
+@forks
+@pytest.mark.parametrize("jobs", [2, 3])
+def test_forks_give_the_figures_of_one_process(tmp_path: Path, jobs: int) -> None:
+    closed = replace(SWING, controller=_feedback)
+    # Six that interact: orders are drawn.
+    names = ("mass", "gravity", "gains", "axis", "armature", "medium")
+    run = partial(explained, tmp_path, ARM, _apart(ARM, names), seconds=0.2, budget=20)
+    for scenario in (SWING, closed):
+        one = run(scenario=scenario, jobs=1)
+        assert one.runs > 15
+        assert one.method == "drawn orders"
+        assert _figures(run(scenario=scenario, jobs=jobs)) == _figures(one)
+
+
+@forks
+def test_forks_give_the_figures_of_one_process_on_pybullet(tmp_path: Path) -> None:
+    need_engine("pybullet")
+    engines = "mujoco", "pybullet"
+    run = partial(explained, tmp_path, ARM, _apart(ARM), engines=engines, seconds=0.1)
+    assert _figures(run(jobs=3)) == _figures(run(jobs=1))
+
+
+@forks
+def test_what_cannot_be_run_is_told_alike(tmp_path: Path) -> None:
+    """A function that fails does so here, with its own error; after a first run of each side."""
+    begun: list[int] = []
+
+    def failing(model: sm.Model, _seed: int) -> Callable[[float, sm.Data], list[float]]:
+        begun.append(1)
+        if len(begun) > 2:
+            raise ZeroDivisionError("of the function")
+        return lambda _time, _data: [0.0] * model.nu
+
+    scenario = replace(SWING, controller=failing)
+    with pytest.raises(ZeroDivisionError, match="of the function"):
+        explained(tmp_path, ARM, _apart(ARM), scenario=scenario, seconds=0.1, jobs=2)
+
+
+def _gone() -> bool:
+    try:
+        return os.waitpid(-1, os.WNOHANG) == (0, 0)
+    except ChildProcessError:
+        return True
+
+
+@forks
+def test_a_fork_that_is_killed_is_no_crash(tmp_path: Path, capfd: pytest.CaptureFixture) -> None:
+    """Once: tried again. Twice: told as a run that cannot be made. Nothing is shown."""
+    mark, here = tmp_path / "killed", os.getpid()
+
+    def once() -> int:
+        if not mark.exists():
+            mark.write_text("", encoding="utf-8")
+            os.kill(os.getpid(), signal.SIGKILL)
+        return 1
+
+    def always() -> int:
+        assert os.getpid() != here
+        print("noise")
+        os.write(2, b"noise")
+        os.abort()
+
+    ended: list[int] = []
+    work = [once, always, *(partial(int, k) for k in range(5))]
+    found = in_forks(work, 2, lambda: ended.append(1))
+    assert found == [1, None, 0, 1, 2, 3, 4]
+    assert len(ended) == 6
+    assert capfd.readouterr() == ("", "")
+    assert _gone()
+
+
+@forks
+def test_a_run_whose_process_dies_is_a_set_that_cannot_be_run(tmp_path: Path) -> None:
+    here = os.getpid()
+
+    def deadly(model: sm.Model, _seed: int) -> Callable[[float, sm.Data], list[float]]:
+        if os.getpid() != here and model.compiled.body_mass[1] != 0.5:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return lambda _time, _data: [0.5] * model.nu
+
+    heavier = changed(ARM, ALONE["gains"]).replace('mass="0.5" pos', 'mass="0.6" pos')
+    scenario = replace(SWING, controller=deadly)
+    found = explained(
+        tmp_path, ARM, heavier, scenario=scenario, seconds=0.1, jobs=2, uncertain=None
+    )
+    assert ("gains of shoulder",) in found.impossible  # the mass stays what kills
+
+
+def test_how_many_forks() -> None:
+    if forks_for(2, 1.0, 2) == 2:
+        assert forks_for(10, 1.0, 3) == 3
+        assert forks_for(1, 1.0, 3) == 1
+        assert forks_for(10, 0.001, 2) == 2
+    assert forks_for(10, 0.001, None) == 1  # short work
+    with pytest.raises(BadInputError, match="jobs must be at least 1"):
+        forks_for(10, 1.0, 0)
+
+
+def test_jobs_on_the_command(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    left = str(write(tmp_path, "left.xml", ARM))
+    right = str(write(tmp_path, "right.xml", _apart(ARM)))
+    assert main(["compare", "fall", left, right, "--jobs", "2"]) == 2
+    assert "--jobs belongs to --why" in capsys.readouterr().err
+    assert main(["compare", "hold", "--why", "--jobs", "2"]) == 2
+    assert "--jobs is of two sides" in capsys.readouterr().err
+    assert main(["compare", "fall", left, right, "--why", "--jobs", "0"]) == 2
+    assert "jobs must be at least 1; got 0" in capsys.readouterr().err
+
+
+@forks
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_no_fork_stays(tmp_path: Path, number: int) -> None:
+    """After a Ctrl-C, which goes to all, in one line; and where only the parent was killed."""
+    slow = write(
+        tmp_path,
+        "slow.py",
+        "import os, time\n\n"
+        "def slow(model, data):\n"
+        f"    open(r'{tmp_path}/' + str(os.getpid()) + '.pid', 'w').close()\n"
+        "    time.sleep(0.02)\n"
+        "    return None\n",
+    )
+    left = str(write(tmp_path, "left.xml", ARM))
+    right = str(write(tmp_path, "right.xml", _apart(ARM)))
+    words = ["compare", f"{slow}:slow", left, right, "--why", "--seconds", "0.1", "--jobs", "2"]
+    command = [sys.executable, "-m", "statemachine", *words]
+    run = subprocess.Popen(
+        command, cwd=ROOT, start_new_session=True, stderr=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert _soon(lambda: len(list(tmp_path.glob("*.pid"))) >= 3)
+    if number == signal.SIGINT:
+        os.killpg(run.pid, number)
+    else:
+        os.kill(run.pid, number)
+    _, err = run.communicate(timeout=30)
+    assert run.returncode == (130 if number == signal.SIGINT else -number)
+    assert b"Traceback" not in err
+    assert err.strip() == b""
+    assert _soon(lambda: not any(_runs(int(each.stem)) for each in tmp_path.glob("*.pid")))
+
+
+def _soon(true: Callable[[], bool]) -> bool:
+    until = time.monotonic() + 30
+    while time.monotonic() < until and not true():
+        time.sleep(0.05)
+    return true()
+
+
+def _runs(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    state = Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()[0]
+    return state != "Z"
