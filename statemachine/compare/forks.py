@@ -22,6 +22,7 @@ from ..processes import checked_jobs
 T = TypeVar("T")
 
 _PAYS = 0.1  # [s] of work: for less a fork is not worth its while
+_NONE = "this system has no forks"
 _MANY = 1000  # whose numbers fit into a pipe
 
 
@@ -85,6 +86,8 @@ def _shared(
     ended: Callable[[], None],
 ) -> None:
     """Fill in what forks return, which take one number after the other from a pipe."""
+    if sys.platform == "win32":
+        raise OSError(_NONE)
     waiting, put = os.pipe()
     os.write(put, b"".join(number.to_bytes(4, "little") for number in numbers))
     os.close(put)
@@ -122,6 +125,8 @@ def _shared(
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
     """A Ctrl-C comes only afterwards; in a fork never, since this process answers it for all."""
+    if sys.platform == "win32":
+        raise OSError(_NONE)
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -136,6 +141,8 @@ def _fork(
     results: Connection[Any, Any],
 ) -> int:
     """Begin a fork; in it nothing is shown, and this does not return."""
+    if sys.platform == "win32":
+        raise OSError(_NONE)
     with warnings.catch_warnings():
         # Python counts threads of libraries, too: that of OpenBLAS is made for forks.
         warnings.simplefilter("ignore", DeprecationWarning)
