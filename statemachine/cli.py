@@ -115,8 +115,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _let_go_of_output()
         return 141
     except OSError as error:
-        if error.filename is not None:  # a file of the model's
-            return complain(error, BAD_INPUT)
+        if error.filename is not None:  # a file that cannot be read or written
+            return complain(f"{error.filename}: {error.strerror or error}", BAD_INPUT)
         _let_go_of_output()
         return complain(OSError(f"the output cannot be written: {error.strerror}"), NO_OUTPUT)
     except MemoryError:

@@ -9,7 +9,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,9 +32,9 @@ from statemachine.sweep import (
     read_manifest,
     run_sweep,
 )
-from statemachine.sweep.factors import parse_vary
+from statemachine.sweep.factors import parse_vary, with_kinds
 from statemachine.sweep.folder import locked, settle_manifest
-from statemachine.sweep.rows import MEASURED, RowWriter, counted
+from statemachine.sweep.rows import MEASURED, RowWriter, counted, remove_failed
 from statemachine.sweep.worker import run_batch
 from statemachine.traces import record_scenario
 
@@ -62,6 +63,10 @@ def hangs(model, data, gain=1.0):
 
 def fails(model, data, gain=1.0):
     return [1 / (gain - 2)] * model.nu
+
+def mended(model, data, gain=1.0):
+    if gain > 2 and not os.path.exists(os.environ["MENDED"]):
+        raise RuntimeError("not yet")
 """
 
 
@@ -97,6 +102,27 @@ def test_the_guide_lists_the_columns() -> None:
         assert rows[name] == f"{kind} | {says}"
 
 
+Start = Callable[..., "subprocess.Popen[str]"]
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Start:
+    """Starts a command of the library in a process and a group of its own."""
+
+    def start(*words: str, program: Sequence[str] = ("-m", "statemachine")) -> Any:
+        return subprocess.Popen(
+            [sys.executable, *program, *words],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            start_new_session=True,
+        )
+
+    return start
+
+
 # What is varied.
 
 
@@ -113,7 +139,8 @@ def test_the_guide_lists_the_columns() -> None:
     ],
 )
 def test_what_is_typed(word: str, values: tuple[Any, ...], times: bool) -> None:
-    (vary,) = parse_vary([word], ("timestep", "damping", "contacts", "integrator"), ("gain",))
+    options = ("timestep", "damping", "contacts", "integrator")
+    (vary,) = with_kinds(parse_vary([word]), options, ("gain",))
     assert (vary.values, vary.times, vary.bounds) == (values, times, None)
     assert vary.numeric == isinstance(values[0], float)
 
@@ -135,6 +162,8 @@ REFUSED = [
     (("qpos=1",), "qpos[JOINT]"),
     (("qpos[elbow]=1",), "no joint named 'elbow'"),
     (("qpos[elbow_flex]=1x",), "leave the x out"),
+    (("damping==1",), "damping must be real numbers; got '=1'"),
+    (("damping=",), "--vary damping= names no value"),
     (("integrator=Euler4",), "no integrator named"),
     (("model=so101,so102",), "--model says one model"),
 ]
@@ -203,6 +232,20 @@ def test_the_points_of_indices() -> None:
     assert len(design) == 16
     a, b, mixed = (np.array(block[name]) for name in ("A", "B", "damping"))
     assert np.array_equal(mixed, np.column_stack([b[:, 0], a[:, 1]]))
+
+
+def test_a_start_outside_the_range_of_its_joint_is_told_once() -> None:
+    """It is legal, and usually a mistake."""
+    low, high = sm.load("so101").jnt_range[sm.load("so101").joint_id("elbow_flex")]
+
+    def said(word: str) -> list[str]:
+        return [line for line in prepared(small("hold", word)).said if "outside" in line]
+
+    (line,) = said("qpos[elbow_flex]=-3:1:3")
+    assert line.startswith("qpos[elbow_flex]=-3 starts outside the range of the joint")
+    assert f"{low:.4g} to {high:.4g} rad" in line
+    assert not said(f"qpos[elbow_flex]={low}:{high}:3")
+    assert not said("qvel[elbow_flex]=-30:30:3")
 
 
 # The cells.
@@ -353,6 +396,74 @@ def test_a_folder_of_something_else_is_refused(tmp_path: Path) -> None:
         run_sweep(prepared(small("hold")), tmp_path / "thesis.tex")
 
 
+def test_a_manifest_that_is_damaged_or_missing_is_one_line(tmp_path: Path) -> None:
+    sweep = prepared(small("hold"))
+    whole = json.dumps(sweep.manifest())
+    (tmp_path / "cells").mkdir()
+    with pytest.raises(BadInputError, match=r"has cells and no sweep\.json"):
+        run_sweep(sweep, tmp_path)
+    with pytest.raises(BadInputError, match=r"is no sweep: it has no sweep\.json"):
+        read_manifest(tmp_path)
+    design = json.loads(whole)["design"]
+    for text in (
+        whole[:200],
+        '{"schema": 1}',
+        json.dumps({**json.loads(whole), "design": {**design, "seeds": "one"}}),
+        json.dumps({**json.loads(whole), "design": {**design, "factors": [{"name": 1}]}}),
+    ):
+        (tmp_path / "sweep.json").write_text(text)
+        for read in (lambda: read_manifest(tmp_path), lambda: run_sweep(sweep, tmp_path)):
+            with pytest.raises(BadInputError, match=r"sweep\.json is damaged"):
+                read()
+
+
+def test_what_cannot_be_written_or_read_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["sweep", "hold", "--backend", "mujoco", "--seconds", "0.02", "--jobs", "1"]
+    (tmp_path / "file").write_text("")
+    assert main([*words, "--out", str(tmp_path / "file" / "x")]) == 2
+    assert capsys.readouterr().err.endswith("cannot be made: Not a directory\n")
+    assert main(["sweep", "--report", str(tmp_path / "file")]) == 2
+    assert capsys.readouterr().err.endswith("is no sweep: it has no sweep.json\n")
+    assert main([*words, "--out", str(tmp_path / "s")]) == 0
+    (part,) = (tmp_path / "s").rglob("part-*.parquet")
+    part.write_bytes(part.read_bytes()[:300])
+    capsys.readouterr()
+    assert main([*words, "--out", str(tmp_path / "s")]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert f"{part} cannot be read" in error
+    with pytest.raises(BadInputError, match="cannot be read"):
+        read_cells(tmp_path / "s")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the limit stands in for a full disk")
+def test_a_full_disk_is_one_line_and_nothing_is_half_written(tmp_path: Path) -> None:
+    code = (
+        "import resource, sys; from statemachine.cli import main\n"
+        "from statemachine.sweep import rows\n"
+        "flush = rows.RowWriter.flush\n"
+        "def full(self):\n"
+        "    resource.setrlimit(resource.RLIMIT_FSIZE, (2048, 2048)); flush(self)\n"
+        "rows.RowWriter.flush = full\n"
+        "sys.exit(main(['sweep', 'hold', '--vary', 'damping=1:2:8', '--backend', 'mujoco',"
+        " '--seconds', '0.05', '--jobs', '1', '--out', 'full']))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert re.search(r"full/cells/backend=mujoco/part-\w+\.parquet: File too large", done.stderr)
+    assert not [each for each in (tmp_path / "full").rglob("*part-*") if each.is_file()]
+
+
 # Workers, and what dies.
 
 
@@ -385,27 +496,6 @@ def test_a_worker_that_dies_or_hangs_is_a_row(policy: str, tmp_path: Path, jobs:
         table = read_cells(out)
         failed = [row["vary.gain"] for row in table.to_pylist() if row["status"] == "failed"]
         assert failed == [2.0, 2.0]
-
-
-Start = Callable[..., "subprocess.Popen[str]"]
-
-
-@pytest.fixture
-def start(tmp_path: Path) -> Start:
-    """Starts a command of the library in a process and a group of its own."""
-
-    def start(*words: str) -> subprocess.Popen[str]:
-        return subprocess.Popen(
-            [sys.executable, "-m", "statemachine", *words],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            cwd=tmp_path,
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
-            start_new_session=True,
-        )
-
-    return start
 
 
 def _until(what: Callable[[], Any], seconds: float = 120.0) -> Any:
@@ -447,26 +537,121 @@ def test_a_driver_that_is_killed_goes_on(policy: str, tmp_path: Path, start: Sta
     assert {cell.id for cell in prepared(sweep).cells("mujoco")} == set(cells)
 
 
+STOPPED = "statemachine: stopped; out has what was done. Type the same to go on\n"
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="no such signals")
 @pytest.mark.parametrize("jobs", ["1", "2"])
 @pytest.mark.parametrize("begun", ["sweep.json", "cells/*/part-*.parquet"])
-def test_an_interrupt_keeps_what_was_done(
-    policy: str, tmp_path: Path, start: Start, jobs: str, begun: str
+@pytest.mark.parametrize("how", ["SIGINT", "SIGINT twice", "SIGTERM"])
+def test_a_sweep_that_is_stopped_keeps_what_was_done(
+    policy: str, tmp_path: Path, start: Start, jobs: str, begun: str, how: str
 ) -> None:
     words = ["sweep", f"{policy}:slow", "--vary", "gain=1:60:60", "--model", "so101"]
     words += ["--seconds", "0.1", "--backend", "mujoco", "--jobs", jobs, "--out", "out"]
     driver = start(*words)
     _until(lambda: list((tmp_path / "out").glob(begun)))
     time.sleep(0.4)  # its workers begin, and must not say that they were interrupted
-    os.killpg(driver.pid, signal.SIGINT)
-    told, error = driver.communicate(timeout=60)
-    assert (driver.returncode, told) == (130, "")
-    assert error == "statemachine: stopped; out has what was done. Type the same to go on\n"
+    if how == "SIGTERM":  # of a batch system, to the driver alone
+        os.kill(driver.pid, signal.SIGTERM)
+    else:
+        os.killpg(driver.pid, signal.SIGINT)
+    if how == "SIGINT twice":
+        time.sleep(0.05)
+        os.killpg(driver.pid, signal.SIGINT)
+    told, error = driver.communicate(timeout=20)
+    codes = {"SIGINT": {130}, "SIGINT twice": {130, -signal.SIGINT}, "SIGTERM": {-signal.SIGTERM}}
+    assert driver.returncode in codes[how]
+    assert (told, error) == ("", "" if how == "SIGTERM" else STOPPED)
     done = len(dict(counted(tmp_path / "out")))
     assert done < 60
     assert done or begun == "sweep.json"
-    _until(lambda: not _group(driver.pid))
+    _until(lambda: not _group(driver.pid), 10)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name == "nt", reason="no such signals")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_sweep_on_dask_that_is_stopped_goes_on(
+    policy: str, tmp_path: Path, start: Start, number: int
+) -> None:
+    distributed = pytest.importorskip("distributed")
+    words = ["sweep", f"{policy}:slow", "--vary", "gain=1:60:60", "--model", "so101", "--json"]
+    words += ["--seconds", "0.1", "--backend", "mujoco", "--out", "out", "--scheduler"]
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as cluster:
+        driver = start(*words, cluster.scheduler_address)
+        _until(lambda: list((tmp_path / "out").glob("cells/*/part-*.parquet")))
+        os.kill(driver.pid, number)
+        told, error = driver.communicate(timeout=20)
+        assert driver.returncode == (130 if number == signal.SIGINT else -number)
+        assert (told, error) == ("", STOPPED if number == signal.SIGINT else "")
+        before = len(dict(counted(tmp_path / "out")))
+        assert 0 < before < 60
+        _until(lambda: not _group(driver.pid), 10)
+        second = start(*words, cluster.scheduler_address)  # on the same workers
+        told, error = second.communicate(timeout=120)
+    assert second.returncode == 0, error
+    summary = json.loads(told)
+    assert (summary["done"], summary["ran"]) == (60, 60 - before)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name == "nt", reason="no SIGKILL")
+def test_cells_that_failed_are_run_again_if_asked(
+    policy: str, tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mended = tmp_path / "mended"
+    monkeypatch.setenv("MENDED", str(mended))
+    words = ["sweep", f"{policy}:mended", "--vary", "gain=1:8:8", "--model", "so101", "--json"]
+    words += ["--seconds", "0.05", "--backend", "mujoco", "--jobs", "1", "--out", "out"]
+
+    def run(*more: str) -> dict[str, Any]:
+        told, error = (driver := start(*words, *more)).communicate(timeout=120)
+        summary: dict[str, Any] = json.loads(told)
+        assert driver.returncode == bool(summary["failed"]), error
+        return summary
+
+    first = run()
+    assert (first["done"], first["failed"], first["ran"]) == (2, {"BadInputError": 6}, 8)
+    mended.touch()
+    assert run()["ran"] == 0
+    # A refused request touches nothing.
+    assert start(*words, "--retry-failed", "--seeds", "2").wait() == 2
+    assert Counter(dict(counted(tmp_path / "out")).values())["BadInputError"] == 6
+    # Killed when the rows of the failed cells are gone: these cells are missing, the rest is there.
+    code = (
+        "import os, signal, sys; from statemachine.sweep import drive\n"
+        "from statemachine.cli import main\n"
+        "drive._batches = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "main(sys.argv[1:])"
+    )
+    driver = start("--retry-failed", program=["-c", code, *words])
+    assert driver.wait() == -signal.SIGKILL
+    assert list(dict(counted(tmp_path / "out")).values()) == ["done", "done"]
+    last = run("--retry-failed")
+    assert (last["done"], last["failed"], last["ran"]) == (8, {}, 6)
+    cells = [cell for cell, _ in counted(tmp_path / "out")]
+    assert len(cells) == len(set(cells)) == 8
+    assert read_cells(tmp_path / "out")["error"].null_count == 8
+
+
+def test_a_file_keeps_its_rows_when_its_first_cell_is_run_again(tmp_path: Path) -> None:
+    """A file is named by its first cell, which may be the one that failed."""
+    sweep = prepared(small("hold", "timestep=0.005,0.01"))
+    rows = sorted(
+        run_batch(sweep.rules, list(sweep.cells("mujoco")), False), key=lambda r: r["cell"]
+    )
+    writer = RowWriter(tmp_path, sweep.design.factors, {"request": {}})
+    writer.add([{**rows[0], "status": "failed", "error_class": "DivergedError"}, rows[1]])
+    writer.flush()
+    remove_failed(tmp_path)
+    assert dict(counted(tmp_path)) == {rows[1]["cell"]: "done"}
+    writer.add([rows[0]])
+    writer.flush()
+    assert sorted(counted(tmp_path)) == [(row["cell"], "done") for row in rows]
 
 
 @pytest.mark.slow

@@ -250,8 +250,7 @@ def test_a_gap_inside_the_chaos_floor_is_no_difference(tmp_path: Path) -> None:
     from statemachine.sweep import analysis
     from statemachine.sweep.analysis_gaps import gaps_of
     from statemachine.sweep.analysis_runs import ModelFacts
-    from statemachine.sweep.folder import read_manifest
-    from statemachine.sweep.request import design_of
+    from statemachine.sweep.folder import design_of, read_manifest
     from statemachine.sweep.rows import read_cells
 
     folder = agreement(tmp_path / "s", seeds=1)

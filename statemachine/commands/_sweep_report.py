@@ -107,8 +107,10 @@ def check(options: argparse.Namespace) -> None:
         check_target(options.html)
     if options.plot is not None:
         from ..report.plot import check_suffix
+        from ..traces.whole import check_place
 
         check_suffix(options.plot)
+        check_place(options.plot)
 
 
 def report(options: argparse.Namespace, folder: str | Path) -> tuple[Any, Any]:

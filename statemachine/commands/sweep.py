@@ -115,6 +115,11 @@ def add(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="let the dataset in DIR grow by values, seeds, engines",
     )
+    group.add_argument(
+        "--retry-failed",
+        action="store_true",
+        help="run the cells that failed again; their rows are replaced",
+    )
     _sweep_report.add_options(parser)
     add_json(parser, "summary, or the report,")
     parser.set_defaults(run=run)
@@ -142,6 +147,7 @@ def run(options: argparse.Namespace) -> int:
                 jobs=options.jobs,
                 scheduler=options.scheduler,
                 extend=options.extend,
+                retry_failed=options.retry_failed,
                 progress=told,
             )
     except KeyboardInterrupt:

@@ -69,7 +69,8 @@ def as_numbers(value: ArrayLike, name: str) -> NDArray[Any]:
     except (TypeError, ValueError, OverflowError) as error:  # a ragged list
         raise BadInputError(f"{name} must be real numbers, in a regular array") from error
     if array.dtype.kind not in "fiu":
-        raise BadInputError(f"{name} must be real numbers; got {array.dtype}")
+        got = shown(array.item()) if not array.ndim and array.dtype.kind == "U" else array.dtype
+        raise BadInputError(f"{name} must be real numbers; got {got}")
     return array
 
 

@@ -26,7 +26,11 @@ def page(ready: PreparedSweep, summary: SweepSummary) -> Page:
     failed = sum(summary.failed.values())
     if failed:
         blocks.append(
-            Verdict(f"{count(failed, 'cell')} failed: the column error of each says why", False)
+            Verdict(
+                f"{count(failed, 'cell')} failed: the column error of each says why; "
+                "--retry-failed runs them again",
+                False,
+            )
         )
     else:
         blocks.append(Verdict(f"{count(summary.done, 'cell')} done, none failed", True))

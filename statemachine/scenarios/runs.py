@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from ..errors import BadInputError, DivergedError
-from ..interface import Model, make_data, step
+from ..interface import Data, Model, make_data, step
 
 Progress = Callable[[float], None]  # told the fraction that is done
 
@@ -58,3 +59,15 @@ def check_length(model: Model, seconds: float) -> None:
             f"a timestep of {model.timestep:g} s is longer than the run of {seconds:g} s; "
             "both are in seconds"
         )
+
+
+def write_ctrl(data: Data, wanted: Any, time: float) -> None:
+    """Write what a controller gave at a time [s].
+
+    Raises:
+        BadInputError: It is no ctrl.
+    """
+    try:
+        data.ctrl = wanted
+    except BadInputError as error:
+        raise BadInputError(f"what the controller gave at {time:.3f} s: {error}") from None

@@ -15,8 +15,9 @@ from __future__ import annotations
 from .design import Design, DesignPoint
 from .drive import SweepSummary, run_sweep
 from .factors import Vary
-from .folder import read_manifest
-from .request import PreparedSweep, Sweep, design_of, prepared
+from .folder import design_of, read_manifest
+from .prepare import prepared
+from .request import PreparedSweep, Sweep
 from .rows import COLUMNS, read_cells
 
 __all__ = [

@@ -29,8 +29,7 @@ from .analysis_runs import CellRunner, ModelFacts, facts_of, runner_of
 from .analysis_together import BroughtTogether, Varied, brought_together
 from .design import Design
 from .factors import Value, Vary
-from .folder import read_manifest
-from .request import design_of
+from .folder import design_of, read_manifest
 from .rows import read_cells
 
 SettingVerdict = Literal["agrees", "some seeds", "chaos", "differs", "no runs"]

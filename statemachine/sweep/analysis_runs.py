@@ -19,7 +19,8 @@ from .analysis_gaps import SweepRuns, runs_of
 from .apart import apart
 from .cell import CellRules, SweepCell
 from .factors import Value, Vary
-from .request import PreparedSweep, Sweep, prepared
+from .prepare import prepared
+from .request import REQUEST, PreparedSweep, Sweep
 from .settings import options_at
 
 Setting = tuple[tuple[Value, ...], int]  # values of the factors, and a seed
@@ -105,7 +106,6 @@ def runner_of(
     what = request["what"]
     if is_function(what) and not Path(what.rpartition(":")[0]).is_file():
         return f"{what.rpartition(':')[0]} is not in this folder"
-    names = ("model", "seconds", "every", "keyframe", "defaults", "spread", "moments")
     try:
         ready = prepared(
             Sweep(
@@ -117,7 +117,7 @@ def runner_of(
                 indices=design["indices"],
                 design_seed=design["design_seed"],
                 menagerie=menagerie,
-                **{name: request[name] for name in names if request.get(name) is not None},
+                **{name: request[name] for name in REQUEST if request.get(name) is not None},
             )
         )
     except StateMachineError as error:

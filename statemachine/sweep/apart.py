@@ -86,9 +86,9 @@ class _Process:
             return [failed_row(batch[0], timed_out(self._rules.timeout) if late else error)]
 
     def _run(self, batch: Batch) -> list[Row]:
-        if self._pool is None:
-            self._pool = self._loky.ProcessPoolExecutor(max_workers=1, env=ALONE)
         with deaf():
+            if self._pool is None:
+                self._pool = self._loky.ProcessPoolExecutor(max_workers=1, env=ALONE)
             future: Future[list[Row]] = self._pool.submit(run_batch, self._rules, batch, True)
         try:
             return future.result(self._rules.timeout * len(batch) + _GRACE)

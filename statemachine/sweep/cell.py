@@ -11,11 +11,11 @@ import numpy as np
 
 from ..compare.perturbed import Uncertainty, nudged_pose
 from ..comparison import ContactNames
-from ..errors import BadInputError, TimedOutError
+from ..errors import TimedOutError
 from ..interface import Array, Data, Model, forward, make_data, reset, step
 from ..interface.records import usual_site
 from ..scenarios import Controller, Scenario, scenario
-from ..scenarios.runs import check_length, steps_in
+from ..scenarios.runs import check_length, steps_in, write_ctrl
 from ..traces.controllers import function_scenario, is_function
 from ..traces.energy import energies
 from .factors import Value, Vary
@@ -201,7 +201,7 @@ def _advance(
                 ):
                     ctrl[:] = wanted
                 else:
-                    _command(data, wanted, now)
+                    write_ctrl(data, wanted, now)
             step(model, data)
             row["steps"] = k
             np.maximum(fastest, np.abs(qvel), out=fastest)
@@ -219,13 +219,6 @@ def _advance(
     finally:
         if model.nv:
             row["max_qvel"] = float(np.nan_to_num(fastest).max())
-
-
-def _command(data: Data, wanted: Any, time: float) -> None:
-    try:
-        data.ctrl = wanted
-    except BadInputError as error:
-        raise BadInputError(f"ctrl at {time:.3f} s: {error}") from None
 
 
 def timed_out(seconds: float) -> TimedOutError:

@@ -23,8 +23,9 @@ from ..scenarios.runs import Progress, silent
 from .apart import Batch, Results, apart, deaf, require_joblib
 from .cell import DONE, CellRules
 from .folder import check_folder, locked, settle_manifest
-from .request import PreparedSweep, Sweep, prepared
-from .rows import CELLS, RowWriter, counted
+from .prepare import prepared
+from .request import PreparedSweep, Sweep
+from .rows import CELLS, RowWriter, counted, remove_failed
 from .worker import Row, differing, probe, run_batch
 
 _BATCH, _MOST = 1.0, 500  # a task takes about so many seconds, and has at most so many cells
@@ -71,6 +72,7 @@ def run_sweep(
     jobs: int | None = None,
     scheduler: str | None = None,
     extend: bool = False,
+    retry_failed: bool = False,
     progress: Progress = silent,
 ) -> SweepSummary:
     """Run what is missing of a sweep.
@@ -81,10 +83,12 @@ def run_sweep(
         jobs: How many processes here; by default one for each processor.
         scheduler: Address of a Dask scheduler, whose workers run it instead.
         extend: Whether the design may be larger than that of the folder.
+        retry_failed: Whether cells that failed are run again; their rows are replaced.
         progress: Told the fraction of what is missing that is done.
 
     Raises:
         BadInputError: The folder is of another sweep, or in use; see `prepared` for the rest.
+        OSError: A file cannot be written; what was written is kept.
         MissingEngineError: An engine or a package is missing.
         KeyboardInterrupt: It was interrupted; what was done is in the folder.
     """
@@ -102,6 +106,9 @@ def run_sweep(
             _check_growth(ready, known, folder)
         manifest = ready.manifest()
         settle_manifest(folder, manifest, extend)
+        if retry_failed:
+            remove_failed(folder)
+            known = {cell: kind for cell, kind in known.items() if kind == DONE}
         total = len(ready)
         missing = total - len(known)
         writer = RowWriter(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -84,23 +84,18 @@ def is_number(value: object) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-def parse_vary(
-    words: Iterable[str], options: Collection[str], parameters: Collection[str] = ()
-) -> tuple[Vary, ...]:
-    """What words NAME=a,b,c, NAME=lo:hi:count and NAME=lo:hi say.
+def parse_vary(words: Iterable[str]) -> tuple[Vary, ...]:
+    """What words NAME=a,b,c, NAME=lo:hi:count and NAME=lo:hi say; `with_kinds` says what they vary.
 
     Args:
         words: As typed behind `--vary`.
-        options: Names that `Model.replace` takes on the backends of the sweep.
-        parameters: Of the user's function.
 
     Raises:
-        UnknownNameError: There is nothing of this name.
         BadInputError: A word is none, or two of them vary the same.
     """
     found: dict[str, Vary] = {}
     for word in words:
-        vary = _parsed(word, options, parameters)
+        vary = _parsed(word)
         if vary.label in found:
             raise BadInputError(f"{vary.label} is varied twice")
         found[vary.label] = vary
@@ -110,22 +105,40 @@ def parse_vary(
     return tuple(found.values())
 
 
-def _parsed(word: str, options: Collection[str], parameters: Collection[str]) -> Vary:
+def with_kinds(
+    factors: Iterable[Vary], options: Collection[str], parameters: Collection[str] = ()
+) -> tuple[Vary, ...]:
+    """The same factors, each with its kind.
+
+    Args:
+        factors: As parsed.
+        options: Names that `Model.replace` takes on the backends of the sweep.
+        parameters: Of the user's function.
+
+    Raises:
+        UnknownNameError: There is nothing of this name.
+        BadInputError: What is typed is none for what it is.
+    """
+    return tuple(replace(vary, kind=_kind(vary, options, parameters)) for vary in factors)
+
+
+def _parsed(word: str) -> Vary:
     label, sign, text = word.partition("=")
     match = _NAME.fullmatch(label.strip())
-    if not (sign and text and match):
+    if not (sign and match):
         raise BadInputError(
             "--vary wants NAME=a,b,c, NAME=from:to:count or, with --samples, NAME=from:to; got "
             f"{shown(word)}"
         )
     name, place = match[1], match[2] or ""
-    kind = _kind(name, place, options, parameters)
-    if kind == MODEL or ":" not in text:
+    if not text.strip(" ,"):
+        raise BadInputError(f"--vary {label}= names no {MODEL if name == MODEL else 'value'}")
+    if name == MODEL or ":" not in text:
         words = [each.strip() for each in text.split(",")]
-        values, times = _values(label, words, kind)
-        return Vary(name, place, kind, values, None, times)
+        values, times = _values(label, words, name == MODEL)
+        return Vary(name, place, values=values, times=times)
     parts = text.split(":")
-    (low, high), times = _values(label, parts[:2], kind)
+    (low, high), times = _values(label, parts[:2])
     if not (is_number(low) and is_number(high)):
         raise BadInputError(f"{label}={text} wants numbers on both sides of the colon")
     assert isinstance(low, float)
@@ -133,42 +146,46 @@ def _parsed(word: str, options: Collection[str], parameters: Collection[str]) ->
     if not low < high:
         raise BadInputError(f"{label}={text} wants the smaller number first")
     if len(parts) == 2:
-        return Vary(name, place, kind, (), (low, high), times)
+        return Vary(name, place, bounds=(low, high), times=times)
     if len(parts) > 3 or not parts[2].isdigit() or not 2 <= int(parts[2]) <= _MOST:
         raise BadInputError(f"{label}={text} wants from:to:count, with a count from 2 to {_MOST:,}")
     grid = tuple(float(f"{x:.{_DIGITS}g}") for x in np.linspace(low, high, int(parts[2])))
-    return Vary(name, place, kind, grid, None, times)
+    return Vary(name, place, values=grid, times=times)
 
 
-def _kind(name: str, place: str, options: Collection[str], parameters: Collection[str]) -> Kind:
+def _kind(vary: Vary, options: Collection[str], parameters: Collection[str]) -> Kind:
+    name = vary.name
+    kind: Kind = "option"
     if name == MODEL or name in STATES:
-        if (name == MODEL) == bool(place):
+        if (name == MODEL) == bool(vary.place):
             raise BadInputError(
                 "model is varied as a whole: model=so101/scene,so101/scene_box"
-                if place
+                if vary.place
                 else f"{name} is varied one coordinate at a time: {name}[JOINT]=…"
             )
-        return MODEL if name == MODEL else "state"
-    if name in options and name in parameters:
+        kind = MODEL if name == MODEL else "state"
+    elif name in options and name in parameters:
         raise BadInputError(
             f"{name} is an option of the model and a parameter of the function: give the "
             "parameter another name"
         )
-    if name in options:
-        return "option"
-    if name in parameters and not place:
-        return "parameter"
-    raise unknown_name("thing to vary", name, [*options, MODEL, *STATES, *parameters])
+    elif name in parameters and not vary.place:
+        kind = "parameter"
+    elif name not in options:
+        raise unknown_name("thing to vary", name, [*options, MODEL, *STATES, *parameters])
+    if vary.times and kind != "option":
+        raise BadInputError(f"{vary.label} has no value of the model's own: leave the x out")
+    return kind
 
 
-def _values(label: str, words: list[str], kind: Kind) -> tuple[tuple[Value, ...], bool]:
+def _values(label: str, words: list[str], names: bool = False) -> tuple[tuple[Value, ...], bool]:
     """The values of words, and whether they are times the model's own."""
     values: list[Value] = []
     scaled = []
     for word in words:
         if not word:
             raise BadInputError(f"{label} has an empty value")
-        value, times = (word, False) if kind == MODEL else _value(word)
+        value, times = (word, False) if names else _value(word)
         values.append(value)
         scaled.append(times)
     if len({type(value) for value in values}) > 1 or len(set(scaled)) > 1:
@@ -176,8 +193,6 @@ def _values(label: str, words: list[str], kind: Kind) -> tuple[tuple[Value, ...]
             f"{label} mixes values of different kinds: {', '.join(words)}; numbers, numbers with "
             "an x behind (times the model's own), on and off, or names"
         )
-    if any(scaled) and kind != "option":
-        raise BadInputError(f"{label} has no value of the model's own: leave the x out")
     if len(set(values)) < len(values):
         raise BadInputError(f"{label} has a value twice: {', '.join(words)}")
     return tuple(values), scaled[0]

@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from ..comparison.text import listed
 from ..errors import BadInputError, shown
 from ..traces.whole import replace_text
+from .design import Design
+from .factors import Vary
+from .rows import CELLS
 
 MANIFEST = "sweep.json"
 SCHEMA = 1
@@ -62,15 +65,18 @@ def check_folder(folder: Path) -> None:
     """
     if folder.exists() and not folder.is_dir():
         raise BadInputError(f"{folder} is a file: --out wants a folder")
-    others = []
-    with suppress(FileNotFoundError):
-        others = [each.name for each in folder.iterdir() if not each.name.startswith(".")]
-    if others and MANIFEST not in others:
-        raise BadInputError(f"{folder} holds something else, as {others[0]}: name a new folder")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise BadInputError(f"{folder} cannot be made: {error.strerror}") from None
+    others = [each.name for each in folder.iterdir() if not each.name.startswith(".")]
+    if CELLS in others and MANIFEST not in others:
+        raise BadInputError(
+            f"{folder} has cells and no {MANIFEST}, so that nobody knows what they are of: put it "
+            "back, or name another folder"
+        )
+    if others and MANIFEST not in others:
+        raise BadInputError(f"{folder} holds something else, as {others[0]}: name a new folder")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise BadInputError(f"{folder} is read-only for you")
 
@@ -79,22 +85,57 @@ def read_manifest(folder: str | Path) -> dict[str, Any]:
     """What `sweep.json` says of a sweep.
 
     Raises:
-        BadInputError: There is none, or it is none of this version's.
+        BadInputError: There is none, or it is damaged, or none of this version's.
     """
     path = Path(folder) / MANIFEST
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+    except (FileNotFoundError, NotADirectoryError):
+        raise BadInputError(f"{folder} is no sweep: it has no {MANIFEST}") from None
+    except UnicodeError:
+        text = ""
+    found: dict[str, Any] = {}
+    try:
+        found = json.loads(text)
         if found["schema"] != SCHEMA:
             raise BadInputError(
                 f"{path} has schema {shown(found['schema'])}; this version reads {SCHEMA}"
             )
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        if isinstance(error, BadInputError):
-            raise
+        design = design_of(found)
+        whole = (
+            all(isinstance(found[name], dict) for name in _SAME if name != "function")
+            and isinstance(found["function"], str)
+            and isinstance(found["design"]["seeds"], int)
+            and all(isinstance(name, str) for name in found["design"]["backends"])
+            and all(vary.values or vary.bounds for vary in design.factors)
+        )
+    except BadInputError:
+        raise
+    except (ValueError, KeyError, TypeError, AttributeError):
+        whole = False
+    if not whole:
         raise BadInputError(
-            f"{folder} is no sweep: it has no {MANIFEST} that can be read"
-        ) from None
+            f"{path} is damaged, and without it nobody knows what the cells are of: put back a "
+            "copy, or name another folder"
+        )
     return found
+
+
+def design_of(manifest: Mapping[str, Any]) -> Design:
+    """The design that a manifest tells, with the points of its dataset."""
+    told = manifest["design"]
+    factors = [
+        Vary(
+            each["name"],
+            each["place"],
+            each["kind"],
+            tuple(each["values"]),
+            None if each["bounds"] is None else tuple(each["bounds"]),
+            each["times"],
+        )
+        for each in told["factors"]
+    ]
+    return Design(tuple(factors), told["samples"], told["indices"], told["design_seed"])
 
 
 def settle_manifest(folder: Path, manifest: Mapping[str, Any], extend: bool) -> None:

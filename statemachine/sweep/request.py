@@ -1,42 +1,23 @@
-"""What a sweep is asked for, and all that is checked of it before anything runs."""
+"""What a sweep is asked for, and what it is when that was checked."""
 
 from __future__ import annotations
 
 import dataclasses
-import os
-import platform
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-
-from .. import __version__
-from ..backends import backend_names, load
-from ..compare.perturbed import EXACT, parse_uncertainty
 from ..comparison.text import command
-from ..errors import BadInputError, MissingEngineError, StateMachineError, unknown_name
-from ..interface import Model, make_data
-from ..interface.options import checked_options
-from ..models import resolve
-from ..scenarios import scenario
-from ..scenarios.provenance import model_digest
-from ..scenarios.runs import check_length, cost_of_a_second, steps_in
-from ..traces.controllers import is_function, parameters_of
+from ..traces.controllers import is_function
 from .cell import CellRules, SweepCell
-from .design import Design, DesignPoint, digest, require_qmc
-from .factors import MODEL, Vary, parse_vary
+from .design import Design, DesignPoint, digest
 from .folder import SCHEMA
-from .rows import COLUMNS, require_parquet
-from .settings import options_at, start_at
-from .worker import digest_of
+from .rows import COLUMNS
 
 SPREAD = ("1deg", "1mm")
-MODEL_OF_A_FUNCTION = "so101/scene"
-_MANY, _MOST = 10_000, 10**8  # cells that are told beforehand, and that the driver can remember
-_LOOKED_AT = 1000  # values of a factor; of more, the ends
+# What a dataset is of, beside the experiment: cells of other values are of another sweep.
+REQUEST = ("model", "seconds", "every", "keyframe", "defaults", "spread", "moments")
 
 
 @dataclass(frozen=True)
@@ -87,22 +68,15 @@ class Sweep:
             words += ["--vary", word]
         for name in () if tuple(self.backends) == ("all",) else self.backends:
             words += ["--backend", name]
-        return command(
-            words,
-            ("--seeds", self.seeds, 1),
-            ("--samples", self.samples, 0),
-            ("--design-seed", self.design_seed, 0),
-            ("--model", self.model, None),
-            ("--menagerie", self.menagerie, None),
-            ("--seconds", self.seconds, None),
-            ("--every", self.every, 1),
-            ("--keyframe", self.keyframe, None),
-            ("--defaults", self.defaults, "model"),
-            ("--spread", ",".join(self.spread), ",".join(SPREAD)),
-            ("--moments", self.moments, 20),
-            ("--timeout", self.timeout, 600.0),
-            ("--out", out, None),
-        ) + (" --indices" if self.indices else "")
+        apart = ("what", "vary", "backends", "indices", "spread")
+        given = [
+            (f"--{each.name.replace('_', '-')}", getattr(self, each.name), each.default)
+            for each in dataclasses.fields(self)
+            if each.name not in apart
+        ]
+        given.append(("--spread", ",".join(self.spread), ",".join(SPREAD)))
+        indices = " --indices" if self.indices else ""
+        return command(words, *given, ("--out", out, None)) + indices
 
 
 @dataclass(frozen=True)
@@ -148,13 +122,8 @@ class PreparedSweep:
             "command": asked.typed("DIR"),
             "request": {
                 "what": Path(asked.what).name if function else asked.what,
-                "model": asked.model,
-                "seconds": asked.seconds,
-                "every": asked.every,
-                "keyframe": asked.keyframe,
-                "defaults": asked.defaults,
+                **{name: getattr(asked, name) for name in REQUEST},
                 "spread": list(asked.spread),
-                "moments": asked.moments,
             },
             "files": dict(self.rules.files),
             "function": self.rules.function,
@@ -180,222 +149,3 @@ class PreparedSweep:
 def cell_of(point: DesignPoint, seed: int, backend: str) -> SweepCell:
     """A cell; its id is a digest of what it is."""
     return SweepCell(digest([point.id, seed, backend]), point.id, point.values, seed, backend)
-
-
-def design_of(manifest: Mapping[str, Any]) -> Design:
-    """The design that a manifest tells, with the points of its dataset."""
-    told = manifest["design"]
-    factors = [
-        Vary(
-            each["name"],
-            each["place"],
-            each["kind"],
-            tuple(each["values"]),
-            None if each["bounds"] is None else tuple(each["bounds"]),
-            each["times"],
-        )
-        for each in told["factors"]
-    ]
-    return Design(tuple(factors), told["samples"], told["indices"], told["design_seed"])
-
-
-def prepared(sweep: Sweep) -> PreparedSweep:
-    """Check a sweep: names, values, models, engines.
-
-    What one backend alone refuses is no error: its cells will be rows that say so.
-
-    Raises:
-        UnknownNameError: No such experiment, backend, option, joint, …
-        BadInputError: A value is none, or the request contradicts itself.
-        MissingEngineError: An engine or a package is missing.
-        StateMachineError: A model cannot be loaded on any backend.
-    """
-    require_parquet()
-    rules = _rules(sweep)
-    models, backends, said = _loaded(sweep, rules)
-    options = dict.fromkeys(name for model in models for name in model.capabilities.options)
-    free = [name for name in rules.parameters if name != "seed"]
-    factors = parse_vary(sweep.vary, options, free)
-    design = Design(factors, sweep.samples, sweep.indices, sweep.design_seed)
-    if design.sampled:
-        require_qmc()
-        if sweep.samples & (sweep.samples - 1):
-            if sweep.indices:
-                raise BadInputError(
-                    f"--indices wants a power of two of --samples; got {sweep.samples}"
-                )
-            said.append(f"{sweep.samples} samples are no power of two: a Sobol sequence wants one")
-    cells = design.size * sweep.seeds * len(backends)
-    if cells > _MOST:
-        raise BadInputError(
-            f"{cells:.3g} cells are more than a sweep can hold, which is {_MOST:,}: vary less, or "
-            "divide it into several"
-        )
-    if cells > _MANY:
-        said.append(f"{cells:,} cells")
-    rules = dataclasses.replace(rules, factors=factors)
-    for vary in factors:
-        said += _check_values(vary, models)
-    _check_runs(rules, models)
-    versions = {
-        "statemachine": __version__,
-        **{model.backend: model.engine_version for model in models},
-        "numpy": np.__version__,
-        "python": platform.python_version(),
-    }
-    cost = {model.backend: _cost(rules, model) for model in models}
-    return PreparedSweep(sweep, rules, design, backends, versions, cost, tuple(said))
-
-
-def _rules(sweep: Sweep) -> CellRules:
-    """What all cells have in common, but for the factors."""
-    for name, value, least in (
-        ("seeds", sweep.seeds, 1),
-        ("samples", sweep.samples, 0),
-        ("design-seed", sweep.design_seed, 0),
-        ("every", sweep.every, 1),
-        ("moments", sweep.moments, 1),
-    ):
-        if value < least:
-            raise BadInputError(f"--{name} must be at least {least}; got {value}")
-    if not 0 < sweep.timeout <= 86400 * 7:
-        raise BadInputError(f"--timeout must be above 0 s; got {sweep.timeout:g}")
-    spread = EXACT if list(sweep.spread) == ["0"] else parse_uncertainty(sweep.spread)
-    function = is_function(sweep.what)
-    if not function and (sweep.every != 1 or sweep.keyframe is not None):
-        name = "every" if sweep.every != 1 else "keyframe"
-        raise BadInputError(f"--{name} is of a FUNCTION; {sweep.what} is an experiment")
-    parameters = parameters_of(sweep.what) if function else ()
-    usual = MODEL_OF_A_FUNCTION if function else scenario(sweep.what).model
-    names = [word.partition("=")[2] for word in sweep.vary if word.startswith(f"{MODEL}=")]
-    if names and not names[0].strip(" ,"):
-        raise BadInputError(f"--vary {MODEL}= names no model")
-    if names and sweep.model is not None:
-        raise BadInputError("--model says one model and --vary model=… several: leave one out")
-    names = names[0].split(",") if names else [sweep.model or usual]
-    names = [name.strip() for name in names if name.strip()]
-    menagerie = sweep.menagerie and os.path.abspath(sweep.menagerie)
-    paths = {name: resolve(name, menagerie) for name in names}
-    own_file = {name: os.path.abspath(name) for name in names if Path(name).is_file()}
-    return CellRules(
-        what=os.path.abspath(sweep.what) if function else sweep.what,
-        factors=(),
-        model=names[0],
-        files={name: model_digest(path) for name, path in paths.items()},
-        places={name: own_file.get(name, name) for name in names},
-        function=digest_of(sweep.what) if function else "",
-        parameters=parameters,
-        defaults=sweep.defaults,
-        menagerie=menagerie,
-        seconds=sweep.seconds,
-        every=sweep.every,
-        keyframe=sweep.keyframe,
-        spread=spread,
-        moments=sweep.moments,
-        timeout=sweep.timeout,
-    )
-
-
-def _loaded(sweep: Sweep, rules: CellRules) -> tuple[list[Model], tuple[str, ...], list[str]]:
-    """Every variant on every backend, the backends that are here, and what a reader should know.
-
-    A backend that refuses a model stays: its cells are rows that say so.
-    """
-    everyone = tuple(sweep.backends) == ("all",)
-    backends = backend_names() if everyone else list(dict.fromkeys(sweep.backends))
-    for name in backends:
-        if name not in backend_names():
-            raise unknown_name("backend", name, ["all", *backend_names()])
-    # What an experiment switches off is nothing to refuse; a switch that is varied may be off.
-    given = {} if rules.function else dict(scenario(rules.what).options)
-    for word in sweep.vary:
-        name, _, text = word.partition("=")
-        if name in ("contacts", "actuation", "limits") and "off" in text.lower().split(","):
-            given[name] = False
-    models: list[Model] = []
-    said: list[str] = []
-    here: list[str] = []
-    errors: list[StateMachineError] = []
-    for backend in backends:
-        for place in rules.places.values():
-            try:
-                models.append(_load(rules, place, backend, given))
-            except MissingEngineError as error:
-                if not everyone:
-                    raise
-                said.append(f"{error}; it is left out")
-                errors.append(error)
-                break
-            except StateMachineError as error:
-                said.append(f"{place} on {backend}: {error}; its cells will say so")
-                errors.append(error)
-        else:
-            here.append(backend)
-    if not models:
-        raise errors[-1]
-    return models, tuple(here), said
-
-
-def _load(rules: CellRules, place: str, backend: str, options: Mapping[str, Any]) -> Model:
-    return load(
-        place, backend=backend, defaults=rules.defaults, menagerie=rules.menagerie, **options
-    )
-
-
-def _check_values(vary: Vary, models: Sequence[Model]) -> list[str]:
-    """Raise what every model says of a factor's values; else what some say, in lines."""
-    if vary.kind in ("model", "parameter"):
-        return []
-    values = vary.extremes
-    if len(values) > _LOOKED_AT and vary.numeric:
-        values = (min(values), max(values))  # pyright: ignore[reportArgumentType, reportCallIssue]
-    errors: dict[str, StateMachineError] = {}
-    fine = 0
-    for model in models:
-        try:
-            for value in values:
-                if vary.kind == "option":
-                    checked_options(model, options_at(model, [(vary, value)]))
-                else:
-                    start_at(model, [(vary, value)])
-        except StateMachineError as error:
-            errors.setdefault(str(error), error)
-        else:
-            fine += 1
-    if not fine:
-        raise next(iter(errors.values()))
-    return [f"{text}; its cells will say so" for text in errors]
-
-
-def _check_runs(rules: CellRules, models: Sequence[Model]) -> None:
-    """Raise what every model says of the run itself: its start, its length, its function."""
-    values = {vary.name: vary.extremes[0] for vary in rules.factors if vary.kind == "parameter"}
-    doing = rules.scenario(values)
-    timesteps = [vary for vary in rules.factors if vary.label == "timestep"]
-    errors: list[StateMachineError] = []
-    for model in models:
-        try:
-            on_it = doing.on(model)
-            if on_it.keyframe is not None:
-                model.key_id(on_it.keyframe)
-            seconds = doing.seconds if rules.seconds is None else rules.seconds
-            steps_in(model, seconds)
-            for value in timesteps[0].extremes if timesteps else (None,):
-                vary = [(timesteps[0], value)] if timesteps and value is not None else []
-                options = options_at(model, vary)
-                check_length(model.replace(**options) if options else model, seconds)
-            return
-        except StateMachineError as error:
-            errors.append(error)
-    raise errors[0]
-
-
-def _cost(rules: CellRules, model: Model) -> float:
-    """Roughly what a cell costs by the clock [s]: a Model, a Data, the steps."""
-    seconds = rules.scenario(
-        {v.name: v.extremes[0] for v in rules.factors if v.kind == "parameter"}
-    )
-    began = time.perf_counter()
-    with make_data(model.replace(timestep=model.timestep)):
-        made = time.perf_counter() - began
-    return made + cost_of_a_second(model) * (rules.seconds or seconds.seconds)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import itertools
 import json
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -12,6 +13,7 @@ from typing import Any
 from ..errors import BadInputError
 from ..installed import require_extra
 from ..traces.whole import replace_file
+from .cell import DONE
 from .factors import Vary
 
 CELLS = "cells"  # the folder of the dataset, in that of the sweep
@@ -60,8 +62,8 @@ def require_parquet() -> tuple[Any, Any]:
     Raises:
         MissingEngineError: It is not installed; the message names the extra.
     """
-    names = ("pyarrow", "pyarrow.parquet")
-    arrow, parquet = (require_extra(name, "a sweep", "pyarrow", "sweep") for name in names)
+    names = ("pyarrow", "pyarrow.parquet", "pyarrow.compute")
+    arrow, parquet, _ = (require_extra(name, "a sweep", "pyarrow", "sweep") for name in names)
     return arrow, parquet
 
 
@@ -114,19 +116,21 @@ class RowWriter:
 
     def flush(self) -> None:
         """Write what waits."""
-        arrow, parquet = require_parquet()
+        arrow, _ = require_parquet()
         for backend in sorted(self._waiting):
             rows = sorted(self._waiting[backend], key=lambda row: row["cell"])
             folder = self._folder / f"backend={backend}"
             folder.mkdir(parents=True, exist_ok=True)
             table = arrow.Table.from_pylist(rows, schema=self._schema)
-            # No two files have the same first row: a cell is in one file alone.
-            target = folder / f"part-{rows[0]['cell']}.parquet"
-            replace_file(
-                target, lambda out, t=table: parquet.write_table(t, out, compression="zstd")
-            )
+            _write(_unused(folder, rows[0]["cell"]), table)
             del self._waiting[backend]
         self._flushed = time.monotonic()
+
+
+def _unused(folder: Path, cell: str) -> Path:
+    """The name of a new file: that of its first cell, which another one had if that failed."""
+    names = (folder / f"part-{cell}{f'-{k}' if k else ''}.parquet" for k in itertools.count())
+    return next(path for path in names if not path.exists())
 
 
 def _parts(folder: Path) -> list[Path]:
@@ -139,20 +143,50 @@ def counted(folder: Path) -> Iterator[tuple[str, str]]:
     Raises:
         BadInputError: A file is none of the dataset.
     """
-    _, parquet = require_parquet()
     for part in _parts(folder):
-        try:
-            table = parquet.read_table(
-                part, columns=["cell", "status", "error_class"], partitioning=None
-            )
-        except Exception as error:
-            raise BadInputError(
-                f"{part} cannot be read ({type(error).__name__}); remove it, and its cells are "
-                "run again"
-            ) from None
+        table = _read(part, ["cell", "status", "error_class"])
         columns = (table[name].to_pylist() for name in table.column_names)
         for cell, status, error_class in zip(*columns, strict=True):
             yield cell, error_class or status
+
+
+def remove_failed(folder: Path) -> None:
+    """Remove the rows of failed cells, file by file, each whole or not at all.
+
+    A cell without a row is missing: whoever goes on runs it, however this ended.
+    """
+    arrow, _ = require_parquet()
+    for part in _parts(folder):
+        table = _read(part)
+        done = arrow.compute.equal(table["status"], DONE)
+        kept = table.filter(done)
+        if kept.num_rows == table.num_rows:
+            continue
+        if kept.num_rows:
+            _write(part, kept)
+        else:
+            part.unlink()
+
+
+def _read(part: Path, columns: Sequence[str] | None = None) -> Any:
+    """A file of the dataset as a Table.
+
+    Raises:
+        BadInputError: It is damaged.
+    """
+    _, parquet = require_parquet()
+    try:
+        return parquet.read_table(part, columns=columns, partitioning=None)
+    except Exception as error:
+        raise BadInputError(
+            f"{part} cannot be read ({type(error).__name__}); remove it, and its cells are "
+            "run again"
+        ) from None
+
+
+def _write(part: Path, table: Any) -> None:
+    _, parquet = require_parquet()
+    replace_file(part, lambda out: parquet.write_table(table, out, compression="zstd"))
 
 
 def read_cells(folder: str | Path) -> Any:
@@ -161,7 +195,7 @@ def read_cells(folder: str | Path) -> Any:
     The column `backend`, which the folders' names tell, is the last.
 
     Raises:
-        BadInputError: There is no dataset.
+        BadInputError: There is no dataset, or a file of it is damaged.
         MissingEngineError: pyarrow is not installed.
     """
     arrow, _ = require_parquet()
@@ -170,10 +204,15 @@ def read_cells(folder: str | Path) -> Any:
         raise BadInputError(f"{folder} has no cells of a sweep")
     dataset = importlib.import_module("pyarrow.dataset")
     backend = arrow.schema([("backend", arrow.string())])
-    found = dataset.dataset(
-        folder / CELLS,
-        format="parquet",
-        partitioning=dataset.partitioning(backend, flavor="hive"),
-        exclude_invalid_files=False,
-    )
-    return found.to_table().sort_by("cell")
+    try:
+        found = dataset.dataset(
+            folder / CELLS,
+            format="parquet",
+            partitioning=dataset.partitioning(backend, flavor="hive"),
+            exclude_invalid_files=False,
+        )
+        return found.to_table().sort_by("cell")
+    except (arrow.ArrowException, OSError):
+        for part in _parts(folder):
+            _read(part)  # says which one
+        raise

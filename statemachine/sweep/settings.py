@@ -100,6 +100,25 @@ def start_at(model: Model, settings: Iterable[tuple[Vary, Value]]) -> tuple[dict
     return found
 
 
+def beyond_ranges(model: Model, vary: Vary) -> list[str]:
+    """A line for a start that is beyond the range of its joint; legal, and usually a mistake."""
+    if vary.name != "qpos":
+        return []
+    (place,) = start_at(model, [(vary, vary.extremes[0])])[0]
+    joints = np.flatnonzero((model.jnt_qposadr == place) & np.array(model.jnt_limited, dtype=bool))
+    values = [float(value) for value in vary.extremes]
+    for joint in joints.tolist():
+        low, high = (float(end) for end in model.jnt_range[joint])
+        unit = "m" if model.jnt_type[joint] == JointType.SLIDE else "rad"
+        if min(values) < low or max(values) > high:
+            outside = [value for value in values if not low <= value <= high]
+            return [
+                f"{vary.label}={outside[0]:g} starts outside the range of the joint, {low:.4g} to "
+                f"{high:.4g} {unit}: its limit pushes from the first step on"
+            ]
+    return []
+
+
 def drawn_start(model: Model, qpos: Array, spread: Uncertainty, seed: int) -> Array:
     """A start (nq,) near another one, drawn from a seed; that of seed 0 is the same.
 

@@ -17,7 +17,7 @@ from ..interface import Array, Data, Model, State, make_data, reset, set_state, 
 from ..interface.checks import HUGE
 from ..scenarios import Controller, Scenario
 from ..scenarios.provenance import provenance
-from ..scenarios.runs import Progress, check_length, part_of, silent, steps_in
+from ..scenarios.runs import Progress, check_length, part_of, silent, steps_in, write_ctrl
 from .derived import derived
 from .energy import energies
 from .header import Header
@@ -275,7 +275,7 @@ def _run(
                 if wanted.__class__ is plain and wanted.dtype is real and wanted.shape == shape:
                     ctrl[:] = wanted
                 else:
-                    _command(data, wanted, now)
+                    write_ctrl(data, wanted, now)
         keep_time(now)
         keep_qpos(qpos_bytes())
         keep_qvel(qvel_bytes())
@@ -310,13 +310,6 @@ def _stands(row: bytes) -> bool:
     """Whether no finite number of a row is beyond what a trace holds."""
     numbers = np.abs(np.frombuffer(row))
     return not bool(((numbers > HUGE) & np.isfinite(numbers)).any())
-
-
-def _command(data: Data, wanted: Any, time: float) -> None:
-    try:
-        data.ctrl = wanted
-    except BadInputError as error:
-        raise BadInputError(f"what the controller gave at {time:.3f} s: {error}") from None
 
 
 def _plain(value: Any) -> Any:

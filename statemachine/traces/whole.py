@@ -12,7 +12,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from ..errors import BadInputError
+from ..errors import BadInputError, StateMachineError
 
 try:
     import fcntl
@@ -52,19 +52,28 @@ def beside(*targets: Path) -> Iterator[list[str]]:
 
     What a killed process has left of an earlier attempt is removed, where files can be locked:
     not on Windows. What is no file, as /dev/null, is written into and stays what it is.
+
+    Raises:
+        OSError: A file cannot be written; its name is the first place.
     """
     with ExitStack() as stack:
         names = [stack.enter_context(_part_of(target)) for target in targets]
-        yield names
-        for target in targets[1:]:
-            if not _special(target):
-                target.unlink(missing_ok=True)
-        for name, target in zip(names, targets, strict=True):
-            if _special(target):
-                with open(name, "rb") as made, open(target, "wb") as out:
-                    shutil.copyfileobj(made, out)
-            else:
-                os.replace(name, target)
+        try:
+            yield names
+            for target in targets[1:]:
+                if not _special(target):
+                    target.unlink(missing_ok=True)
+            for name, target in zip(names, targets, strict=True):
+                if _special(target):
+                    with open(name, "rb") as made, open(target, "wb") as out:
+                        shutil.copyfileobj(made, out)
+                else:
+                    os.replace(name, target)
+        except OSError as error:
+            if isinstance(error, StateMachineError) or error.filename not in (None, *names):
+                raise
+            # A full disk names no file: the reader is told of the one that was asked for.
+            raise OSError(error.errno, error.strerror, os.fspath(targets[0])) from None
 
 
 def _special(target: Path) -> bool:
