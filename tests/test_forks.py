@@ -78,7 +78,7 @@ def test_what_cannot_be_run_is_told_alike(tmp_path: Path) -> None:
 
     def failing(model: sm.Model, _seed: int) -> Callable[[float, sm.Data], list[float]]:
         begun.append(1)
-        if len(begun) > 2:
+        if len(begun) > 3:
             raise ZeroDivisionError("of the function")
         return lambda _time, _data: [0.0] * model.nu
 

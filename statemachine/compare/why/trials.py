@@ -297,14 +297,20 @@ class Trials:
         """
         found = []
         for side, model in enumerate((one, two)):
-            trace = self._trace(side, model, brought if side else frozenset())
-            found.append(self._curves(side, model, trace))
+            found.append(self._counted(side, model, brought if side else frozenset()))
         return self.ruler.gaps(found[0], found[1]) if found[0] and found[1] else {}
+
+    def _counted(self, side: int, model: Model, brought: frozenset[str]) -> Curves | None:
+        """A run that is not kept."""
+        trace = self._trace(side, model, brought)
+        self.count += 1
+        self._ran()
+        return self._curves(side, model, trace)
 
     def repeats(self) -> bool:
         """Whether the left moves the same when it is run again, so that a gap can have causes."""
-        again = self._curves(0, self._models[0], self._trace(0, self._models[0], frozenset()))
-        first = self._runs[0, frozenset()]
+        again = self._counted(0, self._models[0], frozenset())
+        first = self._runs[0, frozenset()].curves
         assert first is not None  # it has gaps
         return again is not None and all(
             np.array_equal(values, again.of[name]) for name, values in first.of.items()
