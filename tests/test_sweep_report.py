@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import json
 from collections.abc import Callable
@@ -24,10 +25,12 @@ from statemachine.report.terminal import show
 from statemachine.sweep import Design, Sweep, Vary, run_sweep
 from statemachine.sweep.analysis import SweepReport, sweep_report
 from statemachine.sweep.analysis_fit import fit_curves
+from statemachine.sweep.analysis_gaps import SweepRuns, gaps_of, runs_of
 from statemachine.sweep.analysis_indices import variance_shares
+from statemachine.sweep.analysis_together import REFINED, brought_together
 from statemachine.sweep.cell import DONE, FAILED
 from statemachine.sweep.folder import SCHEMA
-from statemachine.sweep.rows import RowWriter
+from statemachine.sweep.rows import RowWriter, read_cells
 
 SIDES = ("mujoco", "pybullet")
 TIMES = 5  # moments of a made-up run
@@ -431,6 +434,57 @@ def test_a_report_of_ten_thousand_rows_has_no_loop_over_moments(tmp_path: Path) 
     one, two = _read(done, None), runs_of(done.to_pylist())
     for name in one.__dataclass_fields__:
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+
+
+class _Runs:
+    """Runs of the made-up engines at any value, as a CellRunner gives them."""
+
+    def __init__(self, left: TipOf, right: TipOf) -> None:
+        self._of = dict(zip(SIDES, (left, right), strict=True))
+
+    def run(self, backends: Any, settings: Any, **_: Any) -> SweepRuns:
+        return runs_of(
+            [
+                {"status": DONE, "steps": 100, "time": 1.0, "sample_qpos": [[0.0]],
+                 "sample_tip": [self._of[backend](*values, seed)]}
+                for backend, (values, seed) in zip(backends, settings, strict=True)
+            ]
+        )  # fmt: skip
+
+
+def test_where_a_run_contradicts_the_fit_the_best_run_is_the_answer(tmp_path: Path) -> None:
+    """A tip that jumps over what the left one does, as over a contact: 5 mm is the least gap."""
+    vary = grid("gain", 0, 2, 9, kind="parameter")
+
+    def right(gain: float, _seed: int) -> list[float]:
+        return along_x(5e-3 + 20e-3 * (gain - 0.62) if gain >= 0.62 else -20e-3 + 2e-3 * gain)
+
+    folder = made_up(tmp_path / "s", Design((vary,)), nowhere, right)
+    report = of(folder, tolerances={"tip": 0.2e-3}, fit=["gain"])
+    (fit,) = report.together
+    assert fit.fit is not None
+    assert fit.fit.gap < 1e-3  # which no run gives
+    assert fit.best is None
+    runner: Any = _Runs(nowhere, right)
+    gaps = gaps_of(read_cells(folder), Design((vary,)), SIDES, 1)
+    found = brought_together(gaps, vary, "tip", 0.2e-3, varied="both", runner=runner)
+    assert found.measured is not None
+    assert found.measured > 5e-3
+    assert found.best is not None
+    assert found.value == found.best.value == pytest.approx(0.625)
+    assert found.after == min(found.best.tried[1]) == pytest.approx(5.1e-3)
+    assert found.error == found.best.apart == pytest.approx(0.25 / (REFINED - 1))
+    assert found.verdict == "closer"
+    assert found.cells == 2 * (1 + REFINED)
+    said = " ".join(text(page(dataclasses.replace(report, together=(found,)))).split())
+    assert "gain = 0.625 ± 0.031 in both brings mujoco and pybullet closer" in said
+    assert "9 values from 0.5 to 0.75 were run, 0.03125 apart" in said
+    # Where it agrees with the fit nothing more is run.
+    runner = _Runs(nowhere, lambda gain, _: along_x(5e-3 * (gain - 0.61)))
+    folder = made_up(tmp_path / "t", Design((vary,)), *runner._of.values())
+    gaps = gaps_of(read_cells(folder), Design((vary,)), SIDES, 1)
+    found = brought_together(gaps, vary, "tip", 0.2e-3, varied="both", runner=runner)
+    assert (found.best, found.cells) == (None, 2)
 
 
 @pytest.mark.slow

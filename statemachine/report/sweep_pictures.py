@@ -99,9 +99,11 @@ def fit_curve(found: SweepReport, each: BroughtTogether) -> Traces | None:
         "predicted": (x, [value * scale for value in y]),
         "tolerance": ([x[0], x[-1]], [found.quantity.tolerance * scale] * 2),
     }
-    value = each.fit.value
-    if each.measured is not None:
-        width = 0.01 * (x[-1] - x[0])
+    if each.best is not None:
+        pairs = sorted(zip(*each.best.tried, strict=True))
+        curves["run"] = ([v for v, _ in pairs], [gap * scale for _, gap in pairs])
+    elif each.measured is not None:
+        value, width = each.fit.value, 0.01 * (x[-1] - x[0])
         curves["run there"] = ([value - width, value + width], [each.measured * scale] * 2)
     across = each.label + (" [times the model's own]" if each.times else "")
     side = found.sides[1] if each.varied == "right" else "both"

@@ -20,7 +20,6 @@ from .sweep_pictures import bars, fit_curve, map_picture, size_word, value_word
 
 _SHOWN = 5  # settings of the largest gaps
 _COLUMNS = 7  # of a map that 80 characters have room for
-_NEAR = 0.5  # of the measured gap: a prediction that is farther off is called so
 _SAYS = {
     "agrees": "agree at every seed",
     "some seeds": "agree at some seeds",
@@ -121,9 +120,9 @@ def _floor(found: SweepReport) -> str:
         "one)"
     )  # fmt: skip
     return (
-        f"The chaos floor: {floor.backend} ran again from starts that differ by "
-        f"{floor.rounding:g}, at {where}: {count(floor.cells, 'cell')}, "
-        f"{floor.seconds:.2g} s. The largest gap that this makes is "
+        f"The chaos floor is what rounding alone makes of a run: {floor.backend} ran again, its "
+        f"starts and commands changed by {floor.rounding:g}, at {where}: "
+        f"{count(floor.cells, 'cell')}, {floor.seconds:.2g} s. The largest gap that this makes is "
         f"{rough(max(widths), main.unit)}. "
         + (
             f"In {count(inside, 'setting')} the gap between the engines is inside it: nothing can "
@@ -286,9 +285,8 @@ def _line(found: SweepReport, each: BroughtTogether) -> str:
     what = found.quantity.says
     if fit is None:
         return f"{each.label} is not fitted: {each.why_not}."
-    gap = fit.gap if each.measured is None else each.measured
     before = f"{quantity(each.before, unit)} → " if each.before is not None else ""
-    sizes = f"{what} {before}{quantity(gap, unit)}"
+    sizes = f"{what} {before}{quantity(each.after, unit)}"
     value = _fitted(each)
     if each.verdict == "none" and _is_own(each):
         return f"The model's own {each.label} is the best already: at {value}, {sizes}."
@@ -308,11 +306,10 @@ def _line(found: SweepReport, each: BroughtTogether) -> str:
 
 def _is_own(each: BroughtTogether) -> bool:
     """Whether the value is the model's own, as far as its error tells."""
-    fit = each.fit
-    if fit is None or each.own is None:
+    if each.fit is None or each.value is None or each.own is None:
         return False
-    wide = fit.bounds[1] - fit.bounds[0]
-    return abs(fit.value - each.own) <= max(2 * (fit.error or 0.0), 0.02 * wide)
+    wide = each.fit.bounds[1] - each.fit.bounds[0]
+    return abs(each.value - each.own) <= max(2 * (each.error or 0.0), 0.02 * wide)
 
 
 def _how(found: SweepReport, each: BroughtTogether) -> str:
@@ -325,7 +322,7 @@ def _how(found: SweepReport, each: BroughtTogether) -> str:
     else:
         said = [f"Both sides have the same {each.label}."]
     assert fit is not None
-    error = "" if fit.error is None else f"; ± is its standard error, from {fit.of}"
+    error = "" if fit.error is None or each.best else f"; ± is its standard error, from {fit.of}"
     said.append(
         f"Least gap between {_times(each, fit.bounds[0])} and {_times(each, fit.bounds[1])}, "
         f"in the mean of {count(fit.curves, 'curve')} over settings and seeds{error}."
@@ -342,25 +339,28 @@ def _how(found: SweepReport, each: BroughtTogether) -> str:
             f"Run there, {count(each.pairs, 'pair')}: {quantity(each.measured, unit)}; predicted "
             f"{quantity(each.predicted, unit)}."
         )
-        near = max(_NEAR * each.measured, found.quantity.tolerance)
-        if each.predicted is not None and abs(each.predicted - each.measured) > near:
+        if each.best is not None:
+            values = each.best.tried[0]
             said.append(
-                "That is far off: between its values the design is too coarse for this gap."
+                "That is far off: between its values the design is too coarse for this gap. So "
+                f"{len(values) - 1} values from {_times(each, min(values))} to "
+                f"{_times(each, max(values))} were run, {_times(each, each.best.apart)} apart: "
+                "the value above is the best of them, and ± is that distance."
             )
     return " ".join(said)
 
 
 def _fitted(each: BroughtTogether) -> str:
     """The value with its error, to the digits that the error leaves."""
-    fit = each.fit
+    fit, value, error = each.fit, each.value, each.error
     assert fit is not None
     times = "x" if each.times else ""
-    if fit.error is None or not fit.error > 0:
-        return f"{fit.value:.3g}{times}"
+    if error is None or not error > 0:
+        return f"{value:.3g}{times}"
     wide = fit.bounds[1] - fit.bounds[0]
-    error = max(fit.error, 1e-4 * wide)  # the interpolation knows no more
+    error = max(error, 1e-4 * wide)  # the interpolation knows no more
     digits = max(0, -int(f"{error:e}".partition("e")[2]) + 1)
-    return f"{fit.value:.{digits}f}{times} ± {error:.{digits}f}{times}"
+    return f"{value:.{digits}f}{times} ± {error:.{digits}f}{times}"
 
 
 def _times(each: BroughtTogether, value: float) -> str:

@@ -54,7 +54,7 @@ class CellRunner:
         Args:
             backends: The engine of each.
             settings: Values and seed of each.
-            nudges: For each what a change of its start by rounding is drawn from.
+            nudges: For each what a change of its start and commands by rounding is drawn from.
             own: A factor that is as the model has it, whatever the settings say.
             progress: Told the fraction that is done.
         """
