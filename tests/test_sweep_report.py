@@ -27,6 +27,7 @@ from statemachine.sweep.analysis import SweepReport, sweep_report
 from statemachine.sweep.analysis_fit import fit_curves
 from statemachine.sweep.analysis_gaps import SweepRuns, gaps_of, runs_of
 from statemachine.sweep.analysis_indices import variance_shares
+from statemachine.sweep.analysis_runs import facts_of
 from statemachine.sweep.analysis_together import REFINED, brought_together
 from statemachine.sweep.cell import DONE, FAILED
 from statemachine.sweep.folder import SCHEMA
@@ -250,7 +251,7 @@ def test_settings_agree_by_the_tolerance(tmp_path: Path) -> None:
 
 
 def test_a_gap_inside_the_chaos_floor_is_no_difference(tmp_path: Path) -> None:
-    from statemachine.sweep import analysis
+    from statemachine.sweep import analysis, analysis_agreement
     from statemachine.sweep.analysis_gaps import gaps_of
     from statemachine.sweep.analysis_runs import ModelFacts
     from statemachine.sweep.folder import design_of, read_manifest
@@ -259,8 +260,8 @@ def test_a_gap_inside_the_chaos_floor_is_no_difference(tmp_path: Path) -> None:
     folder = agreement(tmp_path / "s", seeds=1)
     design = design_of(read_manifest(folder))
     gaps = gaps_of(read_cells(folder), design, SIDES, 1)
-    width = np.full(10, 2.5e-3)
-    found, settings = analysis._agreement(gaps, "tip", width, ModelFacts(), {"tip": 1.5e-3})
+    width, tolerances = np.full(10, 2.5e-3), {"tip": 1.5e-3}
+    found, settings = analysis_agreement.agreement_of(gaps, "tip", width, ModelFacts(), tolerances)
     verdicts = {each.values[0]: each.verdict for each in settings if each.values[1] == 0}
     assert verdicts == {0: "agrees", 1: "agrees", 2: "chaos", 3: "no runs", 4: "differs"}
     chart = analysis.gap_map(gaps, analysis.median(gaps.gap("tip")), width, None)
@@ -390,6 +391,7 @@ def test_pictures_and_page_are_of_the_same_figures(tmp_path: Path) -> None:
     html, plot = tmp_path / "r.html", tmp_path / "r.png"
     arguments = ["sweep", "--report", str(folder), "--no-runs", "--tolerance", "tip=1.5mm"]
     assert main([*arguments, "--html", str(html), "--plot", str(plot)]) == 1
+    assert (chart.across, chart.unit) == ("x", "gap [mm]")
     page_text = html.read_text("utf-8")
     assert page_text.count("data:image/svg+xml;base64,") == 3
     assert "In 2 of 10 settings" in page_text
@@ -403,6 +405,22 @@ def test_one_parameter_is_a_curve(tmp_path: Path) -> None:
     curve = pictures(of(folder))[0]
     assert isinstance(curve, Traces)
     assert curve.curves["median of the seeds"] == ([0, 1, 2, 3, 4], pytest.approx([0, 1, 2, 3, 4]))
+
+
+def test_an_axis_says_what_its_values_are_in() -> None:
+    pytest.importorskip("mujoco")
+    factors = [
+        Vary("timestep", values=(0.001, 0.002)),
+        Vary("damping", values=(0.5, 1.0), times=True),
+        Vary("damping", "elbow_flex", values=(0.5, 1.0)),
+        Vary("qpos", "elbow_flex", "state", values=(0.5, 1.0)),
+        Vary("gain", kind="parameter", values=(0.5, 1.0)),
+    ]
+    units = facts_of({"files": {"so101/scene_box": ""}}, factors, ["mujoco"]).units
+    assert units == {
+        "timestep": "s", "damping": "", "damping[elbow_flex]": "N·m·s/rad",
+        "qpos[elbow_flex]": "rad", "gain": "",
+    }  # fmt: skip
 
 
 def test_what_does_not_go_together_is_said(tmp_path: Path, capsys: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -9,9 +10,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..errors import BadInputError, MissingEngineError
+from ..errors import BadInputError
+from ..installed import require_extra
 from ..page import Bars, Block, HeatMap, Pipeline, Slots, Traces
-from ..traces.whole import replace_file
+from ..traces.whole import replace_bytes
 from .log_axis import LogAxis
 
 _COLOURS = ("#1f5fa8", "#c2571a", "#2f8f4e", "#8a4fa0", "#b03a48", "#6b6b6b", "#3aa6a6")
@@ -23,12 +25,66 @@ _POWERS = 8  # that a log axis names, at most
 
 Drawn = Traces | Slots | Pipeline | HeatMap | Bars
 _DOTS = 150  # a PNG has to an inch
-# The same figures give the same bytes: no date, no version.
-METADATA: dict[str, dict[str, Any]] = {
+SUFFIXES = (".svg", ".png", ".pdf")
+# The same figures give the same bytes: no settings of the user's, no random names, no date, no
+# version.
+SETTINGS: dict[str, Any] = {
+    "svg.fonttype": "none",  # text stays text: small, and found by a search
+    "svg.hashsalt": "statemachine",
+    "pdf.fonttype": 42,
+    "text.parse_math": False,  # a name may have a $ in it
+}
+_METADATA: dict[str, dict[str, Any]] = {
     "svg": {"Date": None},
     "png": {"Software": None},
     "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
 }
+
+
+def check_suffix(path: Path) -> str:
+    """The form of a figure's file, "svg", "png" or "pdf".
+
+    Raises:
+        BadInputError: It is no figure.
+        MissingEngineError: matplotlib is not installed.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        kinds = f"{', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
+        raise BadInputError(f"a figure is a file {kinds}; got {path.name!r}")
+    require_matplotlib()
+    return suffix.lstrip(".")
+
+
+def require_matplotlib() -> Any:
+    """The package matplotlib.
+
+    Raises:
+        MissingEngineError: It is not installed; the message names the extra.
+    """
+    require_extra("matplotlib.figure", "a figure", "matplotlib", "plot")
+    return importlib.import_module("matplotlib")
+
+
+def saved(draw: Callable[[], Any], form: str, settings: dict[str, Any], **how: Any) -> bytes:
+    """What is drawn, as svg, png or pdf; the same gives the same bytes.
+
+    Args:
+        draw: Makes a figure of matplotlib's.
+        form: "svg", "png" or "pdf".
+        settings: Of matplotlib.
+        how: What `savefig` takes.
+
+    Raises:
+        MissingEngineError: matplotlib is not installed.
+    """
+    matplotlib = require_matplotlib()
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(settings)
+        out = io.BytesIO()
+        draw().savefig(out, format=form, metadata=_METADATA[form], **how)
+    return out.getvalue()
 
 
 def svg(picture: Drawn) -> str:
@@ -48,15 +104,13 @@ def write_pictures(blocks: Sequence[Block], path: Path) -> int:
         path: A file .svg, .png or .pdf, written whole or not at all.
 
     Raises:
-        BadInputError: There is no picture among them.
+        BadInputError: There is no picture among them, or another suffix.
         MissingEngineError: matplotlib is not installed.
     """
     pictures = [block for block in blocks if isinstance(block, Drawn)]
     if not pictures:
         raise BadInputError("there is no picture to write")
-    content = drawn(pictures, path.suffix.lower().lstrip("."))
-    replace_file(path, lambda out: out.write(content))
-    return len(content)
+    return replace_bytes(path, drawn(pictures, check_suffix(path)))
 
 
 def drawn(pictures: Sequence[Drawn], form: str) -> bytes:
@@ -65,19 +119,12 @@ def drawn(pictures: Sequence[Drawn], form: str) -> bytes:
     Raises:
         MissingEngineError: matplotlib is not installed.
     """
-    try:
-        import matplotlib
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingEngineError(
-            "pictures need matplotlib: pip install 'statemachine-sim[docs]'", engine="matplotlib"
-        ) from error
     sizes = [_SIZES[type(picture)](picture) for picture in pictures]
     heights = [height for _, height in sizes]
-    # Text as paths would be twice as large; without a salt and a date each run differs.
-    with matplotlib.rc_context(
-        {"svg.fonttype": "none", "svg.hashsalt": "statemachine", "text.parse_math": False}
-    ):
+
+    def draw() -> Any:
+        from matplotlib.figure import Figure
+
         size = max(width for width, _ in sizes), sum(heights)
         figure = Figure(
             figsize=size, facecolor=_PAPER, layout="constrained" if heights[1:] else None
@@ -87,9 +134,9 @@ def drawn(pictures: Sequence[Drawn], form: str) -> bytes:
             cast("Callable[[Any, Any], None]", _DRAW[type(picture)])(axes, picture)
             if heights[1:]:
                 axes.set_title(picture.title, fontsize="medium", loc="left")
-        out = io.BytesIO()
-        figure.savefig(out, format=form, dpi=_DOTS, bbox_inches="tight", metadata=METADATA[form])
-    return out.getvalue()
+        return figure
+
+    return saved(draw, form, SETTINGS, dpi=_DOTS, bbox_inches="tight")
 
 
 def _traces(axes: Any, picture: Traces) -> None:
