@@ -24,6 +24,7 @@ from statemachine.errors import (
     UnknownNameError,
 )
 from statemachine.gym.policies import play, random_policy, scripted_policy
+from statemachine.gym.render import CAMERA, SIZE
 from statemachine.gym.tasks import TASKS, HeldBox, Reach
 from statemachine.gym.vector import ArmVectorEnv
 from statemachine.rendering import renderer_here
@@ -102,6 +103,27 @@ def test_each_world_has_its_picture() -> None:
         one, two = envs.render()
         assert one.shape == two.shape == (360, 480, 3)
         assert not np.array_equal(one, two)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("task", IDS)
+def test_the_target_is_in_the_picture(task: str) -> None:
+    """A violet ball where the target is, and nowhere else; in each world its own."""
+    renderer_here()
+    with closing(_make_vec(task, "mujoco", 2, render_mode="rgb_array")) as envs:
+        seen, _ = envs.reset(seed=1)
+        targets = seen[:, -6:-3]
+        for picture, target in zip(envs.render(), targets, strict=True):
+            x, y = CAMERA.seen(target[None], SIZE[0] / SIZE[1])[0]
+            column, row = np.round((np.array([x, -y]) + 1) / 2 * SIZE - 0.5).astype(int)
+            red, green, blue = np.moveaxis(picture.astype(int), -1, 0)
+            violet = (blue > green + 25) & (red > green + 10)
+            rows, columns = np.nonzero(violet)
+            assert violet[row - 1 : row + 2, column - 1 : column + 2].all()
+            assert np.hypot(rows - row, columns - column).max() < 20
+    fresh = _make(task, "mujoco", render_mode="rgb_array")
+    with fresh as env, pytest.raises(ResetNeeded, match="before render"):
+        env.unwrapped.render()
 
 
 def test_an_observation_is_of_the_present(backend: str) -> None:

@@ -28,6 +28,7 @@ from statemachine.errors import (
     EngineWarning,
     UnsupportedError,
 )
+from statemachine.interface import worlds as interface_worlds
 from statemachine.interface.worlds import BATCHED
 from statemachine.worlds import (
     Worlds,
@@ -391,10 +392,10 @@ def test_engines_are_silent_and_warn_once(
 def test_worlds_that_do_not_fit_are_refused_in_one_line(
     model: sm.Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pool, "free_memory", lambda: 300 << 20)
-    pool._check_memory(12, [{"each": 30 << 20, "left": 4}, {"each": 29 << 20, "left": 4}])
+    monkeypatch.setattr(interface_worlds, "free_memory", lambda: 300 << 20)
+    interface_worlds.check_memory(12, 30 << 20, made=4)
     with pytest.raises(EngineError) as raised:
-        pool._check_memory(1004, [{"each": 30 << 20, "left": 500}, {"each": 0, "left": 500}])
+        interface_worlds.check_memory(1004, 30 << 20, made=4)
     assert str(raised.value) == (
         "1004 worlds do not fit into memory: one takes 31 MB, and 0.3 GB are free: make 13 at most"
     )
@@ -406,7 +407,7 @@ def test_memory_is_measured_and_no_process_is_left_by_a_refusal(
 ) -> None:
     need_engine("pybullet")
     model = sm.load("so101", backend="pybullet")
-    monkeypatch.setattr(pool, "free_memory", lambda: 200 << 20)
+    monkeypatch.setattr(interface_worlds, "free_memory", lambda: 200 << 20)
     started: list[int] = []
     starting = pool.PoolWorlds._fill
 

@@ -10,7 +10,8 @@ import pytest
 
 import statemachine as sm
 from statemachine import worlds
-from statemachine.errors import BadInputError, UnknownNameError
+from statemachine.errors import BadInputError, EngineError, UnknownNameError
+from statemachine.interface import worlds as interface_worlds
 from statemachine.worlds import LogUniform, Uniform, draw, make_worlds
 
 from .conftest import ROOT
@@ -152,6 +153,101 @@ def test_a_state_moves_to_a_data_of_the_worlds_model(box: Any) -> None:
                 np.testing.assert_array_equal(many.qvel[i], data.qvel)
                 worlds.set_state(many, i, sm.get_state(model, data))
                 assert many.time[i] == data.time
+
+
+SLEEPY = """
+<mujoco><option timestep="0.002"><flag sleep="enable"/></option><worldbody>
+  <geom type="plane" size="2 2 .1"/>
+  <body pos="0 0 .12"><freejoint/><geom type="box" size=".1 .1 .1"/></body>
+  <body pos="1 1 .12"><freejoint/><geom type="box" size=".1 .1 .1"/></body>
+  <body pos=".5 0 .5"><joint name="a" axis="0 1 0" damping=".5"/><geom size=".05" pos=".1 0 0"/>
+    <body pos=".2 0 0"><joint name="b" axis="0 1 0" damping=".3"/>
+      <geom size=".05" pos=".1 0 0"/></body></body></worldbody>
+  <actuator><position kp="20" joint="a"/><position kp="10" joint="b"/></actuator></mujoco>
+"""
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("scene", ["box", "box, substeps and times", "asleep"])
+def test_worlds_of_any_latency_live_as_data_of_replaced_models(
+    box: Any, tmp_path: Any, scene: str, seed: int
+) -> None:
+    """States go both ways, time is set back and forth, worlds are reset: the same bits.
+
+    Where a tree falls asleep the engine computes the forces once more, after the newest command
+    has taken the place of the oldest; so a memory that keeps more gives another qacc.
+    """
+    rng = np.random.default_rng(seed)
+    model = box
+    options: dict[str, Any] = {"latency": rng.uniform(0, 0.05, (3, 6))}
+    if scene == "asleep":
+        (tmp_path / "asleep.xml").write_text(SLEEPY)
+        model, options = sm.load(tmp_path / "asleep.xml"), {"latency": rng.uniform(0, 0.05, 3)}
+    elif "times" in scene:
+        model = model.replace(latency=0.02)
+        options |= {"timestep": [0.004, 0.002, 0.003], "substeps": [2] * 3}
+    models = [model.replace(**{k: v[i] for k, v in options.items()}) for i in range(3)]
+    kept: dict[int, Any] = {}
+    with make_worlds(model, 3, workers=2, **options) as many:
+        data = [sm.make_data(each) for each in models]
+        for _ in range(300):
+            if rng.random() < 0.3:
+                many.ctrl[:] = rng.uniform(-0.5, 0.5, many.ctrl.shape)
+                for each, row in zip(data, many.ctrl, strict=True):
+                    each.ctrl[:] = row
+            world = int(rng.integers(3))
+            interrupt(many, models[world], data[world], world, rng, kept)
+            nstep, ids = int(rng.integers(1, 4)), np.flatnonzero(rng.random(3) < 0.8)
+            worlds.step(many, nstep, ids=ids)
+            for i in ids:
+                sm.step(models[i], data[i], nstep)
+            for i, each in enumerate(data):
+                for field in (*FIELDS, *many.derived):
+                    ours, single = getattr(many, field)[i], getattr(each, field)
+                    np.testing.assert_array_equal(ours, single, err_msg=f"{field}[{i}]")
+        for i, each in enumerate(models):
+            assert many.model_of(i).raw.nhistory == each.raw.nhistory
+
+
+def interrupt(
+    many: Any, model: Any, data: Any, world: int, rng: np.random.Generator, kept: dict[int, Any]
+) -> None:
+    """Now and then a reset, a State that is kept or taken back, or a time that is set."""
+    what = rng.random()
+    if what < 0.04:
+        key = 0 if model.keyframes and rng.random() < 0.5 else None
+        worlds.reset(many, ids=[world], keyframe=key)
+        sm.reset(model, data, key)
+    elif what < 0.09 and world not in kept:
+        kept[world] = worlds.get_state(many, world), sm.get_state(model, data)
+        assert kept[world][0] == kept[world][1]
+    elif what < 0.14 and world in kept:
+        ours, single = kept.pop(world)  # either is the other's
+        worlds.set_state(many, world, single)
+        sm.set_state(model, data, ours)
+    elif what < 0.2:
+        many.time[world] += rng.choice([-1.0, -0.05, -0.013, 0.02])
+        data.time = many.time[world]
+
+
+def test_a_latency_that_memory_cannot_hold_is_refused(backend: str) -> None:
+    """Before an engine sees it: the option, what it would take and what there is."""
+    model = sm.load("so101", backend=backend)
+    for step in (1e-9, 1e-300):
+        with pytest.raises(BadInputError, match=r"latency of 10 s .* GB in a Data, which may"):
+            model.replace(latency=10, timestep=step)
+    with pytest.raises(BadInputError, match="latency of 1 s is too long for engine steps of 1e-09"):
+        make_worlds(model, 2, latency=[0, 1], timestep=[1e-9] * 2).close()
+    assert model.replace(latency=0, timestep=1e-9).timestep == 1e-9
+
+
+def test_worlds_that_do_not_fit_are_refused(box: Any, monkeypatch: Any) -> None:
+    monkeypatch.setattr(interface_worlds, "free_memory", lambda: 10**6)
+    with pytest.raises(EngineError, match=r"1000 worlds do not fit into memory: one takes .* kB"):
+        make_worlds(box, 1000)
+    with pytest.raises(EngineError, match="20000 commands that its latency keeps"):
+        make_worlds(box, 2, latency=[0, 2], timestep=[1e-4] * 2)
+    make_worlds(box, 10).close()
 
 
 def test_a_subset_reset_to_a_keyframe_holds_under_latency(box: Any) -> None:

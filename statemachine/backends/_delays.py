@@ -14,9 +14,13 @@ from functools import cache
 import mujoco
 import numpy as np
 
+from ..errors import BadInputError
 from ..interface import Array, Ints
+from ..processes import free_memory
 
 SHORTER = 1 - 1e-6
+_LARGE = 1e7  # bytes of buffers, from which on it is asked what memory is free
+_MOST = 8.0 * 2**31  # bytes: the engine counts the numbers of the buffers in a C int
 _SMALL = """<mujoco><worldbody><body><joint name="j"/><geom size="1"/></body></worldbody>
 <actuator><motor joint="j" delay="1" nsample="{}"/></actuator></mujoco>"""
 
@@ -24,53 +28,146 @@ _SMALL = """<mujoco><worldbody><body><joint name="j"/><geom size="1"/></body></w
 def delay_steps(m: mujoco.MjModel) -> Ints:
     """Engine steps (nu,) by which each number of ctrl acts late."""
     owner = np.repeat(np.arange(m.nactuator), m.actuator_ctrlnum)
-    steps = needed(m.actuator_delay, m.opt.timestep)
-    return np.minimum(steps, m.actuator_history[:, 0])[owner]
+    steps = np.minimum(_needed(m.actuator_delay, m.opt.timestep), m.actuator_history[:, 0])
+    return steps.astype(np.int64)[owner]
 
 
-def needed(delay: Array, timestep: Array | float) -> Ints:
-    """Commands that have to be kept for delays [s], of any shape: the oldest acts."""
-    return np.ceil(delay / timestep - 1e-9).astype(np.int64)
+def commands_kept(m: mujoco.MjModel, delay: Array, timestep: Array | float) -> Ints:
+    """How many commands each actuator keeps: what its delay needs, and what the file asks for.
+
+    Args:
+        m: The compiled model; its own delays and timestep are not looked at.
+        delay: (..., nactuator) [s].
+        timestep: (...) length of an engine step [s].
+
+    Returns:
+        (..., nactuator).
+
+    Raises:
+        BadInputError: The memory that is free cannot hold so many.
+    """
+    steps = np.asarray(timestep)[..., None]
+    kept = np.maximum(_needed(delay, steps), m.actuator_history[:, 0])
+    sizes = 8.0 * (kept * (1 + m.actuator_ctrlnum)).sum(axis=-1)  # bytes
+    if sizes.max() > _LARGE:
+        limit = min(_MOST, free_memory() or _MOST)
+        if sizes.max() > limit:
+            worst = np.unravel_index(sizes.argmax(), sizes.shape)
+            longest = float(np.broadcast_to(delay, kept.shape)[worst].max()) / SHORTER
+            length = float(np.broadcast_to(timestep, sizes.shape)[worst])
+            raise BadInputError(
+                f"a latency of {longest:.4g} s is too long for engine steps of {length:.4g} s: "
+                f"the {kept[worst].max():.3g} commands that are on their way take "
+                f"{sizes[worst] / 1e9:.3g} GB in a Data, which may take {limit / 1e9:.3g} GB here"
+            )
+    return kept.astype(np.int64)
 
 
-def with_room(m: mujoco.MjModel, least: Ints | int = 0) -> mujoco.MjModel:
+def with_room(m: mujoco.MjModel, kept: Ints | None = None) -> mujoco.MjModel:
     """The same model, with a buffer for the delay of every actuator; itself if it has them.
 
     Args:
         m: The compiled model, with its timestep and delays.
-        least: Commands to keep, (nactuator,), where more than the delays need.
+        kept: Commands to keep, (nactuator,); by default `commands_kept` of its own delays.
+
+    Raises:
+        BadInputError: As in `commands_kept`.
     """
-    kept = np.maximum(needed(m.actuator_delay, m.opt.timestep), least)
-    short = np.flatnonzero(kept > m.actuator_history[:, 0])
+    if kept is None:
+        kept = commands_kept(m, m.actuator_delay, m.opt.timestep)
+    short, starts = _appended(m, kept)
     if not len(short):
         return m
-    # Two numbers of the buffer's own, and a time and a command for each that is kept.
-    sizes = 2 + kept[short] * (1 + m.actuator_ctrlnum[short])
-    starts = m.nhistory + np.cumsum([0, *sizes])
-    blob = _saved(m)
-    at = _history_offset()
-    blob[at : at + 8] = np.frombuffer(struct.pack("<q", int(starts[-1])), np.uint8)
-    roomy = mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": blob.tobytes()})
+    roomy = _of_size(m, int(starts[-1]))
     roomy.actuator_history[short, 0] = kept[short]
     roomy.actuator_historyadr[short] = starts[:-1]
     return roomy
 
 
-def hold(m: mujoco.MjModel, history: Array, ctrl: Array) -> None:
+def with_room_of(m: mujoco.MjModel, before: mujoco.MjModel, kept: Ints) -> mujoco.MjModel:
+    """What `with_room` would make of one of many worlds that share larger buffers.
+
+    Args:
+        m: The compiled model of the world, in the buffers that all share.
+        before: The compiled model before it got room for all.
+        kept: Commands that this world keeps, (nactuator,).
+    """
+    own = _of_size(m, before.nhistory)
+    own.actuator_history[:] = before.actuator_history
+    own.actuator_historyadr[:] = before.actuator_historyadr
+    return with_room(own, kept)
+
+
+def places_of(before: mujoco.MjModel, shared: mujoco.MjModel, kept: Ints) -> Ints:
+    """Where the buffers of a Data of one world's model are in those that many worlds share.
+
+    Args:
+        before: The compiled model before it got room.
+        shared: With room for all worlds.
+        kept: Commands that this world keeps, (nactuator,).
+
+    Returns:
+        (nhistory of that Data,), places in (nhistory of `shared`,).
+    """
+    short, starts = _appended(before, kept)
+    first = before.actuator_historyadr.copy()
+    first[short] = starts[:-1]
+    places = np.arange(starts[-1])
+    for a in np.flatnonzero(kept):
+        size = 2 + int(kept[a]) * (1 + int(before.actuator_ctrlnum[a]))
+        start = int(shared.actuator_historyadr[a])
+        places[first[a] : first[a] + size] = np.arange(start, start + size)
+    return places
+
+
+def hold(m: mujoco.MjModel, history: Array, ctrl: Array, kept: Ints | None = None) -> None:
     """Let the commands before the start have been that of the start.
 
     Args:
         m: The compiled model.
         history: (..., nhistory), the buffers of MjData after a reset; written to.
         ctrl: (..., nu).
+        kept: (n, nactuator) commands that each of n worlds keeps, where they differ.
     """
-    for a in np.flatnonzero(m.actuator_history[:, 0]):
-        kept, own = int(m.actuator_history[a, 0]), int(m.actuator_ctrlnum[a])
-        first = int(m.actuator_historyadr[a]) + 2 + kept
-        number = int(m.actuator_ctrladr[a])
-        for k in range(kept):
+    if kept is not None:
+        for alike in np.unique(kept, axis=0):
+            which = (kept == alike).all(axis=1)
+            rows = history[which]
+            _hold(m, rows, ctrl[which], alike)
+            history[which] = rows
+    else:
+        _hold(m, history, ctrl, m.actuator_history[:, 0])
+
+
+def _hold(m: mujoco.MjModel, history: Array, ctrl: Array, kept: Ints) -> None:
+    for a in np.flatnonzero(kept):
+        own, number = int(m.actuator_ctrlnum[a]), int(m.actuator_ctrladr[a])
+        first = int(m.actuator_historyadr[a]) + 2 + int(kept[a])
+        for k in range(int(kept[a])):
             start = first + k * own
             history[..., start : start + own] = ctrl[..., number : number + own]
+
+
+def _needed(delay: Array, timestep: Array | float) -> Array:
+    """Commands that have to be kept for delays [s], of any shape: the oldest acts."""
+    with np.errstate(over="ignore"):  # infinitely many, which `commands_kept` refuses
+        return np.ceil(delay / timestep - 1e-9)
+
+
+def _appended(m: mujoco.MjModel, kept: Ints) -> tuple[Ints, Ints]:
+    """Actuators that need a larger buffer, and where each starts; last, where they all end."""
+    short = np.flatnonzero(kept > m.actuator_history[:, 0])
+    # Two numbers of the buffer's own, and a time and a command for each that is kept.
+    sizes = 2 + kept[short] * (1 + m.actuator_ctrlnum[short])
+    return short, m.nhistory + np.cumsum([0, *sizes])
+
+
+def _of_size(m: mujoco.MjModel, nhistory: int) -> mujoco.MjModel:
+    """A copy whose Data have buffers of another size."""
+    blob = _saved(m)
+    at = _history_offset()
+    blob[at : at + 8] = np.frombuffer(struct.pack("<q", nhistory), np.uint8)
+    return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": blob.tobytes()})
 
 
 def _saved(m: mujoco.MjModel) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..interface import Array, Ints
-from ._delays import SHORTER, needed, with_room
+from ._delays import SHORTER, commands_kept, with_room
 
 _DISABLE = mujoco.mjtDisableBit
 _SWITCHES = {  # option of `replace` -> the flag that turns it off
@@ -105,8 +105,13 @@ def varied(
         put(raw, name, found.pop(name))
     delay = found.get("actuator_delay", raw.actuator_delay)
     timestep = np.asarray(found.get("opt.timestep", raw.opt.timestep))
-    steps = np.atleast_2d(needed(delay, timestep[..., None]))
-    return with_room(raw, steps.max(axis=0)), found
+    kept = commands_kept(raw, delay, timestep)
+    most = np.atleast_2d(kept).max(axis=0)
+    if (kept != most).any():
+        history = np.repeat(raw.actuator_history[None], len(kept), axis=0)
+        history[..., 0] = kept
+        found["actuator_history"] = history
+    return with_room(raw, most), found
 
 
 def _rows(array: Array, value: Any) -> Array:

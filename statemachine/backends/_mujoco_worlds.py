@@ -8,6 +8,7 @@ by running it once more alone, from where the call began.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any
 
 import mujoco
@@ -17,8 +18,8 @@ from mujoco.batch import Batch, SimulationError
 from ..errors import BadInputError, UnsupportedError
 from ..interface import Array, Ints, Model, State
 from ..interface.checks import check_finite
-from ..interface.worlds import WRITABLE, Worlds
-from ._delays import hold
+from ..interface.worlds import WRITABLE, Worlds, check_memory
+from ._delays import hold, places_of, with_room_of
 from ._mujoco_alarms import (
     FATAL,
     AlarmError,
@@ -45,7 +46,8 @@ class MujocoWorlds(Worlds):
     _base: Model
     _varied: bool
     _history: Any  # (n, nhistory), or None
-    _layout: tuple[str, tuple[tuple[str, int], ...]]
+    _kept: Any  # (n, nactuator) commands that each world keeps; None where all keep as many
+    _layout: Callable[[int], tuple[str, tuple[tuple[str, int], ...]]]  # see `__init__`
     _warned: Any  # (n, kinds, 2) the engine's counters: last index, number
     _told: Any  # what they were when they were last looked at
 
@@ -56,7 +58,7 @@ class MujocoWorlds(Worlds):
         size: tuple[int, int],
         derived: tuple[str, ...],
         varied: tuple[Mapping[str, Any], bool],
-        layout: tuple[str, tuple[tuple[str, int], ...]],
+        layout: Callable[[int], tuple[str, tuple[tuple[str, int], ...]]],
     ) -> None:
         """Make the worlds.
 
@@ -67,22 +69,28 @@ class MujocoWorlds(Worlds):
             derived: Names of derived arrays.
             varied: Arrays (n, ...) of the compiled model that each world has of its own, by
                 name, and whether constants of it follow from them.
-            layout: Of the States, after their fingerprint.
+            layout: Of the States, after their fingerprint, by the size of the buffers of a Data.
         """
         raw = base.raw
         try:
+            self._check_memory(size[0], raw, derived, varied[0])
             batch = Batch(raw, *size, persistent=bool(raw.opt.enableflags & _SLEEP))
             for name, value in varied[0].items():
                 batch.expand(name)[:] = value
             if varied[1]:
                 batch.set_const()
+            if varied[0] and raw.nhistory:  # the times in it are by each world's own timestep
+                batch.reset(None, -1, _NO_STAGE)
             arrays = {name: batch.bind(name) for name in (*WRITABLE, *derived)}
         except (MemoryError, mujoco.FatalError) as error:
             raise gave_up(error) from error
         except ValueError as error:  # what a Batch cannot do
             raise _unsupported(error) from error
-        self._batch, self._layout, self._base = batch, layout, base
+        self._batch, self._base = batch, base
         self._varied = bool(varied[0])
+        history = varied[0].get("actuator_history")
+        self._kept = None if history is None else history[:, :, 0]
+        self._layout = cache(layout)
         self._history = batch.bind("history") if raw.nhistory else None
         self._warned, self._told = batch.warning, batch.warning.copy()
         # A copy of what a step changes in a row, to run a world again from there.
@@ -93,10 +101,29 @@ class MujocoWorlds(Worlds):
         super().__init__(model, *size, derived, arrays)
         listen_for(self)
 
+    @staticmethod
+    def _check_memory(
+        n: int, raw: mujoco.MjModel, derived: tuple[str, ...], varied: Mapping[str, Any]
+    ) -> None:
+        """Raise EngineError where the rows of so many worlds do not fit into memory."""
+        data = mujoco.MjData(raw)
+        state = mujoco.mj_stateSize(raw, int(_STATE.mjSTATE_INTEGRATION))
+        each = 16.0 * state + sum(getattr(data, name).nbytes for name in derived)  # with a copy
+        each += sum(array.nbytes for array in varied.values()) / n
+        if raw.opt.enableflags & _SLEEP:
+            each += data.nbuffer
+        late = 16 * raw.nhistory
+        kept = raw.actuator_history[:, 0].max(initial=0)
+        of_which = f"most of it for the {kept} commands that its latency keeps on their way"
+        check_memory(n, each, of_which=of_which if late > each / 2 else "")
+
     def _model_of(self, world: int) -> Model:
         if not self._varied:
             return self._base
-        return self._base.with_compiled(self._batch.get_model(world))
+        compiled = self._batch.get_model(world)
+        if self._kept is not None:
+            compiled = with_room_of(compiled, self.model.raw, self._kept[world])
+        return self._base.with_compiled(compiled)
 
     def _close(self) -> None:
         for name in ("_changing", "_before", "_warned", "_told", "_history", "_batch"):
@@ -198,23 +225,36 @@ class MujocoWorlds(Worlds):
             self._batch.reset(ids, -1 if key is None else key, _NO_STAGE)
             if self._history is not None:  # as of a Data: the command before was that of the start
                 history = self._history[ids]
-                hold(self._base.raw, history, self.ctrl[ids])
+                kept = None if self._kept is None else self._kept[ids]
+                hold(self._base.raw, history, self.ctrl[ids], kept)
                 self._history[ids] = history
             self._told[ids] = self._warned[ids]
         listen()
 
     def _get_state(self, world: int) -> State:
-        fingerprint, layout = self._layout
-        row = self._batch.state[world]
+        fingerprint, layout = self._state_layout(world)
+        row = self._batch.state[world][self._places(world)]
         check_finite(row, "state")
         return State("mujoco", mujoco.__version__, fingerprint, layout, row.tobytes())
 
     def _set_state(self, world: int, state: State) -> None:
         self._reset(self._numbers[world : world + 1], None)
-        self._batch.state[world] = state.vector
+        self._batch.state[world, self._places(world)] = state.vector
 
     def _state_layout(self, world: int) -> tuple[str, tuple[tuple[str, int], ...]]:
-        return self._layout
+        nhistory = self._base.raw.nhistory
+        if self._kept is not None:
+            nhistory = len(places_of(self.model.raw, self._base.raw, self._kept[world]))
+        return self._layout(nhistory)
+
+    def _places(self, world: int) -> Any:
+        """Where in a row of the worlds' state the numbers of a State are."""
+        if self._kept is None:
+            return slice(None)
+        start, size = self._batch._component(_STATE.mjSTATE_HISTORY)
+        own = places_of(self.model.raw, self._base.raw, self._kept[world])
+        end = np.arange(start + size, self._batch.nstate)
+        return np.concatenate([np.arange(start), start + own, end])
 
     def _record(
         self, ids: Ints, nstep: int, every: int, arrays: Mapping[str, Array], ctrl: Array | None

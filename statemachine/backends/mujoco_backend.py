@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -122,7 +123,8 @@ class MujocoModel(Model):
 
         base, arrays = self._varied(options) if options else (self, {})
         follow = bool(CONSTANTS_FOLLOW & options.keys())
-        return MujocoWorlds(self, base, (n, workers), derived, (arrays, follow), _layout(base))
+        layout = partial(_layout, base)
+        return MujocoWorlds(self, base, (n, workers), derived, (arrays, follow), layout)
 
     def _varied(self, options: dict[str, Any]) -> tuple[MujocoModel, dict[str, Any]]:
         """What worlds share, and the arrays of the compiled model that each has of its own.
@@ -138,15 +140,17 @@ class MujocoModel(Model):
         substeps = given.pop("substeps", np.array([self.substeps]))
         if (substeps != substeps[0]).any():
             raise BadInputError("substeps must be the same in all worlds: they step together")
-        # As `_replace` would, so that a timestep is the same to the last bit.
-        base = self._replace({"substeps": int(substeps[0])})
+        count = int(substeps[0])
         if "integrator" in given:
             given["integrator"] = np.array([int(INTEGRATORS[n]) for n in options["integrator"]])
         if "timestep" in given:
-            lengths = [step_length(length, base.substeps, {}) for length in options["timestep"]]
+            lengths = [step_length(length, count, {}) for length in options["timestep"]]
             given["timestep"] = np.array(lengths)
-        raw, arrays = varied(base.raw, given)
-        return MujocoModel(raw, self.path, base.substeps), arrays
+        raw = edited(self.raw, {})
+        # As `_replace` has it, so that a timestep is the same to the last bit.
+        raw.opt.timestep = step_length(self.timestep, count, {})
+        raw, arrays = varied(raw, given)
+        return MujocoModel(raw, self.path, count), arrays
 
     def _check_friction(self, options: Mapping[str, Any]) -> None:
         """Raise UnsupportedError where the friction of geoms would be without effect."""
@@ -191,7 +195,7 @@ class MujocoData(Data):
         for view in views.values():
             view.setflags(write=False)
         self._views, self._alarms = views, alarms
-        self._layout = _layout(model)
+        self._layout = _layout(model, model.raw.nhistory)
         inputs = {name: getattr(raw, name).view() for name in INPUTS}
         super().__init__(
             model,
@@ -331,10 +335,17 @@ def _transition(model: MujocoModel, raw: mujoco.MjData) -> Callable[..., None]:
     return checked_one if len(starts) == 1 else checked
 
 
-def _layout(model: MujocoModel) -> tuple[str, tuple[tuple[str, int], ...]]:
+def _layout(model: MujocoModel, nhistory: int) -> tuple[str, tuple[tuple[str, int], ...]]:
+    """Fingerprint and layout of States of a model.
+
+    Args:
+        model: The Model.
+        nhistory: Size of the buffers of a Data.
+    """
     sizes = {
         name: int(mujoco.mj_stateSize(model.raw, int(bit))) for name, bit in _COMPONENTS.items()
     }
+    sizes["history"] = nhistory
     kept = ("time", *INPUTS)  # even where they are empty
     layout = tuple((name, size) for name, size in sizes.items() if size or name in kept)
     return model._with_fingerprint(layout)

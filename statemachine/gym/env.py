@@ -109,7 +109,9 @@ class ArmEnv(gymnasium.Env[Array, ArrayLike]):
         """A picture (height, width, 3) uint8 of the present moment; None without a render mode."""
         if self.render_mode is None:
             return None
-        return self._pictures.of(self.data.qpos[None])[0]
+        if self._target is None:
+            raise ResetNeeded("call reset before render: no episode has begun")
+        return self._pictures.of(self.data.qpos[None], self._target)[0]
 
     def close(self) -> None:
         """Give back what the engine holds. Idempotent."""

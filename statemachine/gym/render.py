@@ -1,6 +1,9 @@
-"""Pictures of the worlds of a task."""
+"""Pictures of the worlds of a task, each with its target."""
 
 from __future__ import annotations
+
+import tempfile
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,25 +14,45 @@ from ..rendering import LivePictures, motion_through, renderer_here
 from .tasks import Task
 
 SIZE = (480, 360)  # pixels
-_CAMERA = Camera((0.16, 0.0, 0.16), 1.15, 140.0, -20.0)
+CAMERA = Camera((0.16, 0.0, 0.16), 1.15, 140.0, -20.0)
+_BALL = """
+<mujoco><visual><headlight ambient=".8 .8 .8" diffuse=".6 .6 .6" specular="0 0 0"/></visual>
+<worldbody><body name="target"><freejoint/><geom size="{}"/></body></worldbody></mujoco>
+"""
+_UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 
 class TaskPictures:
-    """Draws the poses of a task's model, in a process that is started with the first."""
+    """Draws a task's model, in a process that is started with the first picture.
+
+    The target is drawn as a ghost is: a violet ball, as large as what is near enough for a
+    success. What stands in front of it hides it.
+    """
 
     def __init__(self, task: Task) -> None:
-        self._model = task.model
+        self._model, self._radius = task.model, task.near
         self._live: LivePictures | None = None
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
 
-    def of(self, qpos: Array) -> tuple[NDArray[np.uint8], ...]:
-        """Pictures (height, width, 3) uint8 of rows of qpos (n, nq)."""
+    def of(self, qpos: Array, targets: Array) -> tuple[NDArray[np.uint8], ...]:
+        """Pictures (height, width, 3) uint8.
+
+        Args:
+            qpos: (n, nq), of each world.
+            targets: (n, 3) [m].
+        """
         motion = motion_through(self._model, qpos)
         if self._live is None:
-            bodies = [self._model.nbody]
-            self._live = LivePictures([motion.file], bodies, SIZE, _CAMERA, renderer_here())
+            renderer = renderer_here()
+            self._folder = tempfile.TemporaryDirectory()
+            ball = Path(self._folder.name) / "target.xml"
+            ball.write_text(_BALL.format(self._radius), encoding="utf-8")
+            bodies = [self._model.nbody, 2]
+            self._live = LivePictures([motion.file, ball], bodies, SIZE, CAMERA, renderer)
         pictures = []
-        for xpos, xquat in zip(motion.xpos, motion.xquat, strict=True):
-            self._live.ask([(xpos, xquat)])
+        for xpos, xquat, target in zip(motion.xpos, motion.xquat, targets, strict=True):
+            ball_at = np.stack([np.zeros(3), target]), np.array([_UPRIGHT, _UPRIGHT])
+            self._live.ask([(xpos, xquat), ball_at])
             pictures.append(self._live.take().copy())
         return tuple(pictures)
 
@@ -37,4 +60,6 @@ class TaskPictures:
         """End the process. Idempotent."""
         if self._live is not None:
             self._live.close()
-        self._live = None
+        if self._folder is not None:
+            self._folder.cleanup()
+        self._live = self._folder = None

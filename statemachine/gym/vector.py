@@ -166,8 +166,16 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         return self._seen.copy(), rewards, terminated, truncated, infos
 
     def render(self) -> Any:
-        """A picture (height, width, 3) uint8 of each world; None without a render mode."""
-        return None if self.render_mode is None else self._pictures.of(self.worlds.qpos)
+        """A picture (height, width, 3) uint8 of each world; None without a render mode.
+
+        Raises:
+            ResetNeeded: `reset` was never called.
+        """
+        if self.render_mode is None:
+            return None
+        if not self._begun.all():
+            raise ResetNeeded("call reset before render: no episode has begun")
+        return self._pictures.of(self.worlds.qpos, self._targets)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Give back threads, processes and memory."""

@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from ..errors import BadInputError, ClosedDataError, ReadOnlyError, StateMachineError, shown
+from ..errors import (
+    BadInputError,
+    ClosedDataError,
+    EngineError,
+    ReadOnlyError,
+    StateMachineError,
+    shown,
+)
+from ..processes import free_memory
 from .checks import (
     HUGE,
     TINY,
@@ -30,6 +38,7 @@ if TYPE_CHECKING:
 
 BATCHED = (*POSES, "qacc", *FORCES)  # the derived arrays that worlds can keep
 WRITABLE = (*INPUTS, "time")
+_SPARE = 0.95  # of the memory that is free, what worlds may take
 
 
 class Worlds(ABC):
@@ -308,3 +317,22 @@ class Worlds(ABC):
 def in_world(world: int, error: StateMachineError) -> Any:
     """The same error, saying which of many worlds it is of."""
     return type(error)(f"world {world}: {error}", **{**vars(error), "world": world})
+
+
+def check_memory(n: int, each: float, made: int = 0, of_which: str = "") -> None:
+    """Raise EngineError where the worlds that are still to be made would not fit into memory.
+
+    Args:
+        n: Number of worlds.
+        each: Bytes that one takes.
+        made: Worlds that have been made already.
+        of_which: What most of it is, in words.
+    """
+    free = free_memory()
+    if free is None or (n - made) * each <= _SPARE * free:
+        return
+    size = f"{each / 1e6:.0f} MB" if each >= 1e6 else f"{each / 1e3:.1f} kB"
+    raise EngineError(
+        f"{n} worlds do not fit into memory: one takes {size}{of_which and f', {of_which}'}, and "
+        f"{free / 1e9:.1f} GB are free: make {made + int(_SPARE * free / each)} at most"
+    )

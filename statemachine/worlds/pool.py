@@ -22,8 +22,7 @@ from .. import backends
 from ..errors import BusyDataError, EngineError, StateMachineError, UnsupportedError
 from ..interface import Array, Ints, Model, State
 from ..interface.data import alone
-from ..interface.worlds import Worlds
-from ..processes import free_memory
+from ..interface.worlds import Worlds, check_memory
 from ._process import WorldsProcess, end_all, lost_worlds
 from ._protocol import ANSWER_MOST, Verb
 from ._shared import SharedBlock, arrays_in, laid_out, shapes_of
@@ -31,7 +30,6 @@ from ._shared import SharedBlock, arrays_in, laid_out, shapes_of
 _PATIENCE = 2.0  # seconds in which a process has to end a step that was interrupted
 _SCRATCH = 1 << 24  # bytes for what belongs to a command, at least
 _WORDS = 1 << 16  # of these, for what is no array of a record
-_SPARE = 0.95  # of the memory that is free, what worlds may take
 
 Answers = list[dict[str, Any]]
 
@@ -119,7 +117,9 @@ class PoolWorlds(Worlds):
         """Let processes that have just been started make their Data."""
         answers = self._exchange(processes, Verb.START, self._answers, self._job)
         self._check(processes, answers)
-        _check_memory(self.n, [answer["value"] for answer in answers])
+        told = [answer["value"] for answer in answers]
+        left = sum(process["left"] for process in told)
+        check_memory(self.n, max(process["each"] for process in told), self.n - left)
         answers = self._exchange(processes, Verb.FILL)
         self._check(processes, answers)
         for process, answer in zip(processes, answers, strict=True):
@@ -340,17 +340,4 @@ def _unreadable(model: Model, error: Exception) -> UnsupportedError:
         backend=model.backend,
         feature="worlds",
         reason=reason,
-    )
-
-
-def _check_memory(n: int, processes: Sequence[Mapping[str, int]]) -> None:
-    """Raise EngineError where the worlds that are still to be made would not fit."""
-    free, left = free_memory(), sum(process["left"] for process in processes)
-    each = max(process["each"] for process in processes)
-    if free is None or left * each <= _SPARE * free:
-        return
-    fit = n - left + int(_SPARE * free / each)
-    raise EngineError(
-        f"{n} worlds do not fit into memory: one takes {each / 1e6:.0f} MB, and "
-        f"{free / 1e9:.1f} GB are free: make {fit} at most"
     )
