@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import io
+import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, cast
@@ -21,6 +22,7 @@ _INK, _PAPER, _BELOW = "#222222", "#ffffff", "#f0f0f0"  # the last: behind the l
 _WIDE = 30.0  # times the least value: beyond, colours are logarithmic
 _WRITTEN, _LONG = 150, 60  # cells whose figures are written; letters that fit under a map
 _POWERS = 8  # that a log axis names, at most
+_TITLE = 80  # letters of a line of it
 
 
 Drawn = Traces | Slots | Pipeline | HeatMap | Bars
@@ -133,7 +135,8 @@ def drawn(pictures: Sequence[Drawn], form: str) -> bytes:
         for axes, picture in zip(rows, pictures, strict=True):
             cast("Callable[[Any, Any], None]", _DRAW[type(picture)])(axes, picture)
             if heights[1:]:
-                axes.set_title(picture.title, fontsize="medium", loc="left")
+                title = textwrap.fill(picture.title, _TITLE)
+                axes.set_title(title, fontsize="medium", loc="left")
         return figure
 
     return saved(draw, form, SETTINGS, dpi=_DOTS, bbox_inches="tight")
