@@ -276,7 +276,9 @@ def _heat_map(axes: Any, picture: HeatMap) -> None:
     scale = ScalarMappable(norm, colours.resampled(256))
     bar = axes.figure.colorbar(scale, ax=axes, shrink=0.9, pad=0.02)
     if wide:
-        steps = [m * 10.0**e for e in range(-15, 16) for m in (1, 2, 5)]
+        every = 1 + int(np.log10(high / low)) // _POWERS
+        mantissas = (1, 2, 5) if high < 1e4 * low else (1,)
+        steps = [m * 10.0**e for e in range(-15, 16, every) for m in mantissas]
         bar.set_ticks([step for step in steps if low <= step <= high], minor=False)
         bar.ax.minorticks_off()
     bar.ax.yaxis.set_major_formatter(lambda tick, _place: f"{tick:g}")
