@@ -6,6 +6,7 @@ import json
 import math
 import os
 import re
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -351,6 +352,24 @@ def test_doctor(cli: Cli) -> None:
     assert findings["viser"]["optional"]
     page = cli("doctor").stdout
     assert max(map(len, page.splitlines())) <= 80
+
+
+def test_the_doctor_knows_every_package_of_an_extra(cli: Cli) -> None:
+    """But for those that only work on this library itself needs."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    named: dict[str, list[str]] = {}
+    for extra, requirements in project["optional-dependencies"].items():
+        for requirement in requirements if extra not in ("test", "check") else ():
+            package = re.split(r"[<>=\[]", requirement)[0]
+            if package not in ("statemachine-sim", "viser"):  # viser has a line of its own
+                named.setdefault(package, []).append(extra)
+    told = json.loads(cli("doctor", "--json").stdout)["packages"]
+    assert {each["name"]: sorted(each["extras"]) for each in told} == {
+        package: sorted(extras) for package, extras in named.items()
+    }
+    versions = {each["name"]: each["version"] for each in told}
+    assert versions["pytest"] == pytest.__version__
+    assert f"pytest {pytest.__version__}" in " ".join(cli("doctor").stdout.split())
 
 
 def test_the_doctor_says_what_the_viewer_lacks(cli: Cli, tmp_path: Path) -> None:

@@ -238,9 +238,13 @@ def test_latencies_that_are_none(backend: str, value: Any) -> None:
 def test_pybullet_as_it_comes_has_none_of_them() -> None:
     need_engine("pybullet")
     model = sm.load("so101", backend="pybullet", defaults="engine")
-    for name in ("mass", "friction", "kp", "kv", "latency"):
-        with pytest.raises(UnsupportedError):
+    for name in ("mass", "friction", "kp", "kv", "latency", "damping", "limits"):
+        with pytest.raises(UnsupportedError, match="load the model without that to set it"):
             model.replace(**{name: 1.0})
+    for name, said in (("frictionloss", "ignores"), ("integrator", "no such setting")):
+        with pytest.raises(UnsupportedError, match=said):
+            model.replace(**{name: 1.0})
+    assert "not damping, mass, friction, kp, kv, latency, limits: with" in str(model.capabilities)
 
 
 def test_energies_are_those_of_the_changed_mass() -> None:

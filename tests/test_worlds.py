@@ -658,3 +658,10 @@ def test_shapes_are_counted_right(mujoco_: None) -> None:
             worlds.ctrl = np.zeros((3, 6))
         with pytest.raises(BadInputError, match="names of fields are wanted"):
             many.record(worlds, 2, None)  # pyright: ignore[reportArgumentType]
+
+
+def test_no_array_can_be_deleted(model: sm.Model) -> None:
+    with many.make_worlds(model, 2, workers=1) as worlds:
+        for name in ("ctrl", "xpos", "nosuch"):
+            with pytest.raises(ReadOnlyError, match="cannot be deleted"):
+                delattr(worlds, name)

@@ -87,6 +87,10 @@ _AS_IT_COMES = {
     "forces by part": Behaviour("unsupported", "the engine tells its bias and its motors' torque"),
     "contacts": Behaviour("native", "friction 0.5, and none between the links of one robot"),
 }
+_NO_OPTION = dict.fromkeys(
+    ("damping", "mass", "friction", "kp", "kv", "latency", "limits"),
+    "with defaults='engine' it stays as it was loaded; load the model without that to set it",
+) | {"frictionloss": _AS_IT_COMES["dry friction"].note}
 
 
 def _capabilities(as_it_comes: bool, max_qvel: Array | None = None, soft: str = "") -> Capabilities:
@@ -114,6 +118,7 @@ def _capabilities(as_it_comes: bool, max_qvel: Array | None = None, soft: str = 
         exact_restore=False,
         # A Model has two clients of its own: the still copy and the look-ahead.
         data_per_process=MOST_CLIENTS // 3,
+        refused=_NO_OPTION if as_it_comes else {},
     )
 
 

@@ -17,7 +17,7 @@ COUNT = 2 * np.pi / 4096
 _COUNT_SAYS = "1/4096 turn, one count of a 12-bit encoder as in the SO-101's servos"
 _ENERGY = 0.01  # of what the energy changes by in the run
 _FORCE = 0.05  # of its mean while it acts
-_BODY, _BODY_TURN = 1e-3, np.radians(1.0)
+SLIDE, BODY, BODY_TURN = 1e-4, 1e-3, np.radians(1.0)
 
 
 def tolerance_for(
@@ -37,7 +37,7 @@ def tolerance_for(
     if kind in ("joint", "tip rotation"):
         return Tolerance(COUNT, _COUNT_SAYS)
     if kind == "slide":
-        return Tolerance(1e-4, "a tenth of a millimetre")
+        return Tolerance(SLIDE, "a tenth of a millimetre")
     if kind == "tip":
         reach = max(_reach(one, series), _reach(two, series))
         return Tolerance(
@@ -45,9 +45,9 @@ def tolerance_for(
             f"what one count of a 12-bit encoder moves it, {reach:.2f} m from the arm's foot",
         )
     if kind == "body":
-        return Tolerance(_BODY, "a millimetre: what a grasp of a box of centimetres forgives")
+        return Tolerance(BODY, "a millimetre: what a grasp of a box of centimetres forgives")
     if kind == "body rotation":
-        return Tolerance(_BODY_TURN, "a degree, which moves the rim of a hand's breadth by 1 mm")
+        return Tolerance(BODY_TURN, "a degree, which moves the rim of a hand's breadth by 1 mm")
     if kind == "energy":
         range_ = max(_range(series.one), _range(series.two))
         return Tolerance(

@@ -24,7 +24,7 @@ from .perturbed import Rerun
 from .request import Request
 from .side import Side
 
-Loop = Literal["the same", "its own", "recorded"]
+Loop = Literal["the same", "its own", "recorded", "more than ctrl"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +43,10 @@ class SidesRun:
         left, right: The runs, each with the commands that its own side computed; those of the
             right go by the names of the left.
         played: The left's start and commands on the right, for an open loop. It is `right`
-            where these were the right's own.
+            where these were the right's own, and where there is no open loop.
         commands: "its own" if the two sides were told different things; "the same" if what
-            each was told did not depend on the side; "recorded" if a trace was played on both.
+            each was told did not depend on the side; "recorded" if a trace was played on both;
+            "more than ctrl" if a FUNCTION also wrote what no recorded command repeats.
         matched: What of the left is what of the right; None if both are of one file.
         reruns: How the left and the right were run; None where a trace was played.
         file: The file of both sides; None if they have two.
@@ -114,7 +115,9 @@ def run_sides(request: Request, progress: Progress = silent) -> SidesRun:
         reruns, said = _reruns(scenario, models, options, matched, request)
         pair = _of_scenario(scenario, reruns, request, progress)
         theirs = _in_terms_of_right(pair[0], pair[1], matched)
-        if _same_commands(theirs, pair[1]):
+        if any(trace.header.rewritten for trace in pair):
+            commands, played = "more than ctrl", pair[1]
+        elif _same_commands(theirs, pair[1]):
             commands, played = "the same", pair[1]
         else:
             commands = "its own"
@@ -273,8 +276,6 @@ def _played(
 def _same_commands(theirs: Trace, right: Trace) -> bool:
     """Whether the right was told at each of its moments what the left was, from the same start."""
     if any(not np.array_equal(theirs[name][0], right[name][0]) for name in ("qpos", "qvel")):
-        return False
-    if right.header.rewritten or theirs.header.rewritten:
         return False
     since, times = right.time - right.time[0], theirs.time - theirs.time[0]
     early = 1e-6 * theirs.timestep  # as `play` has it

@@ -88,6 +88,10 @@ class DifferencesPart(Protocol):
         """
         ...
 
+    def sensors(self, one: Any, two: Any) -> list[ModelDifference]:
+        """What the sensors of two compiled models differ in, which only a controller reads."""
+        ...
+
     def entries(self, two: Any, difference: ModelDifference) -> tuple[ModelDifference, ...]:
         """A difference by its single entries, or itself where it is of one piece.
 

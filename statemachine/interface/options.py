@@ -80,6 +80,7 @@ def unsupported(of: Optioned, feature: str) -> UnsupportedError:
     """The error for what this backend cannot do; the reason is in its record."""
     known = of.capabilities.behaviours.get(feature)
     reason = known.note if known else "the engine has no such setting"
+    reason = of.capabilities.refused.get(feature, reason)
     return UnsupportedError(
         f"backend {of.backend!r} does not support {feature!r}: {reason}",
         backend=of.backend,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any, Literal
 
@@ -88,6 +88,8 @@ class Capabilities:
             mid-contact too; otherwise two restores of one State agree bit by bit.
         data_per_process: How many Data one process can hold, each of a Model of its own; None
             for as many as there is memory for.
+        refused: Why `Model.replace` does not take some others, by their names; of the rest
+            the engine has no such setting.
     """
 
     options: tuple[str, ...]
@@ -96,9 +98,13 @@ class Capabilities:
     shared_model: bool
     exact_restore: bool
     data_per_process: int | None = None
+    refused: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def __str__(self) -> str:
         lines = [f"options of replace: {', '.join(self.options)}"]
+        for reason in dict.fromkeys(self.refused.values()):
+            names = [name for name, why in self.refused.items() if why == reason]
+            lines.append(f"not {', '.join(names)}: {reason}")
         lines.append(f"integrators: {', '.join(self.integrators) or 'as in the file'}")
         alone = "share the compiled model" if self.shared_model else "share its description only"
         lines.append(f"several Data of a Model {alone}")

@@ -297,6 +297,9 @@ class Worlds(ABC):
                 f"{name!r} of Worlds cannot be assigned to; write qpos, qvel, ctrl or time"
             )
 
+    def __delattr__(self, name: str) -> None:
+        raise ReadOnlyError(f"{name!r} of Worlds cannot be deleted")
+
     def __enter__(self) -> Worlds:
         return self
 

@@ -28,10 +28,48 @@ class HealthCheck:
 
 
 @dataclass(frozen=True)
+class OptionalPackage:
+    """A package that nothing needs but what an extra of this library is for.
+
+    Attributes:
+        name: As pip calls it.
+        role: What it is for.
+        extras: Those that bring it.
+        version: That is here; None without it.
+    """
+
+    name: str
+    role: str
+    extras: tuple[str, ...]
+    version: str | None = None
+
+
+# pyproject.toml names the same, which a test compares; `viser` is imported, see `_viewer`.
+_PACKAGES = (
+    OptionalPackage("pillow", "pictures and films", ("render", "mp4")),
+    OptionalPackage("imageio-ffmpeg", "films as mp4", ("mp4",)),
+    OptionalPackage("matplotlib", "plots", ("plot", "docs", "notebook")),
+    OptionalPackage("pyarrow", "parquet traces, sweeps", ("parquet", "sweep")),
+    OptionalPackage("joblib", "sweeps", ("sweep",)),
+    OptionalPackage("scipy", "sweeps", ("sweep",)),
+    OptionalPackage("distributed", "sweeps through Dask", ("cluster",)),
+    OptionalPackage("gymnasium", "reinforcement learning", ("gym",)),
+    OptionalPackage("mujoco-menagerie", "public robots", ("menagerie",)),
+    OptionalPackage("robot_descriptions", "public robots", ("robots",)),
+    OptionalPackage("pytest", "check --mutants", ("mutants",)),
+    OptionalPackage("jupyterlab", "the path as a notebook", ("notebook",)),
+    OptionalPackage("sphinx", "pages (make docs)", ("docs",)),
+    OptionalPackage("furo", "pages (make docs)", ("docs",)),
+    OptionalPackage("myst-parser", "pages (make docs)", ("docs",)),
+)
+
+
+@dataclass(frozen=True)
 class Diagnosis:
-    """All findings."""
+    """All findings, and what optional packages are here."""
 
     findings: tuple[HealthCheck, ...]
+    packages: tuple[OptionalPackage, ...] = ()
 
     @property
     def healthy(self) -> bool:
@@ -40,9 +78,10 @@ class Diagnosis:
 
 
 def examine() -> Diagnosis:
-    """Look at Python, the engines, rendering, the viewer and the import name."""
+    """Look at Python, the engines, rendering, the viewer, the import name and the extras."""
     findings = [_python(), *map(_engine, ENGINES), _rendering(), _viewer(), _clash()]
-    return Diagnosis(tuple(findings))
+    packages = (replace(package, version=_version(package.name)) for package in _PACKAGES)
+    return Diagnosis(tuple(findings), tuple(packages))
 
 
 def page(diagnosis: Diagnosis) -> Page:
@@ -52,7 +91,17 @@ def page(diagnosis: Diagnosis) -> Page:
         for finding in diagnosis.findings
     ]
     blocks = [
-        Table(("", "", "found"), rows, title="What this machine has", words=frozenset({0, 1, 2}))
+        Table(("", "", "found"), rows, title="What this machine has", words=frozenset({0, 1, 2})),
+        Table(
+            ("", "found", "for", "extra"),
+            [
+                (package.name, package.version or "no", package.role, ", ".join(package.extras))
+                for package in diagnosis.packages
+            ],
+            title="Optional packages",
+            words=frozenset({0, 1, 2, 3}),
+        ),
+        Text("An extra is installed by its name: pip install 'statemachine-sim[plot]'"),
     ]
     steps = [f"{f.name}: {f.next_step}" for f in diagnosis.findings if f.next_step]
     return Page(
@@ -114,6 +163,14 @@ def _rendering() -> HealthCheck:
     room: OpenGLPart = needed_part(DEFAULT, "rendering")
     works, found, step = room.diagnosis()
     return HealthCheck("rendering", works, found, step, optional=True)
+
+
+def _version(name: str) -> str | None:
+    """Version of an installed package, which is not imported."""
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return None
 
 
 def _clash() -> HealthCheck:

@@ -95,7 +95,7 @@ def _gap_sentence(result: Explanation) -> str:
         for name, other in result.first.items()
         if name != result.quantity
     ]
-    return text + (f" Elsewhere: {', '.join(others)}." if others else "")
+    return text + (f" Elsewhere: {', '.join(others)} (--quantity)." if others else "")
 
 
 def _nothing(result: Explanation) -> str:
@@ -116,7 +116,10 @@ def _table(result: Explanation) -> list[Block]:
     rows = [_row(result, each) for each in able]
     if rows:
         gap = quantity(result.gap, result.unit)
-        title = f"What differs, and its part of the {gap} ({_MEASURES[result.measure]})"
+        title = (
+            f"What differs, and its part of the {gap} of the {result.quantity} "
+            f"({_MEASURES[result.measure]})"
+        )
         title = "What differs" if result.is_rounding else title
         heads = ("what", "left", "right", "explains", "alone", "last")
         words = frozenset({0, 1, 2})
@@ -125,9 +128,13 @@ def _table(result: Explanation) -> list[Block]:
             more = Table(heads, rows[_SHOWN:], words=words)
             heading = f"{len(rows) - _SHOWN} more differences, with smaller parts"
             blocks.append(Section("", heading, [more], folded=True))
-    if method := _METHODS[result.method].format(result.orders):
+    method = _METHODS[result.method].format(result.orders)
+    if method and len(able) > 1:
         blocks.append(
-            Text(f"{method} Alone, last: brought to the same first, or after all others.")
+            Text(
+                f"{method} Alone, last: brought to the same first, or after all others. The right "
+                "is brought to the left: the other way round the parts are those of another motion."
+            )
         )
     if refused:
         lines = [f"{capital(each.name)}: {each.note}." for each in refused]

@@ -24,6 +24,10 @@ _SAID = {
         "Both sides were told the recorded commands, an open loop: the figures say whether the "
         "machine itself differs, and nothing of what feedback would make of it."
     ),
+    "more than ctrl": (
+        "There is no open loop: beside ctrl the function wrote into the state or applied forces, "
+        "which the recorded commands of the left do not repeat on the right."
+    ),
 }
 
 

@@ -22,7 +22,7 @@ from ...engines.model_differences import ModelDifference
 from ...errors import StateMachineError
 from ...interface import Model
 from ..matching import Matched, match_models
-from ..why.causes import differences_of
+from ..why.causes import differences_of, sensors_of
 from ._told import FLAGS, SETTINGS, SUBJECTS_OF, TOLD, WEIGHTS, WHOLE_LINK
 from .ledger import Difference, Value
 
@@ -64,7 +64,7 @@ def one_list(
             book.add(each)
     if complete:
         book.leave_out_what_follows()
-    rows = [*book.rows, *_order(matched), *_keyframes(matched)]
+    rows = [*book.rows, *_order(matched), *_keyframes(matched), *_sensors(matched)]
     skipped = [
         f"{each.title}: compared as a whole only, and it differs"
         for each in found
@@ -311,6 +311,8 @@ def _keyframes(matched: Matched) -> Iterator[Difference]:
     ]
     for name in dict.fromkeys([*frames[0], *frames[1]]):
         a, b = frames[0].get(name), frames[1].get(name)
+        if a is not None and b is not None and a.time != b.time:
+            yield _row("further", f"keyframe {name}", "time", a.time, b.time, "s")
         if a is None or b is None:
             words = ("there", "nothing") if b is None else ("nothing", "there")
             yield _row("further", f"keyframe {name}", "", *words)
@@ -323,3 +325,28 @@ def _keyframes(matched: Matched) -> Iterator[Difference]:
             off = float(np.abs(ours - theirs).max(initial=0.0))
             if off > 1e-9:
                 yield _row("further", f"keyframe {name}", f"{figure}, farthest entry", 0.0, off)
+
+
+def _sensors(matched: Matched) -> Iterator[Difference]:
+    """What only a controller that reads them meets: it changes no motion by itself."""
+    found = sensors_of(matched.one, matched.two)
+    rows = [
+        _row("further", f"sensor {each.where}", name, _value(one), _value(two))
+        for each in found
+        if each.subject in ("sensor", "cutoff")
+        for name, one, two in each.values
+    ]
+    values = [each.values[0] for each in found if each.subject == "extra sensor"]
+    if values:
+        sides = ([str(each[k]) for each in values if each[k]] for k in (1, 2))
+        here, there = (few(names, 6) or "nothing" for names in sides)
+        rows.append(_row("further", "sensors", "that only one has", here, there))
+    rows += [
+        _row("further", "sensordata", "order", one, two)
+        for each in found
+        if each.subject == "order of sensordata"
+        for _, one, two in each.values
+    ]
+    effect = "only a controller that reads it moves otherwise"
+    for row in rows:
+        yield replace(row, share=0.0, effect=effect, matters=False)

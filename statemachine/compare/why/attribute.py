@@ -15,7 +15,7 @@ from ..perturbed import EXACT, Uncertainty, rerun_of
 from ..stages import FOUND
 from .factors import FACTORS, OFF_ORDER, PARITY_ORDER, Factor
 from .gap import Deviation
-from .results import ROUNDING, Attribution, Detection, FactorTrial, Way
+from .results import ROUNDING, Attribution, Detection, FactorTrial, Way, telling
 from .runs import Runs
 from .sides import Change, Changes, same, side_of
 
@@ -76,14 +76,18 @@ def attribute(
     names = runs.ruler.units
     if quantity is not None and quantity not in names:
         raise unknown_name("quantity", quantity, names)
-    runs.quantity = quantity or runs.natural
     first = runs.gaps({}, {})
     if not first:
         raise EndedEarlyError(
             f"as they come, a side does not reach the end: {runs.ended}", ended=runs.ended
         )
-    floor = 0.0 if uncertain is None else runs.floor(uncertain)[runs.quantity].worst
-    nothing = first[runs.quantity].worst <= max(ROUNDING[names[runs.quantity]], floor)
+    floors = {} if uncertain is None else runs.floor(uncertain)
+    bounds = {name: ROUNDING[unit] for name, unit in names.items()}
+    bounds |= {name: max(bounds[name], each.worst) for name, each in floors.items()}
+    gaps = {name: each.worst for name, each in first.items()}
+    runs.quantity = quantity or telling(gaps, bounds, runs.natural)
+    floor = floors[runs.quantity].worst if floors else 0.0
+    nothing = gaps[runs.quantity] <= bounds[runs.quantity]
     ladder, parity = ((), ({}, {})) if nothing else _ladder(runs)
     alone = () if nothing else _alone(runs, *parity)
     steps = [trial.worst for trial in ladder if trial.explains is not None]

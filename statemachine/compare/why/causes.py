@@ -38,7 +38,12 @@ class Cause:
 
 
 def differences_of(
-    one: Model, two: Model, matched: Matched, world: bool = True, finer: bool = False
+    one: Model,
+    two: Model,
+    matched: Matched,
+    world: bool = True,
+    finer: bool = False,
+    sensors: bool = False,
 ) -> tuple[ModelDifference, ...]:
     """All that two Models differ in by their compiled models.
 
@@ -48,9 +53,12 @@ def differences_of(
         matched: What of one is what of the other.
         world: Whether gravity and timestep count; not where they are an engine's own.
         finer: By single entries, where they can be brought over one by one.
+        sensors: Whether sensors count, which act on nothing but a controller that reads them.
     """
     room: DifferencesPart = needed_part(DEFAULT, "differences")
     found = list(room.differences(one.compiled, two.compiled, matched, world=world))
+    if sensors:
+        found += sensors_of(one, two)
     if finer:
         found = [part for each in found for part in room.entries(two.compiled, each)]
     for side, only in enumerate(matched.only):
@@ -59,6 +67,12 @@ def differences_of(
             why = "a joint cannot be added or taken away"
             found.append(ModelDifference("extra joint", "joint", name, values, refused=why))
     return tuple(found)
+
+
+def sensors_of(one: Model, two: Model) -> list[ModelDifference]:
+    """What the sensors of two Models differ in, which only a controller reads."""
+    room: DifferencesPart = needed_part(DEFAULT, "differences")
+    return room.sensors(one.compiled, two.compiled)
 
 
 def built(model: Model, edits: tuple[Edit, ...]) -> Model:

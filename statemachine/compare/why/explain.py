@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from ...backends import load
-from ...errors import EndedEarlyError, StateMachineError, unknown_name
+from ...errors import BadInputError, EndedEarlyError, StateMachineError, unknown_name
 from ...interface import Model
 from ...scenarios import Scenario
 from ...scenarios.provenance import Provenance, provenance
@@ -17,7 +17,7 @@ from ..perturbed import EXACT, Uncertainty
 from .attribute import attribute
 from .causes import Cause, causes, differences_of
 from .gap import Deviation
-from .results import ROUNDING, UNEXPLAINED, Attribution
+from .results import ROUNDING, UNEXPLAINED, Attribution, telling
 from .shapley import Method, Shares, shapley
 from .trials import Measure, Trials
 
@@ -174,20 +174,31 @@ def explain(
     units = trials.ruler.units
     if quantity is not None and quantity not in units:
         raise unknown_name("quantity", quantity, units)
-    asked, quantity = quantity, quantity or trials.ruler.held(trials.traces[0], frozenset())
     first = trials.gaps(())
     if not first:
         raise EndedEarlyError(
             f"as they come, a side does not reach the end: {trials.ended}", ended=trials.ended
         )
-    if asked is None and first[quantity].worst <= ROUNDING[units[quantity]]:
-        # The joints may agree while something else does not.
-        more = (name for name, each in first.items() if each.worst > ROUNDING[units[name]])
-        quantity = next(more, quantity)
+    if scenario.own and not trials.repeats():
+        raise BadInputError(
+            f"two runs of {labels[0] if labels else 'the left'} from the same start differ: "
+            f"{scenario.name} does not command the same twice, and so no gap has a cause; give "
+            "what it draws a seed, and let it keep nothing from one run to the next"
+        )
+    floors = {} if uncertain is None else trials.floor(uncertain)
+    bounds = {name: ROUNDING[unit] for name, unit in units.items()}
+    bounds |= {name: max(bounds[name], _figure(each, measure)) for name, each in floors.items()}
+    if quantity is None:
+        gaps = {name: _figure(each, measure) for name, each in first.items()}
+        tolerances = {name: trials.ruler.tolerance(name) for name in units}
+        quantity = telling(gaps, bounds, next(iter(units)), tolerances)
     gap = _figure(first[quantity], measure)
+    nothing = gap <= bounds[quantity]
     world = not any(_is_as_it_comes(model) for model in models)
     differences = (
-        *differences_of(models[0], models[1], matched, world, finer),
+        *differences_of(
+            models[0], models[1], matched, world, finer, sensors=scenario.own and not nothing
+        ),
         *trials.of_the_run(),
     )
     listed = causes(differences, finer)
@@ -198,17 +209,16 @@ def explain(
         gaps = trials.gaps(brought)
         return _figure(gaps[quantity], measure) if gaps else None
 
-    negligible, floor = ROUNDING[units[quantity]], 0.0
-    if uncertain is not None:
-        floor = _figure(trials.floor(uncertain)[quantity], measure)
-    nothing = gap <= max(negligible, floor)
     known.expected = 3 * len(able) + 2
     found = shapley([] if nothing else able, value, gap or 1.0, budget=budget, seed=seed)
     brought = gap if nothing else value(frozenset(able))
-    engines = None
+    engines, apart = None, 0.0
     if not nothing and not _alike(*models):
         engines = _engines(models, scenario, trials, quantity, known)
-    parts = _parts(gap, brought, engines, measure) if not nothing else (0.0, 0.0, 0.0)
+        if any(cause.refused for cause in listed):
+            between = _files_apart(models, trials, frozenset(able))
+            apart = _figure(between[quantity], measure) if between else gap
+    parts = _parts(gap, brought, engines, apart) if not nothing else (0.0, 0.0, 0.0)
     shares = [_share(cause, found) for cause in listed]
     shares.sort(key=lambda each: -abs(each.share or 0.0))
     progress(1.0)
@@ -231,8 +241,8 @@ def explain(
         explained=parts[0],
         located=parts[1],
         unexplained=parts[2],
-        negligible=negligible,
-        floor=floor,
+        negligible=ROUNDING[units[quantity]],
+        floor=_figure(floors[quantity], measure) if floors else 0.0,
         impossible=found.impossible,
         unmatched=matched.only,
         notes=(*matched.notes, *trials.notes()),
@@ -301,11 +311,12 @@ def _engines(
 ) -> Attribution | None:
     """The left's file on both engines: what is left when the files are the same."""
     one, two = models
-    if _is_as_it_comes(two) or _is_as_it_comes(one):
-        other = load(one.path, backend=two.backend, defaults="engine")
-    else:
-        other = two.with_compiled(one.compiled)
     try:
+        if _is_as_it_comes(two) or _is_as_it_comes(one):
+            # What is typed behind the right is a setting of that side.
+            other = _with_world_of(two, load(one.path, backend=two.backend, defaults="engine"))
+        else:
+            other = two.with_compiled(one.compiled)
         return attribute(
             one,
             other,
@@ -319,16 +330,49 @@ def _engines(
         return None
 
 
+def _files_apart(
+    models: list[Model], trials: Trials, brought: frozenset[str]
+) -> dict[str, Deviation]:
+    """The gap that what cannot be brought over leaves between the files on the right's engine.
+
+    Both are run by the model's own settings: an engine as it comes may hold still what differs.
+    """
+    one, two = models
+    try:
+        if _is_as_it_comes(two) or _is_as_it_comes(one):
+            theirs = [load(model.path, backend=two.backend) for model in models]
+            world = next((m for m in models if not _is_as_it_comes(m)), theirs[0])
+            both = [_with_world_of(world, model) for model in theirs]
+        else:
+            both = [two.with_compiled(one.compiled), two]
+        return trials.files_apart(both[0], trials.brought(both[1], brought), brought)
+    except StateMachineError:
+        return {}
+
+
+def _with_world_of(model: Model, other: Model) -> Model:
+    """A Model with the gravity and the timestep of another."""
+    return other.replace(gravity=model.gravity, timestep=model.timestep, substeps=model.substeps)
+
+
 def _parts(
-    gap: float, brought: float | None, engines: Attribution | None, measure: Measure
+    gap: float, brought: float | None, engines: Attribution | None, apart: float
 ) -> tuple[float, float, float]:
-    """What is explained, located and unexplained, as parts of the gap."""
+    """What is explained, located and unexplained, as parts of the gap.
+
+    Args:
+        gap: As they come.
+        brought: With all causes brought to the same that can be.
+        engines: What becomes of the gap of the left's file on both engines.
+        apart: The gap between the two files on one engine, with those causes brought over.
+    """
     if brought is None:
         return 0.0, 0.0, 1.0
     explained, located = (gap - brought) / gap, 0.0
     if engines is not None and engines.gap > 0:
-        # The ladder measures the worst; of another figure its parts are the same parts.
-        scale = brought / gap / engines.gap
+        # The ladder is of the left's file alone, and speaks of no more than is not the files'. It
+        # measures the worst; of another figure its parts are the same parts.
+        scale = max(brought - apart, 0.0) / gap / engines.gap
         explained += scale * (engines.gap - engines.settings_same)
         located = scale * (engines.settings_same - engines.left)
     return explained, located, 1.0 - explained - located

@@ -12,6 +12,7 @@ from ...errors import BadInputError, DivergedError, TraceError
 from ...interface import Array, Ints, JointType, Model, forward, make_data, usual_site
 from ...traces import Trace
 from ..matching import Matched
+from ..tolerances import BODY, BODY_TURN, COUNT, SLIDE
 
 BALLS = "ball joints"
 
@@ -222,6 +223,11 @@ class Ruler:
             if self._body(body) in touching and name in self.units:
                 return name
         return next(iter(self.units))
+
+    def tolerance(self, quantity: str) -> float:
+        """What a gap has to be above to matter; of a place, that of a body."""
+        turn = BODY_TURN if quantity in self._turns else BODY
+        return {"joints": COUNT, BALLS: COUNT, "slides": SLIDE}.get(quantity, turn)
 
     def distances(self, quantity: str, one: Curves, two: Curves) -> Array:
         """(n,) how far apart: the worst joint, or the length of the way between."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,7 +11,37 @@ from .gap import Deviation
 
 # Rounding, after it has grown for some seconds: less than this is no gap to be explained.
 ROUNDING = {"rad": 1e-8, "m": 1e-9}
+_NOTHING: Mapping[str, float] = {}
 UNEXPLAINED = 0.05  # of the gap: where more stays, the answer is no
+
+
+def telling(
+    gaps: Mapping[str, float],
+    bounds: Mapping[str, float],
+    preferred: str,
+    tolerances: Mapping[str, float] = _NOTHING,
+) -> str:
+    """The quantity that a gap is explained in.
+
+    It is the preferred one where that is beyond its tolerance. Else it is the one that is
+    farthest beyond, among those that are more than rounding and chaos make of a run.
+
+    Args:
+        gaps: By quantity.
+        bounds: What rounding and chaos make, by quantity.
+        preferred: The quantity that an experiment is about.
+        tolerances: By quantity; none for the bounds.
+    """
+    beyond = {
+        name: gap / tolerances.get(name, bounds[name])
+        for name, gap in gaps.items()
+        if gap > bounds[name]
+    }
+    most = max(beyond, key=beyond.__getitem__, default=preferred)
+    if preferred in beyond and (beyond[preferred] > 1 or beyond[most] <= 1):
+        return preferred
+    return most
+
 
 Way = Literal["parity", "off", "one side", "alike", "none"]
 

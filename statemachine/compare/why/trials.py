@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from ...backends import load
-from ...engines.model_differences import ModelDifference
+from ...engines.model_differences import Edit, ModelDifference
 from ...errors import DivergedError, EngineError, ModelError, UnsupportedError
 from ...installed import DEFAULT
 from ...interface import Array, Model
@@ -89,11 +89,16 @@ class Trials:
         return tuple(found)
 
     def _keyframe(self) -> Iterator[ModelDifference]:
-        """What else the keyframe sets that both start from: ctrl, act, the mocap bodies."""
+        """What else the keyframe sets: the time, ctrl, act, the mocap bodies."""
         name, (one, two) = self._keyframes[0], (model.compiled for model in self._models)
         if name is None or self._keyframes[1] is None:
             return
         keys = [[frame.name for frame in model.keyframes].index(name) for model in self._models]
+        times = [float(raw.key_time[key]) for raw, key in zip((one, two), keys, strict=True)]
+        if times[0] != times[1]:
+            values = (("time", times[0], times[1]),)
+            edits: tuple[Edit, ...] = (("key_time", (keys[1],), times[0]),)
+            yield ModelDifference("time of the start", "run", "", values, "s", edits)
         owner = [np.repeat(np.arange(raw.nactuator), raw.actuator_ctrlnum) for raw in (one, two)]
         commands, states = [], []
         for a, b in self._matched.actuators:
@@ -172,9 +177,13 @@ class Trials:
 
     def model(self, side: int, brought: Iterable[str]) -> Model:
         """A side's Model with causes brought to the same."""
+        return self.brought(self._models[side], brought, side)
+
+    def brought(self, model: Model, brought: Iterable[str], side: int = 1) -> Model:
+        """A Model of a side's file with causes brought to the same."""
         those = sorted(brought)
         edits = [edit for name in those for edit in self._by_name[name].edits(side)]
-        return built(self._models[side], tuple(edits))
+        return built(model, tuple(edits))
 
     def _acting(self, side: int, brought: frozenset[str]) -> frozenset[str]:
         """The causes that change this side."""
@@ -221,6 +230,32 @@ class Trials:
             told = retold(told, self._matched, start)
         # Without a keyframe of its own it starts with the commands of the left, too.
         return told if self._keyframes[0] == self._keyframes[1] else beginning_with(start, told)
+
+    def files_apart(self, one: Model, two: Model, brought: frozenset[str]) -> dict[str, Deviation]:
+        """The gap between the file of the left and that of the right on one engine.
+
+        Args:
+            one: The left's file on the engine of the right.
+            two: The right's file on it, with causes brought to the same.
+            brought: The causes.
+
+        Returns:
+            In each quantity; {} if one of them did not stand.
+        """
+        found = []
+        for side, model in enumerate((one, two)):
+            trace = self._trace(side, model, brought if side else frozenset())
+            found.append(self._curves(side, model, trace))
+        return self.ruler.gaps(found[0], found[1]) if found[0] and found[1] else {}
+
+    def repeats(self) -> bool:
+        """Whether the left moves the same when it is run again, so that a gap can have causes."""
+        again = self._curves(0, self._models[0], self._trace(0, self._models[0], frozenset()))
+        first = self._runs[0, frozenset()]
+        assert first is not None  # it has gaps
+        return again is not None and all(
+            np.array_equal(values, again.of[name]) for name, values in first.of.items()
+        )
 
     def floor(self, uncertain: Uncertainty) -> dict[str, Deviation]:
         """The chaos floor of each quantity: a gap that is no larger says nothing."""

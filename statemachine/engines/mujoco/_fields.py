@@ -76,7 +76,7 @@ ACTUATOR = (
     FieldRow("range of its activation", ("actuator_actlimited", "actuator_actrange")),
     FieldRow("rotor", ("actuator_armature",)),
     FieldRow("damping", ("actuator_damping", "actuator_dampingpoly")),
-    FieldRow("length range", ("actuator_lengthrange",), when="actuator_gaintype"),
+    FieldRow("length range", ("actuator_lengthrange",), when="actuator_gaintype actuator_biastype"),
 )
 DELAY = (FieldRow("delay", ("actuator_delay",), "s"),)
 GROUP = (FieldRow("group", ("actuator_group",)),)
@@ -198,7 +198,7 @@ IDLE = {
     "numeric_*": "a user's own data, which the engine does not read",
     "text_*": "a user's own data, which the engine does not read",
     "tuple_*": "a user's own data, which the engine does not read",
-    "sensor_*": "sensors are read only",
+    "sensor_*": "only a controller reads them: `_sensors`, where there is one",
     "name*": "names pair elements, and act on nothing",
     "*_pathadr": "where a file was",
     "site_type": "it shows the site; of sensors it is read only",

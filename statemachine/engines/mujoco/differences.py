@@ -25,9 +25,10 @@ from ._equalities import Equalities
 from ._figures import plain, same
 from ._geoms import Geoms
 from ._places import Places
+from ._sensors import sensors
 from ._weights import Weights
 
-__all__ = ["differences", "edited", "entries"]
+__all__ = ["differences", "edited", "entries", "sensors"]
 
 # After these the boxes around the geoms of a body are no longer where they were.
 _MOVES = {

@@ -1,0 +1,192 @@
+"""An explanation that would be false: each was printed once, with a green verdict."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from statemachine.cli import main
+
+from .conftest import need_engine
+
+ARM = """
+<mujoco model="arm"><option integrator="implicitfast"/><worldbody>
+<body name="a" pos="0 0 1"><joint name="j1" axis="0 1 0" damping="{damping}"/>
+<geom name="ga" type="capsule" size=".02" fromto="0 0 0 0 0 -.2" mass=".4" {touches}/>
+{load}</body>{more}</worldbody>
+<actuator>{actuator}</actuator>
+{sensor}
+<keyframe><key name="k" qpos="{qpos}" {key}/></keyframe></mujoco>
+"""
+USUAL = {
+    "damping": ".02",
+    "touches": "",
+    "load": "",
+    "more": "",
+    "actuator": '<motor name="m" joint="j1"/>',
+    "sensor": "",
+    "qpos": ".8",
+    "key": "",
+}
+FUNCTIONS = """
+import numpy as np
+
+_draw = np.random.default_rng()
+
+def none(model, data):
+    return None
+
+def wave(model, data):
+    return [np.sin(6 * data.time)]
+
+def sensed(model, data):
+    return [0.3 - 0.2 * data.raw.sensordata[0]]
+
+def drawn(model, data):
+    return [float(_draw.normal())]
+
+def pushed(model, data):
+    data.raw.xfrc_applied[1, 0] = np.sin(6 * data.time) / (1 + 10 * data.qpos[0] ** 2)
+    return [0.0]
+"""
+LOAD = """
+<body name="load" pos="0 0 -.25"><joint name="swing" axis="0 1 0"/>
+<geom name="gl" size=".03" pos="0 0 -.1" mass=".4"/></body>
+"""
+MUSCLE = (
+    '<general name="m" joint="j1" biastype="muscle" biasprm=".75 1.05 100 200 .5 1.6 1.5 1.3 1.2" '
+    'lengthrange="{} .5"/>'
+)
+SLIDING = """
+<geom name="slope" type="plane" size="3 3 .1" pos="0 1 0" euler="0 20 0" friction=".01"/>
+<body name="box" pos="0 1 .06" euler="0 20 0"><freejoint/>
+<geom name="gb" type="box" size=".05 .05 .05" friction="{}"/></body>
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "f.py").write_text(FUNCTIONS, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def file(folder: Path, name: str, **changed: str) -> str:
+    text = ARM.format(**{**USUAL, **changed})
+    (folder / name).write_text(text, encoding="utf-8")
+    return name
+
+
+def asked(capsys: Any, *words: str) -> tuple[int, dict[str, Any]]:
+    code = main(["compare", *words, "--keyframe", "k", "--json"])
+    return code, json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("sides", [("l.xml", "r.xml"), ("r.xml", "l.xml")])
+@pytest.mark.parametrize("of_the_engine", [0, 1])
+def test_engine_settings_do_not_pay_for_another_file(
+    folder: Path, capsys: Any, sides: tuple[str, str], of_the_engine: int
+) -> None:
+    """A load that swings is on one side only; PyBullet's own motors hold both files still."""
+    need_engine("pybullet")
+    file(folder, "l.xml")
+    file(folder, "r.xml", load=LOAD, qpos=".8 0")
+    typed = [
+        f"{side}@pybullet:engine" if k == of_the_engine else side for k, side in enumerate(sides)
+    ]
+    code, found = asked(capsys, "f.py:none", *typed, "--why", "--seconds", "0.6")
+    assert code == 1
+    assert found["engines"]["unexplained"] < 0.01  # of the left file on both engines
+    assert found["unexplained"] > 0.9
+
+
+@pytest.mark.parametrize(
+    ("option", "name", "word"),
+    [("gravity=0,0,-3", "gravity", "3 m/s²"), ("timestep=0.001", "timestep", "1 ms")],
+)
+def test_an_option_of_an_engine_as_it_comes_counts(
+    folder: Path, capsys: Any, option: str, name: str, word: str
+) -> None:
+    need_engine("pybullet")
+    file(folder, "n.xml", actuator="")
+    sides = ("n.xml", "n.xml@pybullet:engine", option)
+    _, found = asked(capsys, "f.py:none", *sides, "--why", "--seconds", "0.3", "--no-floor")
+    (rung,) = (each for each in found["engines"]["ladder"] if each["factor"] == name)
+    assert rung["had"][1] == word
+
+
+def test_what_is_explained_is_what_differs(folder: Path, capsys: Any) -> None:
+    """The joint's damping differs by less than a tolerance; the box slides, or does not."""
+    file(folder, "l.xml", more=SLIDING.format(".2"), qpos=".8 0 1 .06 1 0 0 0")
+    file(folder, "r.xml", damping=".02001", more=SLIDING.format(".6"), qpos=".8 0 1 .06 1 0 0 0")
+    for floor in ((), ("--floor", "0.1deg")):
+        code, found = asked(
+            capsys, "f.py:none", "l.xml", "r.xml", "--why", "--seconds", "1", *floor
+        )
+        assert (code, found["quantity"]) == (0, "box")
+        shares = {each["name"]: each["share"] for each in found["shares"]}
+        assert shares["friction of gb"] > 0.95
+        assert abs(shares["damping of j1"]) < 0.02
+    code, found = asked(
+        capsys, "f.py:none", "l.xml", "r.xml", "--why", "--seconds", "1", "--quantity", "joints"
+    )
+    assert found["quantity"] == "joints"
+
+
+def test_a_muscle_that_pulls_by_its_bias_has_a_length_range(folder: Path, capsys: Any) -> None:
+    for name, lower in (("l.xml", "-.5"), ("r.xml", "-.2")):
+        file(folder, name, actuator=MUSCLE.format(lower))
+    code, found = asked(capsys, "f.py:wave", "l.xml", "r.xml", "--why", "--no-floor")
+    (cause,) = found["shares"]
+    assert (code, cause["name"]) == (0, "length range of m")
+    assert cause["share"] == pytest.approx(1.0)
+    assert main(["compare", "--models", "l.xml", "r.xml"]) == 1
+
+
+def test_a_start_at_another_time_is_a_cause(folder: Path, capsys: Any) -> None:
+    file(folder, "l.xml")
+    file(folder, "r.xml", key='time=".5"')
+    code, found = asked(capsys, "f.py:wave", "l.xml", "r.xml", "--why", "--no-floor")
+    (cause,) = found["shares"]
+    assert (code, cause["name"], cause["values"]) == (0, "time of the start", [["time", 0.0, 0.5]])
+    assert cause["share"] == pytest.approx(1.0)
+    assert main(["compare", "--models", "l.xml", "r.xml"]) == 1
+    assert "keyframe k time" in capsys.readouterr().out
+
+
+def test_a_sensor_counts_where_a_function_may_read_it(folder: Path, capsys: Any) -> None:
+    sensor = '<sensor><jointpos name="p" joint="j1" {}/></sensor>'
+    file(folder, "l.xml", sensor=sensor.format(""))
+    file(folder, "r.xml", sensor=sensor.format('cutoff=".01"'))
+    file(folder, "v.xml", sensor=sensor.format("").replace("jointpos", "jointvel"))
+    code, found = asked(capsys, "f.py:sensed", "l.xml", "r.xml", "--why", "--no-floor")
+    (cause,) = found["shares"]
+    assert (code, cause["name"]) == (0, "cutoff of p")
+    assert cause["share"] == pytest.approx(1.0)
+    code, found = asked(capsys, "f.py:sensed", "l.xml", "v.xml", "--why", "--no-floor")
+    assert code == 1
+    assert found["unexplained"] == 1.0
+    assert found["shares"][0]["name"] == "sensor of p"
+    # By themselves sensors move nothing.
+    code, found = asked(capsys, "f.py:none", "l.xml", "v.xml", "--why", "--no-floor")
+    assert (code, found["shares"]) == (0, [])
+    assert main(["compare", "--models", "l.xml", "v.xml"]) == 0
+    assert "sensor p type" in capsys.readouterr().out
+
+
+def test_a_function_that_draws_without_a_seed_has_no_causes(folder: Path, capsys: Any) -> None:
+    file(folder, "l.xml")
+    assert main(["compare", "f.py:drawn", "l.xml", "l.xml", "damping=0.5", "--why"]) == 2
+    assert "does not command the same twice" in capsys.readouterr().err
+
+
+def test_forces_of_a_function_leave_no_open_loop(folder: Path, capsys: Any) -> None:
+    file(folder, "l.xml")
+    words = ("f.py:pushed", "l.xml", "l.xml", "damping=0.02", "--seconds", "0.5")
+    code, found = asked(capsys, *words)
+    assert (code, found["commands"]) == (0, "more than ctrl")
+    assert main(["compare", *words]) == 0
+    assert "There is no open loop" in capsys.readouterr().out
