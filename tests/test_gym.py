@@ -435,3 +435,24 @@ def test_help_knows_nothing_of_it() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT
     )
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_what_is_closed_says_so_and_starts_nothing() -> None:
+    """A picture of a closed environment would start a process that nobody ends."""
+    env = gymnasium.make(REACH, render_mode="rgb_array").unwrapped
+    envs = _make_vec(REACH, "mujoco", 1, render_mode="rgb_array")
+    for each, actions in ((env, np.zeros(6)), (envs, np.zeros((1, 6)))):
+        each.reset(seed=0)
+        each.close()
+        for use in (each.render, lambda each=each, actions=actions: each.step(actions)):
+            with pytest.raises(ClosedDataError, match="closed: make"):
+                use()
+
+
+def test_seeds_may_be_an_array_of_numbers() -> None:
+    with closing(_make_vec(REACH, "mujoco", 2)) as envs:
+        listed, _ = envs.reset(seed=[3, 4])
+        as_array, _ = envs.reset(seed=np.array([3, 4]))
+        assert np.array_equal(listed, as_array)
+    with pytest.raises(UnknownNameError, match="no task named"):
+        gymnasium.make(REACH, task=["reach"])

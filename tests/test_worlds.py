@@ -665,3 +665,17 @@ def test_no_array_can_be_deleted(model: sm.Model) -> None:
         for name in ("ctrl", "xpos", "nosuch"):
             with pytest.raises(ReadOnlyError, match="cannot be deleted"):
                 delattr(worlds, name)
+
+
+def test_a_record_that_memory_cannot_hold_is_refused(model: sm.Model) -> None:
+    with many.make_worlds(model, 2, workers=1) as worlds:
+        with pytest.raises(BadInputError, match=r"1000000000 rows of qpos, time takes .* GB"):
+            many.record(worlds, 10**9, ("qpos", "time"))
+        assert not worlds.time.any()
+
+
+def test_the_verbs_of_one_data_send_worlds_to_their_own(model: sm.Model) -> None:
+    with many.make_worlds(model, 2, workers=1) as worlds:
+        with pytest.raises(TypeError, match=r"got Worlds, which statemachine\.worlds\.step takes"):
+            sm.step(model, worlds)  # pyright: ignore[reportArgumentType]
+        many.step(worlds)

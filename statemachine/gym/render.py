@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..drawing.camera import Camera
+from ..errors import ClosedDataError
 from ..interface import Array
 from ..rendering import LivePictures, motion_through, renderer_here
 from .tasks import Task
@@ -31,6 +32,7 @@ class TaskPictures:
 
     def __init__(self, task: Task) -> None:
         self._model, self._radius = task.model, task.near
+        self._closed = False
         self._live: LivePictures | None = None
         self._folder: tempfile.TemporaryDirectory[str] | None = None
 
@@ -40,7 +42,12 @@ class TaskPictures:
         Args:
             qpos: (n, nq), of each world.
             targets: (n, 3) [m].
+
+        Raises:
+            ClosedDataError: They are closed.
         """
+        if self._closed:
+            raise ClosedDataError("this environment is closed: make another")
         motion = motion_through(self._model, qpos)
         if self._live is None:
             renderer = renderer_here()
@@ -63,3 +70,4 @@ class TaskPictures:
         if self._folder is not None:
             self._folder.cleanup()
         self._live = self._folder = None
+        self._closed = True

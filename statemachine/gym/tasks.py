@@ -231,7 +231,7 @@ def make_task(name: str, backend: str, frame_skip: int) -> Task:
     Raises:
         UnknownNameError: There is no such task or backend.
     """
-    if name not in TASKS:
+    if not isinstance(name, str) or name not in TASKS:
         raise unknown_name("task", name, TASKS)
     return TASKS[name](backend, frame_skip)
 

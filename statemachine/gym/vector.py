@@ -185,7 +185,7 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
     def _advance(self, going: Flags, ctrl: Array) -> Flags:
         """Step worlds, and see where they are; which diverged. Of these the last is kept."""
         worlds = self.worlds
-        np.copyto(worlds.ctrl, ctrl, where=going[:, None])
+        worlds.ctrl = np.where(going[:, None], ctrl, worlds.ctrl)
         with warnings.catch_warnings():  # `infos` tell of it
             warnings.simplefilter("ignore", DivergedWarning)
             step(worlds, self.task.frame_skip, ids=going)
@@ -238,4 +238,4 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         if not listed or len(seed) != self.num_envs:
             got = len(seed) if listed else shown(seed)
             raise BadInputError(f"seed wants {self.num_envs} seeds, or one; got {got}")
-        return list(seed)
+        return [int(each) if isinstance(each, np.integer) else each for each in seed]

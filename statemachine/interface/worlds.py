@@ -275,6 +275,8 @@ class Worlds(ABC):
             raise AttributeError(
                 f"these Worlds do not keep {name!r}: name it in make_worlds(…, derived=…)"
             )
+        if name == "_advance":  # what `statemachine.step` asks of a Data
+            raise TypeError("a Data is wanted; got Worlds, which statemachine.worlds.step takes")
         raise AttributeError(f"Worlds have no attribute {name!r}")
 
     def __setattr__(self, name: str, value: Any) -> None:

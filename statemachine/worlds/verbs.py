@@ -24,6 +24,7 @@ from ..interface.checks import as_count, as_vector, check_state, kind_of
 from ..interface.data import alone
 from ..interface.options import checked_options
 from ..interface.worlds import BATCHED, WRITABLE, Worlds, in_world
+from ..processes import free_memory
 
 _SHOWN = 5  # diverged worlds that a warning names
 
@@ -215,6 +216,12 @@ def record(
         shape = (worlds.n, rows, worlds.model.nu)
         commands = as_vector(ctrl, shape[1:] if np.ndim(ctrl) == 2 else shape, "ctrl")
         commands = np.broadcast_to(commands, shape)
+    size, free = sum(getattr(worlds, name).nbytes for name in names) * rows, free_memory()
+    if free is not None and size > free:
+        raise BadInputError(
+            f"a record of {rows} rows of {', '.join(names)} takes {size / 1e9:.3g} GB, and "
+            f"{free / 1e9:.3g} GB are free: take fewer steps, or a larger every"
+        )
     arrays = {}
     for name in names:
         array = getattr(worlds, name)
