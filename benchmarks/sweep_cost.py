@@ -103,7 +103,8 @@ def main() -> None:
     print(f"load {load:.1f}, Python {platform.python_version()}, joblib {joblib.__version__}")
     for backend in ("mujoco", "pybullet"):
         alone = min(steps_alone(backend) for _ in range(3))
-        print(f"the 400 steps of hold alone, {backend}: {alone * 1e3:.1f} ms")
+        version = sm.load("so101/scene", backend=backend).engine_version
+        print(f"the 400 steps of hold alone, {backend} {version}: {alone * 1e3:.1f} ms")
     for what in ("hold", "waves"):
         for backend in ("mujoco", "pybullet"):
             for label, vary, seeds in (

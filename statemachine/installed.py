@@ -169,7 +169,7 @@ def require(name: str) -> ModuleType:
     return module
 
 
-def require_extra(module: str, what: str, package: str, extra: str) -> Any:
+def require_extra(module: str, what: str, package: str, extra: str, instead: str = "") -> Any:
     """A module of a package that an extra brings.
 
     Args:
@@ -177,6 +177,7 @@ def require_extra(module: str, what: str, package: str, extra: str) -> Any:
         what: What needs it: "a sweep".
         package: What it is called: "SciPy".
         extra: Of this library.
+        instead: What does without it: "npz needs nothing more".
 
     Raises:
         MissingEngineError: It is not installed; the message names the extra.
@@ -185,7 +186,8 @@ def require_extra(module: str, what: str, package: str, extra: str) -> Any:
         return importlib.import_module(module)
     except ImportError as error:
         raise MissingEngineError(
-            f"{what} needs {package}: pip install 'statemachine-sim[{extra}]'",
+            f"{what} needs {package}: pip install 'statemachine-sim[{extra}]'"
+            + (f"; {instead}" if instead else ""),
             engine=module.partition(".")[0],
         ) from error
 

@@ -72,6 +72,8 @@ def resolve(name: str | os.PathLike[str], menagerie: str | os.PathLike[str] | No
     ours = text if "/" in text else f"{text}/{text}"
     if ours in model_names():
         return models_dir() / f"{ours}.xml"
+    if path.is_dir():
+        raise ModelFileError(f"{text} is a folder: name a file in it ({', '.join(SUFFIXES)})")
     if path.is_file():
         raise ModelFileError(f"model file {text} does not end in {', '.join(SUFFIXES)}")
     if os.environ.get("MENAGERIE") and "/" in text:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -235,8 +236,41 @@ def servo(mass: float = 1.0, load: float = 1.0, kp: float = 200.0) -> str:
     return SERVO.format(mass=mass, load=load, kp=kp, kv=2 * (kp * (mass + load)) ** 0.5)
 
 
-def mesh(size: float = 0.05, order: int | None = None, corners: int = 20, noise: float = 0) -> str:
-    """The arm with a ball that is a mesh, its corners drawn by a seed and in an order of choice."""
+def mesh(**more: Any) -> str:
+    """The arm with a ball that is a mesh; `more` as for `_asset`."""
+    return ARM.replace("<worldbody>", f"<asset>{_asset('m', **more)}</asset><worldbody>").replace(
+        f'{_BALL} size="0.05"', f'{_BALL} type="mesh" mesh="m"'
+    )
+
+
+def balls(*meshes: str, **assets: dict[str, Any]) -> str:
+    """The arm with two balls that are meshes.
+
+    Args:
+        meshes: The name of the mesh of each ball.
+        assets: The meshes by name, as for `_asset`.
+    """
+    text = "".join(_asset(name, **more) for name, more in assets.items())
+    text = ARM.replace("<worldbody>", f"<asset>{text}</asset><worldbody>")
+    start, end = text.index('<body name="ball"'), text.index('<body name="weight"')
+    ball = text[start:end]
+    again = ball.replace('"ball', '"again').replace("0.6 0 0.2", "0.9 0 0.2")
+    for name, of in zip(("ball", "again"), meshes, strict=True):
+        shape = f'name="{name}_shape"'
+        ball, again = (
+            each.replace(f'{shape} size="0.05"', f'{shape} type="mesh" mesh="{of}"')
+            for each in (ball, again)
+        )
+    places = "0.6 0 0.2 1 0 0 0"
+    return (text[:start] + ball + again + text[end:]).replace(
+        f'"0 0  {places}', f'"0 0  {places} {places.replace("0.6", "0.9")}'
+    )
+
+
+def _asset(
+    name: str, size: float = 0.05, order: int | None = None, corners: int = 20, noise: float = 0
+) -> str:
+    """A mesh whose corners on a sphere are drawn by a seed, in an order of choice."""
     random = np.random.default_rng(0)
     points = random.normal(size=(corners, 3))
     points *= size / np.linalg.norm(points, axis=1)[:, None]
@@ -244,10 +278,7 @@ def mesh(size: float = 0.05, order: int | None = None, corners: int = 20, noise:
     if order is not None:
         points = np.random.default_rng(order).permutation(points)
     text = " ".join(repr(float(each)) for each in points.ravel())
-    asset = f'<asset><mesh name="m" vertex="{text}"/></asset><worldbody>'
-    return ARM.replace("<worldbody>", asset).replace(
-        f'{_BALL} size="0.05"', f'{_BALL} type="mesh" mesh="m"'
-    )
+    return f'<mesh name="{name}" vertex="{text}"/>'
 
 
 def hills(wave: float = 1.0, points: int = 9) -> str:

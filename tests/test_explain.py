@@ -18,6 +18,7 @@ from .explained import (
     ARM,
     SWING,
     Case,
+    balls,
     changed,
     equality,
     explained,
@@ -59,16 +60,35 @@ def test_one_cause_is_found_and_explains_all(name, tmp_path):
     assert found.located == 0
 
 
+def at_70_to_30(seed: int) -> tuple[str, str, float]:
+    """Two servos under weights that differ by 70 and 30 parts, and the gap between them [m]."""
+    size = np.random.default_rng(seed).uniform(0.2, 0.6)
+    left, right = servo(), servo(1.0 + 0.7 * size, 1.0 + 0.3 * size)
+    return left, right.replace(_kv(right), _kv(left)), 9.81 * size / 200
+
+
+def that_interact(seed: int) -> tuple[str, str, float, float]:
+    """Two servos that differ in weight and in gain, and the Shapley value of either."""
+    random = np.random.default_rng(seed)
+    mass, kp = random.uniform(2, 3), random.uniform(80, 140)
+
+    def gap(m: float, k: float) -> float:
+        return 9.81 * abs((m + 1) / k - 2 / 200)
+
+    whole = gap(mass, kp)
+    heavier = ((whole - gap(1, kp)) + gap(mass, 200)) / 2 / whole
+    left, right = servo(), servo(mass, 1.0, kp)
+    return left, right.replace(_kv(right), _kv(left)), heavier, 1 - heavier
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_two_causes_at_70_to_30(seed, tmp_path):
     """What a servo sags by is the sum of the weights that it carries."""
-    size = np.random.default_rng(seed).uniform(0.2, 0.6)
-    left, right = servo(), servo(1.0 + 0.7 * size, 1.0 + 0.3 * size)
-    right = right.replace(_kv(right), _kv(left))
+    left, right, sags = at_70_to_30(seed)
     found = explained(
         tmp_path, left, right, scenario=STILL, seconds=3.0, measure="end", quantity="slides"
     )
-    assert found.gap == pytest.approx(9.81 * size / 200, rel=1e-3)
+    assert found.gap == pytest.approx(sags, rel=1e-3)
     told = shares(found)
     assert told["mass of slider"] == pytest.approx(0.7, abs=0.05)
     assert told["mass of load"] == pytest.approx(0.3, abs=0.05)
@@ -78,23 +98,14 @@ def test_two_causes_at_70_to_30(seed, tmp_path):
 @pytest.mark.parametrize("seed", range(8))
 def test_causes_that_interact_get_their_shapley_value(seed, tmp_path):
     """What a servo sags by is weight over gain: two causes, neither of which adds to the other."""
-    random = np.random.default_rng(seed)
-    mass, kp = random.uniform(2, 3), random.uniform(80, 140)
-    left, right = servo(), servo(mass, 1.0, kp)
-    right = right.replace(_kv(right), _kv(left))
+    left, right, heavier, stiffer = that_interact(seed)
     found = explained(
         tmp_path, left, right, scenario=STILL, seconds=6.0, measure="end", quantity="slides"
     )
-
-    def gap(m: float, k: float) -> float:
-        return 9.81 * abs((m + 1) / k - 2 / 200)
-
-    whole = gap(mass, kp)
-    heavier = ((whole - gap(1, kp)) + gap(mass, 200)) / 2 / whole
     told = shares(found)
     assert found.method == "all sets"
     assert told["mass of slider"] == pytest.approx(heavier, abs=0.01)
-    assert told["gains of slider"] == pytest.approx(1 - heavier, abs=0.01)
+    assert told["gains of slider"] == pytest.approx(stiffer, abs=0.01)
 
 
 def _kv(text: str) -> str:
@@ -158,24 +169,24 @@ def _swapped(text: str) -> str:
     return text.replace(lines[0], "@").replace(lines[1], lines[0]).replace("@", lines[1])
 
 
-@pytest.mark.parametrize("name", SAME)
-def test_another_way_of_saying_it_is_no_difference(name, tmp_path):
+def said_otherwise(name: str) -> str:
+    """The arm in other words."""
     right = ARM
     for old, new in SAME[name]:
         assert right.count(old) == 1
         right = right.replace(old, new)
-    scenario = HOME
     if name == "permuted bodies":  # and with them the order of qpos
         start, end = right.index('<body name="ball"'), right.index('<body name="weight"')
         ball = right[start:end]
         right = right.replace(ball, "").replace('<body name="upper"', f'{ball}<body name="upper"')
         right = right.replace('qpos="0 0  0.6 0 0.2 1 0 0 0  0"', 'qpos="0.6 0 0.2 1 0 0 0 0 0 0"')
-    if name == "permuted actuators":
-        lines = [
-            f'<position name="{n}" joint="{n}" kp="20" kv="1"/>' for n in ("shoulder", "elbow")
-        ]
-        right = right.replace(lines[0], "@").replace(lines[1], lines[0]).replace("@", lines[1])
-    found = explained(tmp_path, ARM, right, scenario=scenario)
+    return _swapped(right) if name == "permuted actuators" else right
+
+
+@pytest.mark.parametrize("name", SAME)
+def test_another_way_of_saying_it_is_no_difference(name, tmp_path):
+    right = said_otherwise(name)
+    found = explained(tmp_path, ARM, right, scenario=HOME)
     # The order of ctrl matters to who writes it by number.
     assert [each.name for each in found.shares] == (
         ["order of ctrl"] if name == "permuted actuators" else []
@@ -214,19 +225,19 @@ def test_equivalent_meshes_equalities_and_still_bodies_are_no_difference(name, t
     assert found.is_explained
 
 
-@pytest.mark.parametrize(
-    ("left", "right", "cause"),
-    [
-        (mesh(), mesh(size=0.055), "shape of ball_shape"),
-        (mesh(), mesh(noise=1e-4), "shape of ball_shape"),
-        (hills(), hills(2.0), "heights of floor"),
-        (
-            equality('<weld name="w" body1="lower" body2="ball" anchor="-0.3 0 0.05"/>'),
-            equality('<weld name="w" body1="ball" body2="lower" anchor="0.35 0 -0.05"/>'),
-            "what it keeps of w",
-        ),
-    ],
-)
+BROUGHT_OVER = [
+    (mesh(), mesh(size=0.055), "shape of ball_shape"),
+    (mesh(), mesh(noise=1e-4), "shape of ball_shape"),
+    (hills(), hills(2.0), "heights of floor"),
+    (
+        equality('<weld name="w" body1="lower" body2="ball" anchor="-0.3 0 0.05"/>'),
+        equality('<weld name="w" body1="ball" body2="lower" anchor="0.35 0 -0.05"/>'),
+        "what it keeps of w",
+    ),
+]
+
+
+@pytest.mark.parametrize(("left", "right", "cause"), BROUGHT_OVER)
 def test_a_mesh_a_height_field_and_a_swapped_weld_are_brought_over(left, right, cause, tmp_path):
     found = explained(tmp_path, left, right, scenario=HOME, quantity="ball")
     told = shares(found)
@@ -242,6 +253,53 @@ def test_another_size_of_a_mesh_or_of_a_height_field_is_refused_with_its_reason(
         assert [each.note.rpartition(" of ")[2] for each in found.shares] == ["another size"]
 
 
+SMALL, LARGE, COARSE = {"size": 0.05}, {"size": 0.055}, {"corners": 30}
+
+
+SHARED = [
+    # One mesh for both, which is another.
+    (
+        balls("m", "m", m=SMALL),
+        balls("m", "m", m=LARGE),
+        ["shape of ball_shape, again_shape"],
+    ),
+    # Two files of one mesh are the same as one.
+    (
+        balls("m", "n", m=SMALL, n=SMALL),
+        balls("m", "m", m=LARGE),
+        ["shape of ball_shape, again_shape"],
+    ),
+    # The right has the left's mesh, too, whatever its size: each geom can take it up.
+    (
+        balls("m", "n", m=SMALL, n=COARSE),
+        balls("n", "n", m=SMALL, n=COARSE),
+        ["shape of ball_shape"],
+    ),
+    (
+        balls("m", "n", m=SMALL, n=COARSE),
+        balls("n", "m", m=SMALL, n=COARSE),
+        ["shape of ball_shape", "shape of again_shape"],
+    ),
+]
+
+
+@pytest.mark.parametrize(("left", "right", "causes"), SHARED)
+def test_a_mesh_that_geoms_share_is_brought_over(left, right, causes, tmp_path):
+    found = explained(tmp_path, left, right, scenario=HOME, quantity="ball")
+    assert found.gap > 100 * found.negligible
+    assert sorted(shares(found)) == sorted(causes)
+    assert found.brought == 0.0
+    assert found.is_explained
+
+
+@pytest.mark.parametrize("mesh_of_the_other", ["k", "n"])
+def test_a_mesh_that_another_geom_keeps_is_refused_with_its_reason(mesh_of_the_other, tmp_path):
+    left = balls("m", mesh_of_the_other, m=SMALL, k={"noise": 2e-3}, n=LARGE)
+    found = explained(tmp_path, left, balls("n", "n", n=LARGE), scenario=HOME, quantity="ball")
+    assert {each.note for each in found.shares} == {"another geom keeps this mesh, or gets a third"}
+    assert not found.is_explained
+
+
 def test_a_function_that_writes_by_number_meets_other_actuators(tmp_path):
     right = _swapped(ARM)
     by_number = replace(HOME, controller=lambda _model, _seed: lambda _time, _data: [0.8, -0.5])
@@ -249,13 +307,15 @@ def test_a_function_that_writes_by_number_meets_other_actuators(tmp_path):
     assert shares(found) == {"order of ctrl": pytest.approx(1.0)}
 
 
+EXTRA = (
+    '<site name="tip"',
+    '<body name="more"><joint name="more" axis="1 0 0" damping="0.01"/><inertial mass="0.2" '
+    'pos="0 0.05 0" diaginertia="0.001 0.001 0.001"/></body><site name="tip"',
+)
+
+
 def test_what_cannot_be_brought_over_stays_unexplained(tmp_path):
-    extra = (
-        '<site name="tip"',
-        '<body name="more"><joint name="more" axis="1 0 0" damping="0.01"/><inertial mass="0.2" '
-        'pos="0 0.05 0" diaginertia="0.001 0.001 0.001"/></body><site name="tip"',
-    )
-    found = explained(tmp_path, ARM, ARM.replace(*extra), scenario=SWING)
+    found = explained(tmp_path, ARM, ARM.replace(*EXTRA), scenario=SWING)
     (alone,) = [each for each in found.shares if each.share is None]
     assert alone.name == "extra joint of more"
     assert found.unexplained > 0.9
@@ -263,10 +323,14 @@ def test_what_cannot_be_brought_over_stays_unexplained(tmp_path):
     assert found.unmatched[1]["joint"] == ("more",)
 
 
-@pytest.mark.parametrize("name", ["mass", "gains", "damping", "gear", "place", "armature"])
+ACROSS = ("mass", "gains", "damping", "gear", "place", "armature")
+FLOOR = '<geom name="floor" type="plane" size="2 2 0.1"/>'
+
+
+@pytest.mark.parametrize("name", ACROSS)
 def test_across_engines_the_file_is_told_from_the_engine(name, tmp_path):
     need_engine("pybullet")
-    bare = ARM.replace('<geom name="floor" type="plane" size="2 2 0.1"/>', "")
+    bare = ARM.replace(FLOOR, "")
     case = ALONE[name]
     found = explained(
         tmp_path, bare, changed(bare, case), engines=("mujoco", "pybullet"), quantity="joints"
@@ -486,11 +550,11 @@ EASILY_MISSED = {
 @pytest.mark.parametrize("name", EASILY_MISSED)
 def test_what_is_easily_missed(name, tmp_path):
     both, other, cause, *quantity = EASILY_MISSED[name]
-    left = _with(LED, both)
+    left = with_changes(LED, both)
     # A delay shows only where the command changes.
     scenario = HOME if "delay" in name else HOME_LEAVE
     found = explained(
-        tmp_path, left, _with(left, other), scenario=scenario, quantity=(*quantity, None)[0]
+        tmp_path, left, with_changes(left, other), scenario=scenario, quantity=(*quantity, None)[0]
     )
     assert found.gap > 100 * found.negligible
     assert list(shares(found)) == [cause]
@@ -507,7 +571,7 @@ def test_what_is_easily_missed(name, tmp_path):
     ],
 )
 def test_a_mocap_body_and_a_cord_are_no_difference(change, tmp_path):
-    found = explained(tmp_path, LED, _with(LED, change), scenario=HOME_LEAVE)
+    found = explained(tmp_path, LED, with_changes(LED, change), scenario=HOME_LEAVE)
     assert not found.shares
 
 
@@ -515,8 +579,8 @@ def test_a_mocap_body_and_a_cord_are_no_difference(change, tmp_path):
 def test_another_zero_of_several_joints_or_of_one_that_an_equality_holds(held, tmp_path):
     more = '<joint name="twist" axis="1 0 0" damping="0.1"/><site name="low"'
     keep = '<equality><joint joint1="shoulder" joint2="elbow"/>'
-    left = _with(LED, [("<equality>", keep)] if held else [('<site name="low"', more)])
-    right = _with(left, [('name="elbow" axis', 'name="elbow" ref="0.2" axis')])
+    left = with_changes(LED, [("<equality>", keep)] if held else [('<site name="low"', more)])
+    right = with_changes(left, [('name="elbow" axis', 'name="elbow" ref="0.2" axis')])
     found = explained(tmp_path, left, right, scenario=STAY)
     assert set(shares(found)) == {"zero of lower", "start"}
     assert found.brought is not None
@@ -527,17 +591,17 @@ def test_another_zero_of_several_joints_or_of_one_that_an_equality_holds(held, t
 def test_what_the_hinges_do_not_show_is_no_agreement(old, new, tmp_path):
     ball = '<body pos="1 0 1"><joint name="hip" type="ball" stiffness="0.1"/>'
     ball += '<geom type="capsule" size="0.02" fromto="0 0 0 0.1 0 -0.2" mass="0.3"/></body>'
-    left = _with(ARM, [('<body name="weight"', f'{ball}<body name="weight"')])
+    left = with_changes(ARM, [('<body name="weight"', f'{ball}<body name="weight"')])
     left = left.replace('0 0.2 1 0 0 0  0"', '0 0.2 1 0 0 0  1 0 0 0  0"')
-    found = explained(tmp_path, left, _with(left, [(old, new)]), scenario=HOME)
+    found = explained(tmp_path, left, with_changes(left, [(old, new)]), scenario=HOME)
     assert not found.is_rounding
     assert len(found.shares) == 1
     assert found.brought == 0
 
 
 def test_what_sleeps_from_the_start(tmp_path):
-    left = _with(ARM, [('implicitfast"/>', 'implicitfast"><flag sleep="enable"/></option>')])
-    right = _with(left, [('<body name="ball"', '<body name="ball" sleep="init"')])
+    left = with_changes(ARM, [('implicitfast"/>', 'implicitfast"><flag sleep="enable"/></option>')])
+    right = with_changes(left, [('<body name="ball"', '<body name="ball" sleep="init"')])
     found = explained(tmp_path, left, right, scenario=HOME, quantity="ball")
     assert found.gap > 0.01
     assert list(shares(found)) == ["sleep policy of ball"]
@@ -555,7 +619,8 @@ def test_what_is_fixed_elsewhere_does_not_move_the_world(tmp_path):
     assert found.brought == 0
 
 
-def _with(text: str, changes: list[tuple[str, str]]) -> str:
+def with_changes(text: str, changes: list[tuple[str, str]]) -> str:
+    """A text with changes, each of a piece that is there once."""
     for old, new in changes:
         assert text.count(old) == 1, old
         text = text.replace(old, new)
@@ -672,7 +737,7 @@ def test_detection_is_told_from_contact_at_equal_states():
     one, two = (sm.load("so101/scene", backend=name) for name in ("mujoco", "pybullet"))
     hold = scenario("hold")
     found = attribute(one, two, hold, seconds=0.45, uncertain=None)
-    wanted = one_step(rerun_of(hold, one, seconds=0.45), two, moments=100)
+    wanted = one_step(rerun_of(hold, one, seconds=0.45), two)
     (gap,) = [stage for stage in wanted.stages if stage.stage == "contacts found"]
     told = found.detection
     assert told is not None

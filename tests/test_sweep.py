@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import re
@@ -63,6 +64,11 @@ def hangs(model, data, gain=1.0):
 
 def fails(model, data, gain=1.0):
     return [1 / (gain - 2)] * model.nu
+
+def told(model, data, gain=1.0):
+    if data.time > 0.007:
+        raise RuntimeError(f"{float(data.ctrl[0])!r} {float(data.qvel[0])!r}")
+    return [0.5] * model.nu
 
 def mended(model, data, gain=1.0):
     if gain > 2 and not os.path.exists(os.environ["MENDED"]):
@@ -309,6 +315,18 @@ def test_a_cell_that_fails_is_a_row(policy: str) -> None:
     fine, wrong = in_process(small(f"{policy}:fails", "gain=1,2"))
     assert (fine["status"], wrong["error_class"]) == ("done", "BadInputError")
     assert "policy.py, line" in wrong["error"]
+
+
+def test_the_chaos_floor_changes_starts_and_commands(policy: str) -> None:
+    """As that of a comparison does."""
+    sweep = prepared(small(f"{policy}:told", "qvel[shoulder_pan]=0"))
+    (cell,) = sweep.cells("mujoco")
+    rows = run_batch(sweep.rules, [cell, dataclasses.replace(cell, nudge=1)], False)
+    exact, nudged = (re.findall(r"-?\d[\d.e+-]*", row["error"])[-2:] for row in rows)
+    assert exact[0] == "0.5"
+    assert 0 < abs(float(nudged[0]) - 0.5) <= 1e-12
+    assert 0 < abs(float(nudged[1]) - float(exact[1])) < 1e-6
+    assert rows[0]["qpos"] != rows[1]["qpos"]
 
 
 # The folder.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import json
 from collections.abc import Callable
@@ -24,10 +25,13 @@ from statemachine.report.terminal import show
 from statemachine.sweep import Design, Sweep, Vary, run_sweep
 from statemachine.sweep.analysis import SweepReport, sweep_report
 from statemachine.sweep.analysis_fit import fit_curves
+from statemachine.sweep.analysis_gaps import SweepRuns, gaps_of, runs_of
 from statemachine.sweep.analysis_indices import variance_shares
+from statemachine.sweep.analysis_runs import facts_of
+from statemachine.sweep.analysis_together import REFINED, brought_together
 from statemachine.sweep.cell import DONE, FAILED
 from statemachine.sweep.folder import SCHEMA
-from statemachine.sweep.rows import RowWriter
+from statemachine.sweep.rows import RowWriter, read_cells
 
 SIDES = ("mujoco", "pybullet")
 TIMES = 5  # moments of a made-up run
@@ -247,7 +251,7 @@ def test_settings_agree_by_the_tolerance(tmp_path: Path) -> None:
 
 
 def test_a_gap_inside_the_chaos_floor_is_no_difference(tmp_path: Path) -> None:
-    from statemachine.sweep import analysis
+    from statemachine.sweep import analysis, analysis_agreement
     from statemachine.sweep.analysis_gaps import gaps_of
     from statemachine.sweep.analysis_runs import ModelFacts
     from statemachine.sweep.folder import design_of, read_manifest
@@ -256,8 +260,8 @@ def test_a_gap_inside_the_chaos_floor_is_no_difference(tmp_path: Path) -> None:
     folder = agreement(tmp_path / "s", seeds=1)
     design = design_of(read_manifest(folder))
     gaps = gaps_of(read_cells(folder), design, SIDES, 1)
-    width = np.full(10, 2.5e-3)
-    found, settings = analysis._agreement(gaps, "tip", width, ModelFacts(), {"tip": 1.5e-3})
+    width, tolerances = np.full(10, 2.5e-3), {"tip": 1.5e-3}
+    found, settings = analysis_agreement.agreement_of(gaps, "tip", width, ModelFacts(), tolerances)
     verdicts = {each.values[0]: each.verdict for each in settings if each.values[1] == 0}
     assert verdicts == {0: "agrees", 1: "agrees", 2: "chaos", 3: "no runs", 4: "differs"}
     chart = analysis.gap_map(gaps, analysis.median(gaps.gap("tip")), width, None)
@@ -387,6 +391,7 @@ def test_pictures_and_page_are_of_the_same_figures(tmp_path: Path) -> None:
     html, plot = tmp_path / "r.html", tmp_path / "r.png"
     arguments = ["sweep", "--report", str(folder), "--no-runs", "--tolerance", "tip=1.5mm"]
     assert main([*arguments, "--html", str(html), "--plot", str(plot)]) == 1
+    assert (chart.across, chart.unit) == ("x", "gap [mm]")
     page_text = html.read_text("utf-8")
     assert page_text.count("data:image/svg+xml;base64,") == 3
     assert "In 2 of 10 settings" in page_text
@@ -400,6 +405,22 @@ def test_one_parameter_is_a_curve(tmp_path: Path) -> None:
     curve = pictures(of(folder))[0]
     assert isinstance(curve, Traces)
     assert curve.curves["median of the seeds"] == ([0, 1, 2, 3, 4], pytest.approx([0, 1, 2, 3, 4]))
+
+
+def test_an_axis_says_what_its_values_are_in() -> None:
+    pytest.importorskip("mujoco")
+    factors = [
+        Vary("timestep", values=(0.001, 0.002)),
+        Vary("damping", values=(0.5, 1.0), times=True),
+        Vary("damping", "elbow_flex", values=(0.5, 1.0)),
+        Vary("qpos", "elbow_flex", "state", values=(0.5, 1.0)),
+        Vary("gain", kind="parameter", values=(0.5, 1.0)),
+    ]
+    units = facts_of({"files": {"so101/scene_box": ""}}, factors, ["mujoco"]).units
+    assert units == {
+        "timestep": "s", "damping": "", "damping[elbow_flex]": "N·m·s/rad",
+        "qpos[elbow_flex]": "rad", "gain": "",
+    }  # fmt: skip
 
 
 def test_what_does_not_go_together_is_said(tmp_path: Path, capsys: Any) -> None:
@@ -431,6 +452,57 @@ def test_a_report_of_ten_thousand_rows_has_no_loop_over_moments(tmp_path: Path) 
     one, two = _read(done, None), runs_of(done.to_pylist())
     for name in one.__dataclass_fields__:
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+
+
+class _Runs:
+    """Runs of the made-up engines at any value, as a CellRunner gives them."""
+
+    def __init__(self, left: TipOf, right: TipOf) -> None:
+        self._of = dict(zip(SIDES, (left, right), strict=True))
+
+    def run(self, backends: Any, settings: Any, **_: Any) -> SweepRuns:
+        return runs_of(
+            [
+                {"status": DONE, "steps": 100, "time": 1.0, "sample_qpos": [[0.0]],
+                 "sample_tip": [self._of[backend](*values, seed)]}
+                for backend, (values, seed) in zip(backends, settings, strict=True)
+            ]
+        )  # fmt: skip
+
+
+def test_where_a_run_contradicts_the_fit_the_best_run_is_the_answer(tmp_path: Path) -> None:
+    """A tip that jumps over what the left one does, as over a contact: 5 mm is the least gap."""
+    vary = grid("gain", 0, 2, 9, kind="parameter")
+
+    def right(gain: float, _seed: int) -> list[float]:
+        return along_x(5e-3 + 20e-3 * (gain - 0.62) if gain >= 0.62 else -20e-3 + 2e-3 * gain)
+
+    folder = made_up(tmp_path / "s", Design((vary,)), nowhere, right)
+    report = of(folder, tolerances={"tip": 0.2e-3}, fit=["gain"])
+    (fit,) = report.together
+    assert fit.fit is not None
+    assert fit.fit.gap < 1e-3  # which no run gives
+    assert fit.best is None
+    runner: Any = _Runs(nowhere, right)
+    gaps = gaps_of(read_cells(folder), Design((vary,)), SIDES, 1)
+    found = brought_together(gaps, vary, "tip", 0.2e-3, varied="both", runner=runner)
+    assert found.measured is not None
+    assert found.measured > 5e-3
+    assert found.best is not None
+    assert found.value == found.best.value == pytest.approx(0.625)
+    assert found.after == min(found.best.tried[1]) == pytest.approx(5.1e-3)
+    assert found.error == found.best.apart == pytest.approx(0.25 / (REFINED - 1))
+    assert found.verdict == "closer"
+    assert found.cells == 2 * (1 + REFINED)
+    said = " ".join(text(page(dataclasses.replace(report, together=(found,)))).split())
+    assert "gain = 0.625 ± 0.031 in both brings mujoco and pybullet closer" in said
+    assert "9 values from 0.5 to 0.75 were run, 0.03125 apart" in said
+    # Where it agrees with the fit nothing more is run.
+    runner = _Runs(nowhere, lambda gain, _: along_x(5e-3 * (gain - 0.61)))
+    folder = made_up(tmp_path / "t", Design((vary,)), *runner._of.values())
+    gaps = gaps_of(read_cells(folder), Design((vary,)), SIDES, 1)
+    found = brought_together(gaps, vary, "tip", 0.2e-3, varied="both", runner=runner)
+    assert (found.best, found.cells) == (None, 2)
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from ..errors import BadInputError
-from ._common import pairs_of, show
+from ._common import PROGRAM, pairs_of, show
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -66,6 +66,9 @@ def run(options: argparse.Namespace) -> int:
         ]
     if len(given) != 2 or len(options.models) > 2:
         hint = "two models, or one and --backends A B"
+        typed = options.models[0].replace(",", " ").split()
+        if len(options.models) == 1 and len(typed) == 2:
+            hint = f"two words: {PROGRAM} compare --models {' '.join(typed)}"
         raise BadInputError(f"--models wants {hint}; got {len(options.models)}")
     digits = 6 if options.digits is None else options.digits
     if not 1 <= digits <= 17:

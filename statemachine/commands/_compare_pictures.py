@@ -80,9 +80,9 @@ def checked(options: argparse.Namespace) -> Pictures:
 
     plot, film = (None if word is None else Path(word) for word in (options.plot, options.film))
     if plot is not None:
-        from ..report import plot as plots
+        from ..report import figures
 
-        plots.check_suffix(plot)
+        figures.check_suffix(plot)
         check_place(plot)
     renderer = None
     if film is not None:

@@ -106,7 +106,7 @@ def check(options: argparse.Namespace) -> None:
 
         check_target(options.html)
     if options.plot is not None:
-        from ..report.plot import check_suffix
+        from ..report.figures import check_suffix
         from ..traces.whole import check_place
 
         check_suffix(options.plot)

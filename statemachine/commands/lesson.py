@@ -158,7 +158,7 @@ def run(options: argparse.Namespace) -> int:
     values = {option.key: getattr(options, option.key) for option in lesson.options}
     reader = _reader(options, lesson)
     if options.plot is not None:
-        from ..report.plot import check_suffix
+        from ..report.figures import check_suffix
 
         check_suffix(Path(options.plot))
     page, results = _compute(options, lesson, options.model, values)

@@ -180,7 +180,9 @@ def _check_names(
             parts = {each.name for each in (*robot.joints, *robot.links, *robot.frames)}
             known = parts | {name for name in model.actuator_names if name}
             if name not in known:
-                raise unknown_name(f"name in {model.path.name}", name, sorted(known))
+                raise unknown_name(
+                    f"joint, body, site or actuator in {model.path.name}", name, sorted(known)
+                )
             if name not in parts:
                 drives.add(a)
     return drives

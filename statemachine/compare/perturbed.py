@@ -203,10 +203,12 @@ def perturbed_run(
     draw = np.random.default_rng([seed, k])
     qpos, qvel = rerun.start()
     qpos = _displaced(rerun.model, qpos, uncertain, np.random.default_rng([seed, k // 2]), k)
+    controller = nudged_controller(rerun.controller(rerun.model), draw)
+    qpos, qvel = nudged_start(rerun.model, qpos, qvel, draw)
     return rerun.record(
-        controller=_nudged_controller(rerun.controller(rerun.model), draw),
-        qpos=nudged_pose(rerun.model, qpos, draw),
-        qvel=_nudged(qvel, draw),
+        controller=controller,
+        qpos=qpos,
+        qvel=qvel,
         derive=derive,
         progress=progress,
     )
@@ -228,13 +230,15 @@ def _displaced(
     return qpos
 
 
-def nudged_pose(model: Model, qpos: Array, draw: np.random.Generator) -> Array:
-    """Positions (nq,) changed by rounding; a quaternion stays one."""
+def nudged_start(
+    model: Model, qpos: Array, qvel: Array, draw: np.random.Generator
+) -> tuple[Array, Array]:
+    """Positions (nq,) and velocities (nv,) changed by rounding; a quaternion stays one."""
     nudged = _nudged(qpos, draw)
     for _, place in model._quaternions:
         nudged[place : place + 4] = qpos[place : place + 4]
         turn(nudged[place : place + 4], ROUNDING * direction(draw))
-    return nudged
+    return nudged, _nudged(qvel, draw)
 
 
 def turn(quat: Array, by: Array) -> None:
@@ -258,7 +262,7 @@ def _nudged(values: Array, draw: np.random.Generator) -> Array:
     return values + ROUNDING * np.maximum(1.0, np.abs(finite)) * draw.uniform(-1, 1, len(values))
 
 
-def _nudged_controller(controller: Controller | None, draw: np.random.Generator) -> Controller:
+def nudged_controller(controller: Controller | None, draw: np.random.Generator) -> Controller:
     """A controller whose commands differ by rounding, and what is commanded without one."""
     began = False
 

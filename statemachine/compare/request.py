@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ..comparison.text import command, listed
-from ..errors import BadInputError, StateMachineError
+from ..errors import BadInputError, StateMachineError, unknown_name
 from ..installed import PAIR
 from ..models import SUFFIXES as MODELS
 from ..scenarios import SCENARIOS, Scenario, scenario
@@ -109,6 +109,7 @@ def split_words(
         StateMachineError: As `parse_sides` does.
     """
     what, rest = tuple(words[:1]), words[1:]
+    _check_rest(what, rest)
     if not what or any(word in SCENARIOS or is_trace(word) for word in rest):
         return tuple(words), ()  # two traces, or nothing that can be compared
     if not (what[0] in SCENARIOS or is_trace(what[0]) or is_function(what[0])):
@@ -127,9 +128,28 @@ def split_words(
     raise BadInputError(f"{said}, as in: {typed} {_another(sides)}")
 
 
+def _check_rest(what: Sequence[str], rest: Sequence[str]) -> None:
+    """Refuse a trace among sides, and an experiment that there is not before them."""
+    sides = [word for word in rest if _is_file(word)]
+    traces = [word for word in rest if is_trace(word)]
+    if sides and traces:
+        raise BadInputError(
+            f"{traces[0]} is a recorded run, not a side; it is played on two sides as in: "
+            f"statemachine compare {traces[0]} {sides[0]} {_another([Side(sides[0])])}"
+        )
+    known = what and (what[0] in SCENARIOS or is_trace(what[0]) or is_function(what[0]))
+    if sides and not known and not _is_file(what[0]) and "@" not in what[0]:
+        raise unknown_name("experiment", what[0], SCENARIOS)
+
+
+def _is_file(word: str) -> bool:
+    """Whether a word names a model's file, by its suffix."""
+    return Path(word.split("@", maxsplit=1)[0]).suffix.lower() in MODELS
+
+
 def _is_side(word: str, menagerie: str | None) -> bool:
     """Whether a word is meant as a side: it names a model, or reads as if it did."""
-    if Path(word.split("@", maxsplit=1)[0]).suffix.lower() in MODELS:
+    if _is_file(word):
         return True
     try:
         return bool(parse_sides([word], menagerie))

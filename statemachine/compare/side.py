@@ -119,9 +119,29 @@ def _side(word: str, menagerie: str | None) -> Side:
             raise unknown_name("engine", engine, backend_names())
         if colon and defaults != "engine":
             raise unknown_name(f"way to load a file on {engine}", defaults, ("engine",))
+    elif not Path(word).exists():
+        _refuse_mistyped(word)
     side = Side(file, engine, "engine" if defaults == "engine" else "model", {}, menagerie)
     side.path  # noqa: B018  (raises for what is no file)
     return side
+
+
+def _refuse_mistyped(word: str) -> None:
+    """Refuse a word of which it is plain what was meant.
+
+    Raises:
+        BadInputError: It reads as FILE@, FILE:ENGINE, FILE,FILE or the name of an option.
+    """
+    parts = word.split(",")
+    if word.endswith("@") and len(word) > 1:
+        raise BadInputError(f"{word} names no engine: type {word}{DEFAULT}, or {word[:-1]}")
+    before, _, after = word.rpartition(":")
+    if before and after in backend_names():
+        raise BadInputError(f"an engine stands behind an @: type {before}@{after}")
+    if len(parts) == 2 and all(parts) and not word.endswith(("/", "\\")):
+        raise BadInputError(f"two sides are two words: type {' '.join(parts)}")
+    if word in OPTIONS:
+        raise BadInputError(f"{word} is an option of a side: type {word}=VALUE")
 
 
 def _option(text: str) -> tuple[str, Any]:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..compare.why import CauseShare, Explanation
-from ..comparison.text import NONE, capital, percent, quantity, short_time, significant
+from ..compare.why import ADDS_UP, CauseShare, Explanation
+from ..comparison.text import NONE, capital, few, percent, quantity, short_time, significant
 from ..page import Block, Items, Page, Section, Table, TableCell, Text, Verdict
 from . import why
 from .why_words import SMALL, THREE, inside, noisy, three
@@ -18,7 +18,8 @@ _MEASURES = {"worst": "at its largest", "end": "in the end", "rms": "as a root m
 _OFF = ("place", "anchor", "com", "axis")
 _METHODS = {
     "nothing": "",
-    "one at a time": "They add up: what each takes away alone it also takes away after all others.",
+    "one at a time": f"They add up, to within {100 * ADDS_UP:g} % of the gap: each takes away as "
+    "much alone as after all others, and explains the mean of the two.",
     "all sets": "They interact. Each share is the mean of what a cause takes away over all orders "
     "in which the causes can be brought to the same (Shapley value), over all sets of them.",
     "drawn orders": "They interact. Each share is the mean of what a cause takes away over {} "
@@ -74,9 +75,10 @@ def _unmatched(result: Explanation) -> list[str]:
         for kind in ("joint", "actuator"):
             names = only.get(kind, ())
             if names:
-                few = ", ".join(names[:6]) + (f" and {len(names) - 6} more" if names[6:] else "")
                 plural = "s" if len(names) > 1 else ""
-                lines.append(f"Only the {side} has the {kind}{plural} {few} (--map LEFT=RIGHT).")
+                # Where the other side has some over, too, they may be the same.
+                hint = " (--map LEFT=RIGHT)" if all(o.get(kind) for o in result.unmatched) else ""
+                lines.append(f"Only the {side} has the {kind}{plural} {few(names, 6)}{hint}.")
     return lines + [f"{capital(note)}." for note in result.notes]
 
 
@@ -123,19 +125,18 @@ def _table(result: Explanation) -> list[Block]:
         title = "What differs" if result.is_rounding else title
         heads = ("what", "left", "right", "explains", "alone", "last")
         words = frozenset({0, 1, 2})
-        blocks.append(Table(heads, rows[:_SHOWN], title, words=words))
-        if rows[_SHOWN:]:
-            more = Table(heads, rows[_SHOWN:], words=words)
-            heading = f"{len(rows) - _SHOWN} more differences, with smaller parts"
+        most = _SHOWN if len(rows) > _SHOWN + 1 else len(rows)  # no table of one row
+        blocks.append(Table(heads, rows[:most], title, words=words))
+        if rows[most:]:
+            heading = f"{len(rows) - most} more differences, with smaller parts"
+            more = Table(heads, rows[most:], heading, words=words)
             blocks.append(Section("", heading, [more], folded=True))
-    method = _METHODS[result.method].format(result.orders)
-    if method and len(able) > 1:
-        blocks.append(
-            Text(
-                f"{method} Alone, last: brought to the same first, or after all others. The right "
-                "is brought to the left: the other way round the parts are those of another motion."
-            )
-        )
+    if result.method != "nothing":
+        method = _METHODS[result.method].format(result.orders)
+        columns = "Alone, last: brought to the same first, or after all others."
+        way = "The right is brought to the left: the other way round the parts are those of another"
+        text = f"{method} {columns} {way} motion." if len(able) > 1 else columns
+        blocks.append(Text(text))
     if refused:
         lines = [f"{capital(each.name)}: {each.note}." for each in refused]
         blocks += [Text("These differ, too, and cannot be brought to the same:"), Items(lines)]
@@ -179,6 +180,12 @@ def _sides(figure: tuple[str, object, object], unit: str) -> tuple[str, str]:
             return "here", f"{quantity(float(np.linalg.norm(a - b)), unit)} off"
         angle = float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
         return "this way", f"{quantity(angle, 'rad')} off"
+    if isinstance(one, tuple) and isinstance(two, tuple) and len(one) == len(two):
+        texts = [" ".join(_number(each, "") for each in value) for value in (one, two)]
+        if max(map(len, texts)) > _WIDE:  # those that differ, which a cut would hide
+            apart = [pair for pair in zip(one, two, strict=True) if pair[0] != pair[1]]
+            cut = () if len(apart) == len(one) else ("…",)
+            one, two = ((*(pair[k] for pair in apart), *cut) for k in (0, 1))
     left, right = _value(one, unit), _value(two, unit)
     if left == right and isinstance(one, float) and isinstance(two, float):
         return f"{one:.12g}", f"{two:.12g}"

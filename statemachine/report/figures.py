@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import importlib
 import io
+import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
-from ..errors import BadInputError, MissingEngineError
+from ..errors import BadInputError
+from ..installed import require_extra
 from ..page import Bars, Block, HeatMap, Pipeline, Slots, Traces
-from ..traces.whole import replace_file
+from ..traces.whole import replace_bytes
 from .log_axis import LogAxis
 
 _COLOURS = ("#1f5fa8", "#c2571a", "#2f8f4e", "#8a4fa0", "#b03a48", "#6b6b6b", "#3aa6a6")
@@ -19,16 +22,71 @@ _INK, _PAPER, _BELOW = "#222222", "#ffffff", "#f0f0f0"  # the last: behind the l
 _WIDE = 30.0  # times the least value: beyond, colours are logarithmic
 _WRITTEN, _LONG = 150, 60  # cells whose figures are written; letters that fit under a map
 _POWERS = 8  # that a log axis names, at most
+_TITLE = 80  # letters of a line of it
 
 
 Drawn = Traces | Slots | Pipeline | HeatMap | Bars
 _DOTS = 150  # a PNG has to an inch
-# The same figures give the same bytes: no date, no version.
-METADATA: dict[str, dict[str, Any]] = {
+SUFFIXES = (".svg", ".png", ".pdf")
+# The same figures give the same bytes: no settings of the user's, no random names, no date, no
+# version.
+SETTINGS: dict[str, Any] = {
+    "svg.fonttype": "none",  # text stays text: small, and found by a search
+    "svg.hashsalt": "statemachine",
+    "pdf.fonttype": 42,
+    "text.parse_math": False,  # a name may have a $ in it
+}
+_METADATA: dict[str, dict[str, Any]] = {
     "svg": {"Date": None},
     "png": {"Software": None},
     "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
 }
+
+
+def check_suffix(path: Path) -> str:
+    """The form of a figure's file, "svg", "png" or "pdf".
+
+    Raises:
+        BadInputError: It is no figure.
+        MissingEngineError: matplotlib is not installed.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        kinds = f"{', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
+        raise BadInputError(f"a figure is a file {kinds}; got {path.name!r}")
+    require_matplotlib()
+    return suffix.lstrip(".")
+
+
+def require_matplotlib() -> Any:
+    """The package matplotlib.
+
+    Raises:
+        MissingEngineError: It is not installed; the message names the extra.
+    """
+    require_extra("matplotlib.figure", "a figure", "matplotlib", "plot")
+    return importlib.import_module("matplotlib")
+
+
+def saved(draw: Callable[[], Any], form: str, settings: dict[str, Any], **how: Any) -> bytes:
+    """What is drawn, as svg, png or pdf; the same gives the same bytes.
+
+    Args:
+        draw: Makes a figure of matplotlib's.
+        form: "svg", "png" or "pdf".
+        settings: Of matplotlib.
+        how: What `savefig` takes.
+
+    Raises:
+        MissingEngineError: matplotlib is not installed.
+    """
+    matplotlib = require_matplotlib()
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(settings)
+        out = io.BytesIO()
+        draw().savefig(out, format=form, metadata=_METADATA[form], **how)
+    return out.getvalue()
 
 
 def svg(picture: Drawn) -> str:
@@ -48,15 +106,13 @@ def write_pictures(blocks: Sequence[Block], path: Path) -> int:
         path: A file .svg, .png or .pdf, written whole or not at all.
 
     Raises:
-        BadInputError: There is no picture among them.
+        BadInputError: There is no picture among them, or another suffix.
         MissingEngineError: matplotlib is not installed.
     """
     pictures = [block for block in blocks if isinstance(block, Drawn)]
     if not pictures:
         raise BadInputError("there is no picture to write")
-    content = drawn(pictures, path.suffix.lower().lstrip("."))
-    replace_file(path, lambda out: out.write(content))
-    return len(content)
+    return replace_bytes(path, drawn(pictures, check_suffix(path)))
 
 
 def drawn(pictures: Sequence[Drawn], form: str) -> bytes:
@@ -65,19 +121,12 @@ def drawn(pictures: Sequence[Drawn], form: str) -> bytes:
     Raises:
         MissingEngineError: matplotlib is not installed.
     """
-    try:
-        import matplotlib
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingEngineError(
-            "pictures need matplotlib: pip install 'statemachine-sim[docs]'", engine="matplotlib"
-        ) from error
     sizes = [_SIZES[type(picture)](picture) for picture in pictures]
     heights = [height for _, height in sizes]
-    # Text as paths would be twice as large; without a salt and a date each run differs.
-    with matplotlib.rc_context(
-        {"svg.fonttype": "none", "svg.hashsalt": "statemachine", "text.parse_math": False}
-    ):
+
+    def draw() -> Any:
+        from matplotlib.figure import Figure
+
         size = max(width for width, _ in sizes), sum(heights)
         figure = Figure(
             figsize=size, facecolor=_PAPER, layout="constrained" if heights[1:] else None
@@ -86,10 +135,11 @@ def drawn(pictures: Sequence[Drawn], form: str) -> bytes:
         for axes, picture in zip(rows, pictures, strict=True):
             cast("Callable[[Any, Any], None]", _DRAW[type(picture)])(axes, picture)
             if heights[1:]:
-                axes.set_title(picture.title, fontsize="medium", loc="left")
-        out = io.BytesIO()
-        figure.savefig(out, format=form, dpi=_DOTS, bbox_inches="tight", metadata=METADATA[form])
-    return out.getvalue()
+                title = textwrap.fill(picture.title, _TITLE)
+                axes.set_title(title, fontsize="medium", loc="left")
+        return figure
+
+    return saved(draw, form, SETTINGS, dpi=_DOTS, bbox_inches="tight")
 
 
 def _traces(axes: Any, picture: Traces) -> None:
@@ -226,7 +276,9 @@ def _heat_map(axes: Any, picture: HeatMap) -> None:
     scale = ScalarMappable(norm, colours.resampled(256))
     bar = axes.figure.colorbar(scale, ax=axes, shrink=0.9, pad=0.02)
     if wide:
-        steps = [m * 10.0**e for e in range(-15, 16) for m in (1, 2, 5)]
+        every = 1 + int(np.log10(high / low)) // _POWERS
+        mantissas = (1, 2, 5) if high < 1e4 * low else (1,)
+        steps = [m * 10.0**e for e in range(-15, 16, every) for m in mantissas]
         bar.set_ticks([step for step in steps if low <= step <= high], minor=False)
         bar.ax.minorticks_off()
     bar.ax.yaxis.set_major_formatter(lambda tick, _place: f"{tick:g}")

@@ -9,7 +9,8 @@ from typing import Any
 
 from ..compare import Comparison, Series, labels_of, series
 from ..comparison.text import reading
-from ..errors import BadInputError, MissingEngineError
+from ..errors import BadInputError
+from ..installed import require_extra
 from ..interface import Model
 from ..rendering import Renderer, Timing, frames, renderer_here, timing_of
 from ..rendering.pictures import check_size
@@ -46,20 +47,9 @@ def check_suffix(path: Path) -> None:
     if suffix not in SUFFIXES:
         hint = "; WebP is smaller and has all colours" if suffix == ".gif" else ""
         raise BadInputError(f"a film is a file {' or '.join(SUFFIXES)}; got {path.name!r}{hint}")
-    try:
-        import PIL.Image  # noqa: F401
-    except ImportError as error:
-        raise MissingEngineError(
-            "films need Pillow: pip install 'statemachine-sim[render]'", engine="pillow"
-        ) from error
+    require_extra("PIL.Image", "a film", "Pillow", "render")
     if suffix == ".mp4":
-        try:
-            import imageio_ffmpeg  # noqa: F401
-        except ImportError as error:
-            raise MissingEngineError(
-                "mp4 needs ffmpeg: pip install 'statemachine-sim[mp4]'; WebP needs nothing more",
-                engine="imageio-ffmpeg",
-            ) from error
+        require_extra("imageio_ffmpeg", "mp4", "ffmpeg", "mp4", "WebP needs nothing more")
 
 
 def write_film(

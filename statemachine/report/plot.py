@@ -2,40 +2,25 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from ..compare import ChaosFloor, Comparison
-from ..errors import BadInputError, MissingEngineError
 from ..traces import Trace
-from ..traces.whole import replace_file
+from ..traces.whole import replace_bytes
 from . import plot_panels
-from .figures import METADATA
+from .figures import SETTINGS, check_suffix, saved
 from .plot_panels import Plot
 
-SUFFIXES = (".svg", ".png", ".pdf")
-# The same figures give the same bytes: no random names, no settings of the user's.
 _SETTINGS = {
-    "svg.fonttype": "none",  # text stays text: small, and found by a search
-    "svg.hashsalt": "statemachine",
-    "pdf.fonttype": 42,
+    **SETTINGS,
     "font.family": ["DejaVu Sans", "sans-serif"],
     "font.size": 6.5,
     "axes.linewidth": 0.5,
-    "text.parse_math": False,  # a name may have a $ in it
     "axes.unicode_minus": True,
     "path.simplify": True,
 }
 _DOTS = 300  # a PNG has to an inch
-
-
-def check_suffix(path: Path) -> None:
-    """Raise BadInputError for a file that is no figure, MissingEngineError without the extra."""
-    if path.suffix.lower() not in SUFFIXES:
-        kinds = f"{', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
-        raise BadInputError(f"a figure is a file {kinds}; got {path.name!r}")
-    _matplotlib()
 
 
 def plot(
@@ -68,15 +53,13 @@ def drawn(figure: Plot, form: str) -> bytes:
     Raises:
         MissingEngineError: matplotlib is not installed.
     """
-    matplotlib = _matplotlib()
-    from .plot_draw import draw
 
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_SETTINGS)
-        out = io.BytesIO()
-        draw(figure).savefig(out, format=form, dpi=_DOTS, metadata=METADATA[form])
-    return out.getvalue()
+    def draw() -> Any:
+        from .plot_draw import draw
+
+        return draw(figure)
+
+    return saved(draw, form, _SETTINGS, dpi=_DOTS)
 
 
 def write_plot(figure: Plot, path: Path) -> int:
@@ -86,22 +69,4 @@ def write_plot(figure: Plot, path: Path) -> int:
         BadInputError: Another suffix.
         MissingEngineError: matplotlib is not installed.
     """
-    check_suffix(path)
-    content = drawn(figure, path.suffix.lower().lstrip("."))
-
-    def fill(out: BinaryIO) -> None:
-        out.write(content)
-
-    replace_file(path, fill)
-    return len(content)
-
-
-def _matplotlib() -> Any:
-    try:
-        import matplotlib
-        import matplotlib.figure
-    except ImportError as error:
-        raise MissingEngineError(
-            "figures need matplotlib: pip install 'statemachine-sim[plot]'", engine="matplotlib"
-        ) from error
-    return matplotlib
+    return replace_bytes(path, drawn(figure, check_suffix(path)))

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..backends import load
 from ..drawing.camera import Camera, framed
-from ..errors import MissingEngineError
+from ..installed import require_extra
 from ..interface import Array
 from ..page import RobotPicture
 from ..rendering import Motion, camera_for, drawn, motion_through, renderer_here
@@ -28,13 +28,7 @@ def webp(picture: RobotPicture) -> bytes:
     Raises:
         MissingEngineError: Nothing here can draw, or Pillow is not installed.
     """
-    try:
-        from PIL import Image
-    except ImportError as error:
-        raise MissingEngineError(
-            "pictures of a robot need Pillow: pip install 'statemachine-sim[render]'",
-            engine="pillow",
-        ) from error
+    image_of = require_extra("PIL.Image", "the picture of a robot", "Pillow", "render")
     renderer = renderer_here()
     model = load(picture.model)
     motions = [motion_through(model, qpos) for qpos in picture.poses() if qpos is not None]
@@ -44,7 +38,7 @@ def webp(picture: RobotPicture) -> bytes:
 
     def images() -> Iterator[Any]:
         for pixels in drawn(motions, _SIZE, camera, renderer):
-            yield Image.fromarray(pixels)
+            yield image_of.fromarray(pixels)
 
     milliseconds = [round(1000 * picture.interval)] * len(motions[0].xpos)
     milliseconds[-1] = _LAST

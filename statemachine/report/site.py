@@ -18,7 +18,7 @@ from ..lessons.pictures import with_picture
 from ..lessons.session import page_of_lesson, take
 from ..page import Page, Picture, RobotPicture, Traces, Verdict
 from ..scenarios import scenario
-from ..traces.whole import replace_file
+from ..traces.whole import replace_bytes
 from . import compare as comparison
 from . import conventions, why
 from .cheat_sheet import cheat_sheet
@@ -165,4 +165,4 @@ def _save(path: Path, content: bytes) -> None:
     """Write beside, then rename: a page is never half there."""
     if path.exists() and path.read_bytes() == content:
         return
-    replace_file(path, lambda out: out.write(content))
+    replace_bytes(path, content)

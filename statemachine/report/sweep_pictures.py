@@ -34,12 +34,12 @@ def map_picture(found: SweepReport) -> HeatMap | Traces | None:
         title += "; hatched: inside the chaos floor"
     return HeatMap(
         title,
-        chart.across,
-        chart.up,
-        [value_word(value) for value in chart.columns],
-        [value_word(value) for value in chart.rows] or [""],
+        axis(found, chart.across),
+        axis(found, chart.up),
+        [setting_word(found, chart.across, value) for value in chart.columns],
+        [setting_word(found, chart.up, value) for value in chart.rows] or [""],
         [[None if v is None else v * scale for v in row] for row in chart.gap],
-        unit.strip(),
+        f"gap [{unit.strip()}]",
         chart.inside,
         framed,
     )
@@ -71,7 +71,9 @@ def _curve(found: SweepReport, chart: GapMap, title: str) -> Traces:
         x = [v for v, _ in pairs]
         curves["median"] = (x, [g for _, g in pairs])
     curves["tolerance"] = ([x[0], x[-1]], [main.tolerance * scale] * 2)
-    return Traces(title, chart.across, f"gap [{reading(main.unit)[1].strip()}]", curves)
+    return Traces(
+        title, axis(found, chart.across), f"gap [{reading(main.unit)[1].strip()}]", curves
+    )
 
 
 def bars(found: SweepReport) -> Bars | None:
@@ -99,19 +101,34 @@ def fit_curve(found: SweepReport, each: BroughtTogether) -> Traces | None:
         "predicted": (x, [value * scale for value in y]),
         "tolerance": ([x[0], x[-1]], [found.quantity.tolerance * scale] * 2),
     }
-    value = each.fit.value
-    if each.measured is not None:
-        width = 0.01 * (x[-1] - x[0])
+    if each.best is not None:
+        pairs = sorted(zip(*each.best.tried, strict=True))
+        curves["run"] = ([v for v, _ in pairs], [gap * scale for _, gap in pairs])
+    elif each.measured is not None:
+        value, width = each.fit.value, 0.01 * (x[-1] - x[0])
         curves["run there"] = ([value - width, value + width], [each.measured * scale] * 2)
-    across = each.label + (" [times the model's own]" if each.times else "")
     side = found.sides[1] if each.varied == "right" else "both"
-    return Traces(f"The gap over {each.label} in {side}", across, f"gap [{unit.strip()}]", curves)
+    return Traces(
+        f"The gap over {each.label} in {side}",
+        axis(found, each.label),
+        f"gap [{unit.strip()}]",
+        curves,
+    )
 
 
-def value_word(value: object) -> str:
+def axis(found: SweepReport, label: str) -> str:
+    """A parameter with what its values are in."""
+    if label in found.scaled:
+        return f"{label} [times the model's own]"
+    return f"{label} [{unit}]" if (unit := found.units.get(label)) else label
+
+
+def setting_word(found: SweepReport, label: str, value: object) -> str:
+    """A value of a parameter: "0.5x", "on", "euler"."""
     if isinstance(value, bool):
         return "on" if value else "off"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    times = "x" if label in found.scaled else ""
+    return f"{value:.4g}{times}" if isinstance(value, float) else str(value)
 
 
 def size_word(value: float, unit: str) -> str:

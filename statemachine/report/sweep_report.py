@@ -13,14 +13,14 @@ from ..comparison.text import (
     rough,
 )
 from ..page import Block, Headline, Page, Section, Table, TableCell, Text
-from ..sweep.analysis import VERDICTS, SettingGap, SweepReport
+from ..sweep.analysis import SweepReport
+from ..sweep.analysis_agreement import VERDICTS, SettingGap
 from ..sweep.analysis_map import GapMap
-from ..sweep.analysis_together import BroughtTogether
-from .sweep_pictures import bars, fit_curve, map_picture, size_word, value_word
+from .sweep_fit import line, together
+from .sweep_pictures import axis, bars, map_picture, setting_word, size_word
 
 _SHOWN = 5  # settings of the largest gaps
 _COLUMNS = 7  # of a map that 80 characters have room for
-_NEAR = 0.5  # of the measured gap: a prediction that is farther off is called so
 _SAYS = {
     "agrees": "agree at every seed",
     "some seeds": "agree at some seeds",
@@ -30,10 +30,15 @@ _SAYS = {
 }
 _METHODS = {
     "sobol": "Sobol indices by Saltelli's design and estimators",
-    "factorial": "a full factorial, its variance taken apart (ANOVA): first-order and total "
-    "shares mean what Sobol indices mean, over the values of the design",
+    "factorial": "Computed from a full factorial, which has every combination of the values "
+    "(ANOVA, the analysis of variance): the shares mean what Sobol indices mean, over these "
+    "values",
     "rank": "squares of Spearman's rank correlation",
 }
+_SHARES = (
+    "First order: the share of the gap's variance that a parameter explains alone. Total: with "
+    "what it does together with others. Where the total is near 0 the parameter does not matter."
+)
 
 
 def page(found: SweepReport, command: str = "") -> Page:
@@ -48,7 +53,7 @@ def page(found: SweepReport, command: str = "") -> Page:
     blocks.append(Section("where", "Where they agree", _where(found)))
     if found.parameters:
         blocks.append(Section("sensitive", "What the gap is sensitive to", _sensitive(found)))
-        blocks.append(Section("together", "What brings them together", _together(found)))
+        blocks.append(Section("together", "What brings them together", together(found)))
     versions = ", ".join(f"{name} {version}" for name, version in found.versions.items())
     origin = f"{versions}; {found.folder}" + (f"; {command}" if command else "")
     title = f"Sweep of {found.what}: {found.sides[0]} and {found.sides[1]}"
@@ -71,7 +76,7 @@ def _headline(found: SweepReport) -> Headline:
         how = "goes most with" if shares.method == "rank" else "is most sensitive to"
         share = "" if shares.method == "rank" else f" (total {_index(top.total)})"
         causes.append(f"The gap {how} {top.label}{share}.")
-    causes += [_line(found, each) for each in found.together if each.fit is not None]
+    causes += [line(found, each) for each in found.together if each.fit is not None]
     agree = found.agreed == len(found.settings)
     return Headline(lead, tuple(causes), holds=agree)
 
@@ -121,9 +126,9 @@ def _floor(found: SweepReport) -> str:
         "one)"
     )  # fmt: skip
     return (
-        f"The chaos floor: {floor.backend} ran again from starts that differ by "
-        f"{floor.rounding:g}, at {where}: {count(floor.cells, 'cell')}, "
-        f"{floor.seconds:.2g} s. The largest gap that this makes is "
+        f"The chaos floor is what rounding alone makes of a run: {floor.backend} ran again, its "
+        f"starts and commands changed by {floor.rounding:g}, at {where}: "
+        f"{count(floor.cells, 'cell')}, {floor.seconds:.2g} s. The largest gap that this makes is "
         f"{rough(max(widths), main.unit)}. "
         + (
             f"In {count(inside, 'setting')} the gap between the engines is inside it: nothing can "
@@ -184,21 +189,25 @@ def _map_table(found: SweepReport, chart: GapMap) -> Table:
         mark = "~" if chart.inside[r][c] else "=" if value <= tolerance else ""
         return f"{mark}{rough(value * scale)}"
 
-    places = [value_word(value) for value in chart.columns]
+    places = [setting_word(found, chart.across, value) for value in chart.columns]
     rows = [
         (
-            value_word(chart.rows[r]) if chart.up else "gap",
+            setting_word(found, chart.up, chart.rows[r]) if chart.up else "gap",
             *(cell(r, c) for c in range(len(places))),
         )
         for r in reversed(range(len(chart.gap)))
     ]
     kept = {round(k * (len(places) - 1) / (_COLUMNS - 1)) for k in range(_COLUMNS)}
     wide = {k + 1 for k in range(len(places)) if len(places) > _COLUMNS and k not in kept}
-    down = f"{chart.up} down, " if chart.up else ""
+
+    def name_of(label: str) -> str:  # an x behind each value says the rest
+        return label if label in found.scaled else axis(found, label)
+
+    down = f"{name_of(chart.up)} down, " if chart.up else ""
     return Table(
         (f"{chart.up or chart.across}", *places),
         rows,
-        f"The gap of the {found.quantity.says},{name}: {down}{chart.across} across",
+        f"The gap of the {found.quantity.says},{name}: {down}{name_of(chart.across)} across",
         wide=frozenset(wide),
     )
 
@@ -223,7 +232,8 @@ def _largest(found: SweepReport) -> Table:
 
 def _setting(found: SweepReport, setting: SettingGap) -> str:
     pairs = zip(found.parameters, setting.values, strict=True)
-    return few([f"{name} {value_word(value)}" for name, value in pairs], 4) or "as it is"
+    words = [f"{name} {setting_word(found, name, value)}" for name, value in pairs]
+    return few(words, 4) or "as it is"
 
 
 def _sensitive(found: SweepReport) -> list[Block]:
@@ -258,113 +268,11 @@ def _sensitive(found: SweepReport) -> list[Block]:
     if not (rank or shares.error):
         error = " They have no error here: it takes three seeds."
     where = "samples in each block" if shares.method == "sobol" else "settings"
-    text = f"{capital(_METHODS[shares.method])}; {shares.samples} {where}.{error}"
+    says = "" if rank else f"{_SHARES} "
+    text = f"{says}{capital(_METHODS[shares.method])}; {shares.samples} {where}.{error}"
     blocks: list[Block] = [table, Text(" ".join([text, *shares.notes]), small=True)]
     picture = bars(found)
     return [*blocks, picture] if picture else blocks
-
-
-def _together(found: SweepReport) -> list[Block]:
-    if not found.together and found.only_rounding:
-        return [Text("Nothing is to be brought together: every gap is inside the chaos floor.")]
-    if not found.together:
-        return [Text("No parameter has three numbers or a range: nothing is fitted.")]
-    blocks: list[Block] = []
-    for each in found.together:
-        blocks.append(Text(_line(found, each)))
-        if each.fit is not None:
-            blocks.append(Text(_how(found, each), small=True))
-        picture = fit_curve(found, each)
-        if picture is not None:
-            blocks.append(picture)
-    return blocks
-
-
-def _line(found: SweepReport, each: BroughtTogether) -> str:
-    """What a fit says, in a sentence."""
-    unit, fit = found.quantity.unit, each.fit
-    what = found.quantity.says
-    if fit is None:
-        return f"{each.label} is not fitted: {each.why_not}."
-    gap = fit.gap if each.measured is None else each.measured
-    before = f"{quantity(each.before, unit)} → " if each.before is not None else ""
-    sizes = f"{what} {before}{quantity(gap, unit)}"
-    value = _fitted(each)
-    if each.verdict == "none" and _is_own(each):
-        return f"The model's own {each.label} is the best already: at {value}, {sizes}."
-    if each.verdict == "none":
-        own = "than the model's own" if each.own is not None else "than any other"
-        return f"No value of {each.label} is better {own}: at the best, {value}, {sizes}."
-    where = f"in {found.sides[1]}" if each.varied == "right" else "in both"
-    pair = listed(list(found.sides))
-    if each.verdict == "edge":
-        return (
-            f"{each.label} {where}: the gap is least at the edge of the range, {value} ({sizes}): "
-            "look beyond it."
-        )
-    brings = "together" if each.verdict == "together" else "closer, not together"
-    return f"{each.label} = {value} {where} brings {pair} {brings}: {sizes}."
-
-
-def _is_own(each: BroughtTogether) -> bool:
-    """Whether the value is the model's own, as far as its error tells."""
-    fit = each.fit
-    if fit is None or each.own is None:
-        return False
-    wide = fit.bounds[1] - fit.bounds[0]
-    return abs(fit.value - each.own) <= max(2 * (fit.error or 0.0), 0.02 * wide)
-
-
-def _how(found: SweepReport, each: BroughtTogether) -> str:
-    """How a fit was made, and what a run says of it."""
-    unit, fit = found.quantity.unit, each.fit
-    left, right = found.sides
-    if each.varied == "right":
-        own = f" ({_times(each, each.own)})" if each.own is not None else ""
-        said = [f"{left} keeps the model's own {each.label}{own}, {right} has the values."]
-    else:
-        said = [f"Both sides have the same {each.label}."]
-    assert fit is not None
-    error = "" if fit.error is None else f"; ± is its standard error, from {fit.of}"
-    said.append(
-        f"Least gap between {_times(each, fit.bounds[0])} and {_times(each, fit.bounds[1])}, "
-        f"in the mean of {count(fit.curves, 'curve')} over settings and seeds{error}."
-    )
-    if (fine := fit.within(found.quantity.tolerance)) is not None:
-        said.append(
-            f"The predicted gap is within tolerance between {_times(each, fine[0])} and "
-            f"{_times(each, fine[1])}."
-        )
-    if each.measured is None:
-        said.append(f"It is not checked by a run: {each.why_not}.")
-    else:
-        said.append(
-            f"Run there, {count(each.pairs, 'pair')}: {quantity(each.measured, unit)}; predicted "
-            f"{quantity(each.predicted, unit)}."
-        )
-        near = max(_NEAR * each.measured, found.quantity.tolerance)
-        if each.predicted is not None and abs(each.predicted - each.measured) > near:
-            said.append(
-                "That is far off: between its values the design is too coarse for this gap."
-            )
-    return " ".join(said)
-
-
-def _fitted(each: BroughtTogether) -> str:
-    """The value with its error, to the digits that the error leaves."""
-    fit = each.fit
-    assert fit is not None
-    times = "x" if each.times else ""
-    if fit.error is None or not fit.error > 0:
-        return f"{fit.value:.3g}{times}"
-    wide = fit.bounds[1] - fit.bounds[0]
-    error = max(fit.error, 1e-4 * wide)  # the interpolation knows no more
-    digits = max(0, -int(f"{error:e}".partition("e")[2]) + 1)
-    return f"{fit.value:.{digits}f}{times} ± {error:.{digits}f}{times}"
-
-
-def _times(each: BroughtTogether, value: float) -> str:
-    return f"{value:.4g}{'x' if each.times else ''}"
 
 
 def _index(value: float) -> str:

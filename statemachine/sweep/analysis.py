@@ -8,83 +8,29 @@ print(found.agreed, "of", len(found.settings), "settings agree")
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
-from ..compare.tolerances import COUNT
 from ..comparison.text import listed
 from ..errors import BadInputError, unknown_name
 from ..interface import Array
 from ..scenarios.runs import Progress, part_of, silent
+from .analysis_agreement import QuantityAgreement, SettingGap, agreement_of, only_rounding
 from .analysis_floor import SweepFloor, floor_of
-from .analysis_gaps import QUANTITIES, SweepGaps, gaps_of, median, worst
+from .analysis_gaps import SweepGaps, gaps_of, median
 from .analysis_indices import Sensitivity, sensitivity
 from .analysis_map import GapMap, gap_map
 from .analysis_runs import CellRunner, ModelFacts, facts_of, runner_of
 from .analysis_together import BroughtTogether, Varied, brought_together
 from .design import Design
-from .factors import Value, Vary
+from .factors import Vary
 from .folder import design_of, read_manifest
 from .rows import read_cells
 
-SettingVerdict = Literal["agrees", "some seeds", "chaos", "differs", "no runs"]
-VERDICTS: tuple[SettingVerdict, ...] = ("agrees", "some seeds", "chaos", "differs", "no runs")
 FLOOR_CELLS = 64
-
-
-@dataclass(frozen=True)
-class SettingGap:
-    """One setting of a sweep.
-
-    Attributes:
-        values: Of the parameters.
-        median: The gap over the seeds [SI]; None without a run on both sides.
-        worst: The largest of the seeds.
-        floor: Its chaos floor; None where that is not known.
-        verdict: "agrees": within tolerance at every seed; "some seeds": at some of them; "chaos":
-            beyond, but inside the chaos floor; "differs"; "no runs".
-    """
-
-    values: tuple[Value, ...]
-    median: float | None
-    worst: float | None
-    floor: float | None
-    verdict: SettingVerdict
-
-    @property
-    def inside_floor(self) -> bool:
-        """Whether there is a gap, and it is inside the chaos floor."""
-        return self.median is not None and self.floor is not None and self.median <= self.floor
-
-
-@dataclass(frozen=True)
-class QuantityAgreement:
-    """The gap of one quantity over all settings.
-
-    Attributes:
-        name: Of the quantity; says: in words; unit: SI.
-        says: See name.
-        unit: See name.
-        tolerance: The gap that does not matter; reason: why that much.
-        reason: See tolerance.
-        counts: How many settings have each verdict.
-        median: Of all settings' medians [SI].
-        worst: The largest of any seed at any setting.
-    """
-
-    name: str
-    says: str
-    unit: str
-    tolerance: float
-    reason: str
-    counts: Mapping[str, int]
-    median: float
-    worst: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +42,9 @@ class SweepReport:
         folder: See what.
         sides: The engines; versions: of what the dataset was made with.
         versions: See sides.
-        parameters: What was varied, in the order of a setting's values.
+        parameters: What was varied, in the order of a setting's values; units: of each of them
+            that has one.
+        units: See parameters.
         seeds: How many starts each setting has.
         quantity: The one that the settings, the map, the indices and the fit are of.
         quantities: Each that the dataset has.
@@ -116,6 +64,7 @@ class SweepReport:
     sides: tuple[str, str]
     versions: Mapping[str, str]
     parameters: tuple[str, ...]
+    units: Mapping[str, str]
     seeds: int
     quantity: QuantityAgreement
     quantities: tuple[QuantityAgreement, ...]
@@ -136,9 +85,14 @@ class SweepReport:
         return self.quantity.counts.get("agrees", 0)
 
     @property
+    def scaled(self) -> frozenset[str]:
+        """The parameters whose values are times the model's own."""
+        return frozenset(vary.label for vary in self.design.factors if vary.times)
+
+    @property
     def only_rounding(self) -> bool:
         """Whether every gap is inside the chaos floor, so that nothing has a cause to look for."""
-        return _only_rounding(self.settings)
+        return only_rounding(self.settings)
 
 
 def sweep_report(
@@ -199,12 +153,12 @@ def sweep_report(
         no_floor = "" if floor else "no cell was to be run for it"
     widths = {} if floor is None else floor.width
     found = {
-        name: _agreement(gaps, name, widths.get(name), facts, tolerances)
+        name: agreement_of(gaps, name, widths.get(name), facts, tolerances)
         for name in gaps.quantities
     }
     agreement, settings = found[main]
     figures = gaps.gap(main)
-    rounding = _only_rounding(settings)
+    rounding = only_rounding(settings)
     shares = None if rounding else sensitivity(design, gaps.points, figures)
     together = () if rounding and not fit else _together(
         gaps, shares, agreement, widths.get(main), facts, fit, varied,
@@ -216,6 +170,7 @@ def sweep_report(
         sides=sides,
         versions={name: manifest["versions"].get(name, "") for name in ("statemachine", *sides)},
         parameters=tuple(labels),
+        units={label: unit for label, unit in facts.units.items() if unit},
         seeds=seeds,
         quantity=agreement,
         quantities=tuple(each for each, _ in found.values()),
@@ -230,11 +185,6 @@ def sweep_report(
         ran=(floor.cells if floor else 0) + sum(each.cells for each in together),
         design=design,
     )
-
-
-def _only_rounding(settings: Sequence[SettingGap]) -> bool:
-    known = [each for each in settings if each.median is not None]
-    return bool(known) and all(each.inside_floor for each in known)
 
 
 def _sides(there: Sequence[str], asked: Sequence[str]) -> tuple[str, str]:
@@ -255,66 +205,6 @@ def _sides(there: Sequence[str], asked: Sequence[str]) -> tuple[str, str]:
             )
         )
     return chosen[0], chosen[1]
-
-
-def _agreement(
-    gaps: SweepGaps,
-    name: str,
-    width: Array | None,
-    facts: ModelFacts,
-    given: Mapping[str, float] | None,
-) -> tuple[QuantityAgreement, tuple[SettingGap, ...]]:
-    """The gap of a quantity at every setting, and how many agree."""
-    quantity = QUANTITIES[name]
-    gap = gaps.gap(name)
-    tolerance, reason = _tolerance(gaps, name, facts, given)
-    within = np.where(np.isnan(gap), np.nan, gap <= tolerance[:, None])
-    centre, most = median(gap), worst(gap)
-    settings = []
-    for k, point in enumerate(gaps.points):
-        known = within[k][~np.isnan(within[k])]
-        floor = None if width is None else float(width[k])
-        verdict: SettingVerdict
-        if not len(known):
-            verdict = "no runs"
-        elif known.all():
-            verdict = "agrees"
-        elif floor is not None and centre[k] <= floor:
-            verdict = "chaos"
-        else:
-            verdict = "some seeds" if known.any() else "differs"
-        pair = (float(centre[k]), float(most[k])) if len(known) else (None, None)
-        settings.append(SettingGap(point.values, *pair, floor, verdict))
-    counts = Counter(each.verdict for each in settings)
-    return (
-        QuantityAgreement(
-            name, quantity.says, quantity.unit, float(np.nanmax(tolerance)), reason,
-            {verdict: counts[verdict] for verdict in VERDICTS if counts[verdict]},
-            float(median(centre)), float(worst(most)),
-        ),
-        tuple(settings),
-    )  # fmt: skip
-
-
-def _tolerance(
-    gaps: SweepGaps, name: str, facts: ModelFacts, given: Mapping[str, float] | None
-) -> tuple[Array, str]:
-    """(p) at each setting, and why that much: those of `compare.tolerances`."""
-    kind, points = QUANTITIES[name].kind, len(gaps.points)
-    if given and kind in given:
-        return np.full(points, given[kind]), "as given"
-    count = "one count of a 12-bit encoder, 1/4096 turn"
-    if kind == "joint":
-        return np.full(points, COUNT), count
-    if kind == "tip":
-        reach = np.linalg.norm(
-            np.concatenate([gaps.left.tip, gaps.right.tip]) - facts.foot, axis=-1
-        )
-        far = float(np.nanmax(reach))
-        return np.full(points, COUNT * far), f"what {count}, moves it, {far:.2f} m from the foot"
-    steps = np.concatenate([gaps.left.timestep, gaps.right.timestep], axis=1)
-    longest = worst(steps) * (1 + 1e-9)
-    return longest, "one timestep: an engine looks at contacts once in a step"
 
 
 def _together(

@@ -67,11 +67,11 @@ class FittedValue:
             good: The gap that is as good as none.
         """
         before = max(self.scan[1]) if before is None else before
-        if gap > good and gap > _LESS * before:
+        if gap <= good:
+            return "together"
+        if gap > _LESS * before:
             return "none"
-        if self.edge:
-            return "edge"
-        return "together" if gap <= good else "closer"
+        return "edge" if self.edge else "closer"
 
 
 def fit_curves(

@@ -1,4 +1,4 @@
-"""The chaos floor of a sweep: what a change of the start by rounding makes of each setting."""
+"""The chaos floor of a sweep: what a change of start and commands by rounding makes of each."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class SweepFloor:
         settings: At how many settings; the others have that of the one nearest to them.
         cells: How many runs it is made of.
         seconds: What they took.
-        rounding: What starts were changed by, relative.
+        rounding: What starts and commands were changed by, relative.
         width: (p) of each quantity [SI]; infinite where a perturbed run failed.
     """
 
@@ -42,7 +42,7 @@ class SweepFloor:
 def floor_of(
     gaps: SweepGaps, runner: CellRunner, most: int, progress: Progress = silent
 ) -> SweepFloor | None:
-    """The chaos floor, from cells of the left side with perturbed starts.
+    """The chaos floor, from cells of the left side, perturbed as `compare` does it.
 
     Args:
         gaps: Of the sweep.

@@ -26,6 +26,23 @@ from .settings import options_at
 Setting = tuple[tuple[Value, ...], int]  # values of the factors, and a seed
 
 
+# What an option or a start is in, of a hinge and of a slide.
+_UNITS = {
+    "timestep": ("s", "s"),
+    "latency": ("s", "s"),
+    "gravity": ("m/s²", "m/s²"),
+    "mass": ("kg", "kg"),
+    "qpos": ("rad", "m"),
+    "qvel": ("rad/s", "m/s"),
+    "max_qvel": ("rad/s", "m/s"),
+    "armature": ("kg·m²", "kg"),
+    "damping": ("N·m·s/rad", "N·s/m"),
+    "frictionloss": ("N·m", "N"),
+    "kp": ("N·m/rad", "N/m"),
+    "kv": ("N·m·s/rad", "N·s/m"),
+}
+
+
 @dataclass(frozen=True)
 class CellRunner:
     """Runs cells of a sweep that its dataset has not.
@@ -54,7 +71,7 @@ class CellRunner:
         Args:
             backends: The engine of each.
             settings: Values and seed of each.
-            nudges: For each what a change of its start by rounding is drawn from.
+            nudges: For each what a change of its start and commands by rounding is drawn from.
             own: A factor that is as the model has it, whatever the settings say.
             progress: Told the fraction that is done.
         """
@@ -140,11 +157,13 @@ class ModelFacts:
         foot: (3,) where the first jointed body has its origin [m].
         own: Value of each option that is varied, as the model has it; None where its parts have
             several.
+        units: What each factor is in; "" where it has no unit, or joints of several.
     """
 
     hinges: tuple[int, ...] | None = None
     foot: tuple[float, ...] = (0.0, 0.0, 0.0)
     own: Mapping[str, float | None] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 def facts_of(
@@ -165,7 +184,10 @@ def facts_of(
         kinds = zip(model.jnt_type.tolist(), model.jnt_qposadr.tolist(), strict=True)
         hinges = tuple(place for kind, place in kinds if kind == JointType.HINGE)
         return ModelFacts(
-            hinges or None, _foot(model), {v.label: own_value(v, model) for v in factors}
+            hinges or None,
+            _foot(model),
+            {v.label: own_value(v, model) for v in factors},
+            {v.label: _unit(v, model) for v in factors},
         )
     return ModelFacts()
 
@@ -175,6 +197,19 @@ def _foot(model: Model) -> tuple[float, ...]:
         reset(model, data)
         forward(model, data)
         return tuple(data.xpos[min(1, model.nbody - 1)].tolist())
+
+
+def _unit(vary: Vary, model: Model) -> str:
+    """What the numbers of a factor are in."""
+    if vary.times or vary.kind == "parameter":
+        return ""
+    hinge, slide = _UNITS.get(vary.name, ("", ""))
+    kinds = set(model.jnt_type.tolist())
+    if vary.place in model.joint_names:
+        kinds = {int(model.jnt_type[model.joint_id(vary.place)])}
+    if hinge == slide or kinds == {JointType.HINGE}:
+        return hinge
+    return slide if kinds == {JointType.SLIDE} else ""
 
 
 def own_value(vary: Vary, model: Model) -> float | None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 
-from ..interface import Array
+from ..interface import Array, Ints
 from ..scenarios.runs import Progress, silent
 from .analysis_fit import FittedValue, Verdict, fit_curves, fit_scatter
 from .analysis_gaps import SweepGaps, SweepRuns, alike, gap_between, joined, median
@@ -17,7 +17,26 @@ from .factors import Vary
 
 Varied = Literal["right", "both"]
 MOST_REFERENCES = 24  # runs of the left side at the model's own value
-CHECKED = 4  # pairs of runs at the value that was found
+CHECKED = 4  # pairs of runs at a value
+REFINED = 9  # values that are run where a check contradicts the fit
+_NEAR = 0.5  # of the measured gap: a prediction that is farther off is contradicted
+
+
+@dataclass(frozen=True)
+class BestRun:
+    """The least gap of runs near a value that a fit got wrong.
+
+    Attributes:
+        value: Of the parameter.
+        gap: There, the mean of its pairs [SI].
+        apart: How far apart the values are that were run: so far is the best one known.
+        tried: (n,) these values, and (n,) the gap of each; NaN where a run failed.
+    """
+
+    value: float
+    gap: float
+    apart: float
+    tried: tuple[tuple[float, ...], tuple[float, ...]]
 
 
 @dataclass(frozen=True)
@@ -35,6 +54,8 @@ class BroughtTogether:
         measured: The gap of runs at that value; None where none was run.
         predicted: What the fit says of the same runs.
         pairs: How many pairs of runs.
+        best: The best of further runs near that value, where `measured` contradicts `predicted`;
+            else None.
         verdict: "together": within tolerance or the chaos floor; "closer"; "edge": least at the
             end of the range; "none": no value is better than the model's own; "" without a fit.
         why_not: Why there is no fit, or no measurement.
@@ -53,6 +74,28 @@ class BroughtTogether:
     verdict: Verdict | Literal[""] = ""
     why_not: str = ""
     cells: int = field(default=0)
+    best: BestRun | None = None
+
+    @property
+    def value(self) -> float | None:
+        """The value that is the best known: of runs, else of the fit."""
+        if self.best is not None:
+            return self.best.value
+        return None if self.fit is None else self.fit.value
+
+    @property
+    def error(self) -> float | None:
+        """How far it is known: the distance of the runs, else the standard error of the fit."""
+        if self.best is not None:
+            return self.best.apart
+        return None if self.fit is None else self.fit.error
+
+    @property
+    def after(self) -> float | None:
+        """The gap there: of runs, else as predicted [SI]."""
+        if self.best is not None:
+            return self.best.gap
+        return self.fit.gap if self.measured is None and self.fit else self.measured
 
 
 def brought_together(
@@ -85,13 +128,20 @@ def brought_together(
     if fit is None:
         return case.told(case.why_not or "it needs three values of the parameter with runs")
     measured = case.check(fit) if runner is not None else None
+    best, gap, there = None, fit.gap, fit
+    if measured is not None:
+        gap = measured[0]
+        if abs(measured[1] - gap) > max(_NEAR * gap, good):
+            best = case.refined(fit, gap)
+            gap = best.gap
+            there = replace(fit, edge=best.value in fit.bounds)
     before = case.before if case.before is not None else case.own_gap()
     return BroughtTogether(
         vary.label, vary.times, varied, own, before, fit,
         *(measured or (None, None, 0)),
-        fit.verdict(measured[0] if measured else fit.gap, before, good),
+        there.verdict(gap, before, good),
         "" if measured else "nothing was run at that value",
-        case.cells,
+        case.cells, best,
     )  # fmt: skip
 
 
@@ -217,7 +267,7 @@ class _Case:
                     [backend for backend, _ in batch],
                     [setting for _, setting in batch],
                     own=self.vary if without else None,
-                    progress=lambda f, k=k: self.progress(start + (f + k) / 4),
+                    progress=lambda f, k=k: self.progress(min(1.0, start + (f + k) / 4)),
                 )
         self.cells += len(order)
         rows = [k + (len(told) if without else 0) for without, k in order]
@@ -226,10 +276,7 @@ class _Case:
     def check(self, fit: FittedValue) -> tuple[float, float, int] | None:
         """Run both sides at the value: the gap, what the fit says, and of how many pairs."""
         assert self.runner is not None
-        known = (
-            np.flatnonzero(np.isfinite(fit.each)) if len(fit.each) else np.arange(len(self.kept))
-        )
-        picked = known[evenly(len(known), CHECKED)]
+        picked = self._picked(fit)
         chosen = [self.kept[k] for k in picked]
         left, right = self.gaps.sides
         at = [(self._with(values, fit.value), seed) for values, seed in chosen]
@@ -252,6 +299,43 @@ class _Case:
             return None
         predicted = np.mean(fit.each[picked]) if len(fit.each) else fit.gap
         return float(np.nanmean(gap)), float(predicted), int(np.isfinite(gap).sum())
+
+    def refined(self, fit: FittedValue, measured: float) -> BestRun:
+        """Run both sides between the neighbours of the value, and keep the best.
+
+        A gap over a contact has jumps, which neither an interpolation nor a search for one
+        minimum stands; values side by side do.
+        """
+        chosen = [self.kept[k] for k in self._picked(fit)]
+        low, high = self._around(fit)
+        values = np.linspace(low, high, REFINED)
+        at = [(self._with(v, value), seed) for value in values.tolist() for v, seed in chosen]
+        left, right = self.gaps.sides
+        own = self.varied == "right"
+        runs = self._run([(right, at, False), (left, chosen if own else at, own)], 0.75)
+        other = np.tile(np.arange(len(chosen)), REFINED) if own else np.arange(len(at))
+        gap = gap_between(self.quantity, runs[len(at) + other], runs[: len(at)])
+        tried = [*values.tolist(), fit.value]
+        gaps = [*gap.reshape(REFINED, -1).mean(axis=1).tolist(), measured]
+        place = int(np.nanargmin(gaps))
+        apart = (high - low) / (REFINED - 1)
+        return BestRun(tried[place], gaps[place], apart, (tuple(tried), tuple(gaps)))
+
+    def _around(self, fit: FittedValue) -> tuple[float, float]:
+        """The values of the design on both sides; of a range an eighth of it to each side."""
+        (low, high), eighth = fit.bounds, (fit.bounds[1] - fit.bounds[0]) / 8
+        if self.vary.bounds is not None:
+            return max(low, fit.value - eighth), min(high, fit.value + eighth)
+        levels = np.sort(np.array(self.vary.values, dtype=float))
+        below, above = levels[levels < fit.value], levels[levels > fit.value]
+        return float(below[-1]) if len(below) else low, float(above[0]) if len(above) else high
+
+    def _picked(self, fit: FittedValue) -> Ints:
+        """The settings that are run at a value."""
+        known = (
+            np.flatnonzero(np.isfinite(fit.each)) if len(fit.each) else np.arange(len(self.kept))
+        )
+        return known[evenly(len(known), CHECKED)]
 
     def _with(self, values: tuple[Any, ...], value: float) -> tuple[Any, ...]:
         return (*values[: self.place], value, *values[self.place + 1 :])

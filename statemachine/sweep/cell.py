@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..compare.perturbed import Uncertainty, nudged_pose
+from ..compare.perturbed import Uncertainty, nudged_controller, nudged_start
 from ..comparison import ContactNames
 from ..errors import TimedOutError
 from ..interface import Array, Data, Model, forward, make_data, reset, step
@@ -35,7 +35,7 @@ class SweepCell:
         values: One for each factor of the sweep.
         seed: What is drawn from; 0 draws no start.
         backend: The engine.
-        nudge: What a change of the start by rounding is drawn from; 0 for none.
+        nudge: What a change of start and commands by rounding is drawn from; 0 for none.
     """
 
     id: str
@@ -140,6 +140,10 @@ def run_cell(
     rows: list[Array] = []
     with make_data(model) as data:
         _begin(rules, cell, model, data, doing.keyframe)
+        if cell.nudge:
+            draw = np.random.default_rng([cell.nudge, cell.seed])
+            data.qpos, data.qvel = nudged_start(model, data.qpos, data.qvel, draw)
+            controller = nudged_controller(controller, draw)
         begun = data.qpos.copy(), data.qvel.copy()
         try:
             _advance(rules, model, data, controller, total, deadline, row, rows)
@@ -166,9 +170,6 @@ def _begin(
     for place, value in qvel.items():
         data.qvel[place] = value
     data.qpos = drawn_start(model, data.qpos, rules.spread, cell.seed)
-    if cell.nudge:
-        draw = np.random.default_rng([cell.nudge, cell.seed])
-        data.qpos = nudged_pose(model, data.qpos, draw)
 
 
 def _advance(

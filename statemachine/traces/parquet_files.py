@@ -9,7 +9,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from ..errors import MissingEngineError, TraceError
+from ..errors import TraceError
+from ..installed import require_extra
 from .checked import as_column, check_size
 from .header import COLUMNS, CONTACTS, Header
 from .trace import Trace
@@ -56,14 +57,7 @@ def require_pyarrow() -> Any:
     Raises:
         MissingEngineError: It is not installed; the message names the extra.
     """
-    try:
-        importlib.import_module("pyarrow.parquet")
-    except ImportError as error:
-        raise MissingEngineError(
-            "parquet needs pyarrow: pip install 'statemachine-sim[parquet]'; "
-            "npz needs nothing more",
-            engine="pyarrow",
-        ) from error
+    require_extra("pyarrow.parquet", "parquet", "pyarrow", "parquet", "npz needs nothing more")
     return importlib.import_module("pyarrow")
 
 

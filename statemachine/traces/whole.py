@@ -87,10 +87,15 @@ def replace_file(target: Path, fill: Callable[[BinaryIO], object]) -> None:
         fill_file(name, fill)
 
 
+def replace_bytes(target: Path, content: bytes) -> int:
+    """The same of bytes; how many."""
+    replace_file(target, lambda out: out.write(content))
+    return len(content)
+
+
 def replace_text(target: Path, text: str, encoding: str = "utf-8") -> None:
     """The same of text; what the encoding lacks, as half of a pair of characters, is a "?"."""
-    content = text.encode(encoding, errors="replace")
-    replace_file(target, lambda out: out.write(content))
+    replace_bytes(target, text.encode(encoding, errors="replace"))
 
 
 def fill_file(name: str, fill: Callable[[BinaryIO], object]) -> None:

@@ -13,6 +13,7 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import BadInputError, MissingEngineError
+from ..installed import require_extra
 from .door import Door
 
 LOOPBACK = "127.0.0.1"
@@ -25,12 +26,7 @@ def require_viser() -> ModuleType:
     Raises:
         MissingEngineError: It is not installed; the message names the extra.
     """
-    try:
-        import viser
-    except ImportError as error:
-        raise MissingEngineError(
-            f"view needs viser ({error}): pip install 'statemachine-sim[view]'", engine="viser"
-        ) from None
+    viser: ModuleType = require_extra("viser", "view", "viser", "view")
     return viser
 
 

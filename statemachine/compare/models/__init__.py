@@ -16,6 +16,7 @@ import os
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -27,9 +28,9 @@ from ...description.records import Robot
 from ...description.tree import GroupTree
 from ...engines import needed_part, part, rooms_with
 from ...engines.parts import CompilerPart, ReadingPart
-from ...errors import UnsupportedError
+from ...errors import UnsupportedError, unknown_name
 from ...installed import DEFAULT
-from ...models import resolve
+from ...models import SUFFIXES, resolve
 from ._one_list import one_list
 from .diff import Found, diff, reach_of
 from .engines import own_ways
@@ -97,7 +98,11 @@ class Compared:
 def split(text: str) -> tuple[str, str | None]:
     """A model and the engine that it is asked of: "so101@pybullet"; None: the file itself."""
     model, sign, engine = text.rpartition("@")
-    return (model, engine) if sign and engine in backend_names() else (text, None)
+    if sign and engine in backend_names():
+        return model, engine
+    if sign and Path(model).suffix.lower() in SUFFIXES and not Path(text).exists():
+        raise unknown_name("engine", engine, backend_names())
+    return text, None
 
 
 def read(

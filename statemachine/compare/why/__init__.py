@@ -7,8 +7,10 @@ from .explain import CauseShare, Explanation, explain
 from .factors import FACTORS, Factor
 from .gap import Deviation
 from .results import UNEXPLAINED, Attribution, FactorTrial, FirstTouch
+from .shapley import ADDS_UP
 
 __all__ = [
+    "ADDS_UP",
     "FACTORS",
     "UNEXPLAINED",
     "Attribution",

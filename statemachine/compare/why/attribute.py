@@ -24,7 +24,6 @@ _NOTHING = 1e-6  # of the first gap: what is less is left alone
 # it stays in the ladder only if it takes away this part of what was left, and if one still
 # moves by this part of what it moves as it comes.
 _MOST, _MOVES = 0.5, 0.1
-_MOMENTS = 100  # at which contacts are looked for from equal states
 
 ORDER = (
     "First the settings that differ: {two} gets those of {one}, and {one} moves as "
@@ -131,7 +130,7 @@ def _detection(
     try:
         rerun = rerun_of(scenario, one, seconds=seconds, seed=seed)
         other = two.replace(**scenario.options) if scenario.options else two
-        found = one_step(rerun, other, moments=_MOMENTS)
+        found = one_step(rerun, other)
     except StateMachineError:
         return None
     (gap,) = [stage for stage in found.stages if stage.stage == FOUND]

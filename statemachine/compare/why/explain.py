@@ -12,6 +12,7 @@ from ...interface import Model
 from ...scenarios import Scenario
 from ...scenarios.provenance import Provenance, provenance
 from ...scenarios.runs import Progress, part_of, silent
+from ..labels import files_apart
 from ..matching import match_models
 from ..perturbed import EXACT, Uncertainty
 from .attribute import attribute
@@ -160,7 +161,7 @@ def explain(
         BadInputError: Nothing can be measured, or `jobs` is less than 1.
         UnknownNameError: There is no such quantity, or name.
     """
-    began, scenario = time.perf_counter(), scenario.on(one)
+    began, scenario, called = time.perf_counter(), scenario.on(one), labels or _labels(one, two)
     options = dict(scenario.options)
     models = [model.replace(**options) if options else model for model in (one, two)]
     matched = match_models(models[0], models[1], names)
@@ -232,8 +233,8 @@ def explain(
         experiment=scenario.name,
         says=scenario.says,
         seconds=trials.seconds,
-        one=labels[0] if labels else _label(models[0]),
-        two=labels[1] if labels else _label(models[1]),
+        one=called[0],
+        two=called[1],
         quantity=quantity,
         unit=units[quantity],
         measure=measure,
@@ -308,8 +309,14 @@ def _alike(one: Model, two: Model) -> bool:
     return one.backend == two.backend and _is_as_it_comes(one) == _is_as_it_comes(two)
 
 
-def _label(model: Model) -> str:
-    return f"{model.path.name} on {model.backend} {model.engine_version}"
+def _labels(one: Model, two: Model) -> tuple[str, str]:
+    """File and engine of both, with the folders by which two files of one name differ."""
+    files = files_apart(one.path.parts, two.path.parts)
+    labels = [
+        f"{file} on {model.backend} {model.engine_version}"
+        for file, model in zip(files, (one, two), strict=True)
+    ]
+    return labels[0], labels[1]
 
 
 def _engines(

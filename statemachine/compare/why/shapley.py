@@ -20,7 +20,7 @@ Method = Literal["nothing", "one at a time", "all sets", "drawn orders"]
 Value = Callable[[frozenset[str]], float | None]
 Ahead = Callable[[Iterable[frozenset[str]]], None]
 
-_ADDS_UP = 0.01  # of the gap: causes that interact by less add up
+ADDS_UP = 0.01  # of the gap: causes that interact by less add up
 _DUMMY = 1e-7  # of the gap: a cause that takes away less, first and last, takes away nothing
 _ALL_SETS = 5  # causes: 32 sets
 _PRECISE = 0.01  # of the gap: a standard error that is small enough
@@ -151,7 +151,7 @@ def _adds_up(
         return False
     together = abs(sum(_known(alone[c]) for c in active) - (1.0 - whole))
     apart = max(abs(_known(alone[c]) - _known(last[c])) for c in active)
-    return together <= _ADDS_UP and apart <= _ADDS_UP
+    return together <= ADDS_UP and apart <= ADDS_UP
 
 
 def _exact(game: _Game, cause: str, active: Sequence[str]) -> float | None:

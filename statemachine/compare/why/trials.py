@@ -114,8 +114,7 @@ class Trials:
             found.append(ModelDifference(START, "run", "", values))
         found += self._keyframe()
         if self._scenario.own and self._matched.reordered:
-            names = [self._names(k) for k in (0, 1)]
-            values = (("order", names[0], names[1]),)
+            values = (("order", *self._orders()),)
             found.append(ModelDifference(ORDER, "run", "", values))
         return tuple(found)
 
@@ -177,9 +176,15 @@ class Trials:
             "number meets others there (model.joint_id, jnt_qposadr and jnt_dofadr tell which)",
         )
 
-    def _names(self, side: int) -> str:
-        model = self._models[side]
-        return ", ".join(name or str(k) for k, name in enumerate(model.actuator_names))
+    def _orders(self) -> tuple[str, str]:
+        """The actuators that stand elsewhere on the right, in the order of either side."""
+        pairs, names = self._matched.actuators, self._models[0].actuator_names
+        left, right = (
+            [names[a] or f"ctrl[{a}]" for a, _ in sorted(pairs, key=lambda pair: pair[k])]
+            for k in (0, 1)
+        )
+        moved = [(a, b) for a, b in zip(left, right, strict=True) if a != b]
+        return ", ".join(a for a, _ in moved), ", ".join(b for _, b in moved)
 
     def know(self, causes: Sequence[Cause]) -> None:
         """The causes that `curves` can bring to the same, by their names."""

@@ -165,6 +165,13 @@ OPTIONS = {
     "actuator groups": ("disableactuator",),
     "sleep": ("sleep_tolerance",),
 }
+# Options that are one of a list, and the enumeration that names it.
+CHOICES = {
+    "integrator": "mjtIntegrator",
+    "solver": "mjtSolver",
+    "cone": "mjtCone",
+    "jacobian": "mjtJacobian",
+}
 FLAGS = ("disableflags", "enableflags")
 OPTION_UNITS = {"gravity": "m/s²", "timestep": "s", "wind": "m/s", "density": "kg/m³"}
 # Flags without an effect on the motion, and why.

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...comparison.text import few
 from ...description.records import HERE, Placement
 from ...installed import require
 from ...interface import Array
@@ -33,6 +34,7 @@ class Geoms(SolidPairs):
 
     def __init__(self, one: Any, two: Any, pairs: Counterparts) -> None:
         super().__init__(one, two, pairs)
+        self._told = set[int]()  # meshes of the second model, whose geoms change together
         self.geoms: tuple[tuple[int, int], ...] = tuple(sorted(self._match_geoms()))
         self.only = tuple(
             [g for g in _acting(raw) if g not in {pair[k] for pair in self.geoms}]
@@ -41,6 +43,7 @@ class Geoms(SolidPairs):
 
     def found(self) -> Iterator[ModelDifference]:
         """What they differ in."""
+        self._told.clear()
         for pair in self.geoms:
             yield from self._shape(*pair)
         yield from self._extra()
@@ -141,21 +144,41 @@ class Geoms(SolidPairs):
         if len(corners[0]) != len(corners[1]):
             values = (("corners of its hull", len(corners[0]), len(corners[1])),)
         subject = "hull" if meshes.apart(ours, theirs) <= VERTEX else "shape"
-        others = [c for c in self._users(b) if c != b]
-        edits, why = meshes.brought(one, two, a, b)
-        if others:
-            edits, why = (), "another geom has this mesh, too"
+        together, why = ((a, b),), ""
+        edits = meshes.chosen(one, two, a, b)
+        if not edits:
+            mesh = int(two.geom_dataid[b])
+            if mesh in self._told:
+                return  # its geoms change together
+            together, why = self._together(a, b), "another geom keeps this mesh, or gets a third"
+            if together:
+                edits, why = meshes.copied(one, two, int(one.geom_dataid[a]), mesh)
+                self._told.add(mesh)
         if edits:
-            wanted, there = pair.align @ self._solids[0].geom(a), self._solids[1].geom(b)
-            edits += self._moved(pair, a, b, wanted, there, name).edits
+            edits += tuple(edit for each in together for edit in self._as_there(*each))
+        name = few([name_of(one, "geom", each) for each, _ in together]) or name
         unit = "m" if values[0][0] == "farthest corner" else ""
         yield ModelDifference(subject, "geom", name, values, unit, edits, (), why)
 
-    def _users(self, geom: int) -> list[int]:
-        """Geoms of the second model that have the same mesh, and act."""
-        two = self._two
-        same_mesh = (two.geom_type == _MESH) & (two.geom_dataid == two.geom_dataid[geom])
-        return [g for g in _acting(two) if same_mesh[g]]
+    def _as_there(self, a: int, b: int) -> tuple[Edit, ...]:
+        """Edits that give a mesh geom the place and the bounds of its counterpart."""
+        pair = self._pair_of(int(self._one.geom_bodyid[a]))
+        assert pair is not None
+        wanted, there = pair.align @ self._solids[0].geom(a), self._solids[1].geom(b)
+        moved = self._moved(pair, a, b, wanted, there, "").edits
+        return (*meshes.bounds(self._one, a, b), *moved)
+
+    def _together(self, a: int, b: int) -> tuple[tuple[int, int], ...]:
+        """The pairs that share the mesh of `b`, if those of the first model share one, too."""
+        one, two = self._one, self._two
+        sharing = (two.geom_type == _MESH) & (two.geom_dataid == two.geom_dataid[b])
+        pairs = tuple(pair for pair in self.geoms if sharing[pair[1]])
+        alike = len(pairs) == sum(sharing[g] for g in _acting(two)) and all(
+            one.geom_type[each] == _MESH
+            and meshes.identical(one, int(one.geom_dataid[a]), one, int(one.geom_dataid[each]))
+            for each, _ in pairs
+        )
+        return pairs if alike else ()
 
     def _extra(self) -> Iterator[ModelDifference]:
         """Geoms that only one has are switched off there."""

@@ -68,13 +68,12 @@ def _farthest(one: Array, two: Array) -> float:
     return most
 
 
-def brought(one: Any, two: Any, a: int, b: int) -> tuple[tuple[Edit, ...], str]:
-    """Edits that make the mesh of a geom of the second model that of one of the first.
+def copied(one: Any, two: Any, ours: int, theirs: int) -> tuple[tuple[Edit, ...], str]:
+    """Edits that make a mesh of the second model one of the first.
 
     Returns:
-        The edits, without those of the place of the geom; and why there are none.
+        The edits, without those of its geoms; and why there are none.
     """
-    ours, theirs = int(one.geom_dataid[a]), int(two.geom_dataid[b])
     edits: list[Edit] = []
     for name in _PARTS:
         here, there = _span(one, name, ours), _span(two, name, theirs)
@@ -94,8 +93,29 @@ def brought(one: Any, two: Any, a: int, b: int) -> tuple[tuple[Edit, ...], str]:
         return (), "it has a convex hull of another size"
     edits.append(("mesh_graph", (graphs[1],), np.array(one.mesh_graph[graphs[0]])))
     edits += [(name, (theirs,), np.array(getattr(one, name)[ours])) for name in _OF_A_MESH]
-    edits += [(name, (b,), np.array(getattr(one, name)[a])) for name in _OF_A_GEOM]
     return tuple(edits), ""
+
+
+def chosen(one: Any, two: Any, a: int, b: int) -> tuple[Edit, ...]:
+    """Edits that give a geom the mesh of one of the first model, if the second has that, too."""
+    ours = int(one.geom_dataid[a])
+    for mesh in range(two.nmesh):
+        if identical(one, ours, two, mesh):
+            return (("geom_dataid", (b,), mesh),)
+    return ()
+
+
+def identical(one: Any, ours: int, two: Any, theirs: int) -> bool:
+    """Whether two meshes have the same vertices, faces and hull, in the same order."""
+    if one is two and ours == theirs:
+        return True
+    edits, why = copied(one, two, ours, theirs)
+    return not why and all(same(getattr(two, name)[index], value) for name, index, value in edits)
+
+
+def bounds(one: Any, a: int, b: int) -> tuple[Edit, ...]:
+    """Edits that give a geom of the second model the size and bounds of one of the first."""
+    return tuple((name, (b,), np.array(getattr(one, name)[a])) for name in _OF_A_GEOM)
 
 
 def heights(one: Any, two: Any, a: int, b: int, name: str) -> Iterator[ModelDifference]:

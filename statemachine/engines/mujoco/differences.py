@@ -150,7 +150,7 @@ def _options(one: Any, two: Any, world: bool) -> list[ModelDifference]:
         for name in names:
             a, b = getattr(one.opt, name), getattr(two.opt, name)
             if not same(a, b):
-                values.append((name, plain(a), plain(b)))
+                values.append((name, _told(name, a), _told(name, b)))
                 edits.append((f"opt.{name}", (), copy.copy(a)))
         if values:
             unit = fields.OPTION_UNITS.get(subject, "")
@@ -162,6 +162,14 @@ def _options(one: Any, two: Any, world: bool) -> list[ModelDifference]:
         edits = (("stat.meaninertia", (), value),)
         found.append(ModelDifference("scale of the solver", "option", "", values, edits=edits))
     return found + _flags(one, two)
+
+
+def _told(name: str, value: Any) -> Any:
+    """The value of an option; of one that is chosen from a list its name there."""
+    if name not in fields.CHOICES:
+        return plain(value)
+    chosen = getattr(require("mujoco"), fields.CHOICES[name])(int(value)).name
+    return chosen.partition("_")[2].lower()
 
 
 def _overrides(raw: Any) -> bool:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import BinaryIO
 
 from ...errors import BadInputError
-from ...traces.whole import check_place, replace_file
+from ...traces.whole import check_place, replace_text
 
 SUFFIXES = (".html", ".htm")
 
@@ -33,10 +32,5 @@ def write_report(path: str | os.PathLike[str], text: str) -> Path:
         OSError: It cannot be written.
     """
     target = check_target(path)
-    data = text.encode("utf-8", errors="replace")
-
-    def fill(out: BinaryIO) -> None:
-        out.write(data)
-
-    replace_file(target, fill)
+    replace_text(target, text)
     return target
