@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 _PATIENCE = 0.5  # seconds without a bar
+_PACE = 0.1  # seconds between two pictures of it
 
 
 @contextmanager
@@ -30,18 +31,23 @@ def progress(what: str) -> Iterator[Callable[[float], None]]:
         Remaining(),
         console=Console(stderr=True),
         transient=True,
+        auto_refresh=False,  # which would take a thread, beside which no process is forked
         redirect_stdout=False,  # while it starts, a lesson may take what its code prints
     )
     task = bar.add_task(what, total=1.0)
     began = time.monotonic()
-    started = False
+    started, drawn = False, 0.0
 
     def report(fraction: float) -> None:
-        nonlocal started
-        if not started and time.monotonic() - began > _PATIENCE:
+        nonlocal started, drawn
+        now = time.monotonic()
+        if not started and now - began > _PATIENCE:
             bar.start()
             started = True
         bar.update(task, completed=fraction)
+        if started and now - drawn > _PACE:
+            bar.refresh()
+            drawn = now
 
     try:
         yield report
