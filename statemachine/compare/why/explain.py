@@ -6,8 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from ...backends import load
-from ...errors import BadInputError, EndedEarlyError, StateMachineError, unknown_name
+from ...errors import BadInputError, EndedEarlyError, unknown_name
 from ...interface import Model
 from ...scenarios import Scenario
 from ...scenarios.provenance import Provenance, provenance
@@ -15,7 +14,13 @@ from ...scenarios.runs import Progress, part_of, silent
 from ..labels import files_apart
 from ..matching import match_models
 from ..perturbed import EXACT, Uncertainty
-from .attribute import attribute
+from .between_engines import (
+    gap_of_files,
+    is_as_it_comes,
+    on_both_engines,
+    parts_of,
+    run_alike,
+)
 from .causes import Cause, causes, differences_of
 from .gap import Deviation
 from .results import ROUNDING, UNEXPLAINED, Attribution, telling
@@ -199,7 +204,7 @@ def explain(
         quantity = telling(gaps, bounds, next(iter(units)), tolerances)
     gap = _figure(first[quantity], measure)
     nothing = gap <= bounds[quantity]
-    world = not any(_is_as_it_comes(model) for model in models)
+    world = not any(is_as_it_comes(model) for model in models)
     differences = (
         *differences_of(
             models[0], models[1], matched, world, finer, sensors=scenario.own and not nothing
@@ -220,12 +225,12 @@ def explain(
     )
     brought = gap if nothing else value(frozenset(able))
     engines, apart = None, 0.0
-    if not nothing and not _alike(*models):
-        engines = _engines(models, scenario, trials, quantity, known)
+    if not nothing and not run_alike(*models):
+        engines = on_both_engines(models, scenario, trials, quantity, known.rest())
         if any(cause.refused for cause in listed):
-            between = _files_apart(models, trials, frozenset(able))
+            between = gap_of_files(models, trials, frozenset(able))
             apart = _figure(between[quantity], measure) if between else gap
-    parts = _parts(gap, brought, engines, apart) if not nothing else (0.0, 0.0, 0.0)
+    parts = parts_of(gap, brought, engines, apart) if not nothing else (0.0, 0.0, 0.0)
     shares = [_share(cause, found) for cause in listed]
     shares.sort(key=lambda each: -abs(each.share or 0.0))
     progress(1.0)
@@ -300,15 +305,6 @@ def _figure(gap: Deviation, measure: Measure) -> float:
     return {"worst": gap.worst, "end": gap.end, "rms": gap.rms}[measure]
 
 
-def _is_as_it_comes(model: Model) -> bool:
-    return getattr(model, "defaults", "model") == "engine"
-
-
-def _alike(one: Model, two: Model) -> bool:
-    """Whether two Models are run by the same engine in the same way."""
-    return one.backend == two.backend and _is_as_it_comes(one) == _is_as_it_comes(two)
-
-
 def _labels(one: Model, two: Model) -> tuple[str, str]:
     """File and engine of both, with the folders by which two files of one name differ."""
     files = files_apart(one.path.parts, two.path.parts)
@@ -317,75 +313,3 @@ def _labels(one: Model, two: Model) -> tuple[str, str]:
         for file, model in zip(files, (one, two), strict=True)
     ]
     return labels[0], labels[1]
-
-
-def _engines(
-    models: list[Model], scenario: Scenario, trials: Trials, quantity: str, known: _Known
-) -> Attribution | None:
-    """The left's file on both engines: what is left when the files are the same."""
-    one, two = models
-    try:
-        if _is_as_it_comes(two) or _is_as_it_comes(one):
-            # What is typed behind the right is a setting of that side.
-            other = _with_world_of(two, load(one.path, backend=two.backend, defaults="engine"))
-        else:
-            other = two.with_compiled(one.compiled)
-        return attribute(
-            one,
-            other,
-            scenario,
-            seconds=trials.seconds,
-            seed=trials.seed,
-            quantity=quantity,
-            progress=known.rest(),
-        )
-    except StateMachineError:
-        return None
-
-
-def _files_apart(
-    models: list[Model], trials: Trials, brought: frozenset[str]
-) -> dict[str, Deviation]:
-    """The gap that what cannot be brought over leaves between the files on the right's engine.
-
-    Both are run by the model's own settings: an engine as it comes may hold still what differs.
-    """
-    one, two = models
-    try:
-        if _is_as_it_comes(two) or _is_as_it_comes(one):
-            theirs = [load(model.path, backend=two.backend) for model in models]
-            world = next((m for m in models if not _is_as_it_comes(m)), theirs[0])
-            both = [_with_world_of(world, model) for model in theirs]
-        else:
-            both = [two.with_compiled(one.compiled), two]
-        return trials.files_apart(both[0], trials.brought(both[1], brought), brought)
-    except StateMachineError:
-        return {}
-
-
-def _with_world_of(model: Model, other: Model) -> Model:
-    """A Model with the gravity and the timestep of another."""
-    return other.replace(gravity=model.gravity, timestep=model.timestep, substeps=model.substeps)
-
-
-def _parts(
-    gap: float, brought: float | None, engines: Attribution | None, apart: float
-) -> tuple[float, float, float]:
-    """What is explained, located and unexplained, as parts of the gap.
-
-    Args:
-        gap: As they come.
-        brought: With all causes brought to the same that can be.
-        engines: What becomes of the gap of the left's file on both engines.
-        apart: The gap between the two files on one engine, with those causes brought over.
-    """
-    if brought is None:
-        return 0.0, 0.0, 1.0
-    explained, located = (gap - brought) / gap, 0.0
-    if engines is not None and engines.gap > 0:
-        # The ladder is of the left's file alone, and speaks of no more than is not the files'. It
-        # measures the worst; of another figure its parts are the same parts.
-        scale = max(brought - apart, 0.0) / gap / engines.gap
-        explained += scale * (engines.gap - engines.settings_same)
-        located = scale * (engines.settings_same - engines.left)
-    return explained, located, 1.0 - explained - located
