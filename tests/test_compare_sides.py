@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine.cli import main
 from statemachine.compare import (
     Request,
     Side,
@@ -333,6 +334,39 @@ def test_robots_that_share_nothing_are_refused(files: Path) -> None:
     )
     with pytest.raises(TraceError, match=r"no joint in common.*--map LEFT=RIGHT"):
         run_sides(asked("gravity", Side(str(files / "arm.xml")), Side(str(files / "ball.xml"))))
+
+
+@pytest.mark.parametrize(
+    ("typed", "says"),
+    [
+        ("--models arm.xml,turned.xml", "two words: statemachine compare --models arm.xml turned"),
+        ("hold arm.xml,turned.xml", "two sides are two words: type arm.xml turned.xml"),
+        ("hold arm.xml@ turned.xml", "arm.xml@ names no engine: type arm.xml@mujoco, or arm.xml"),
+        ("hold arm.xml:mujoco turned.xml", "an engine stands behind an @: type arm.xml@mujoco"),
+        ("hold arm.xml turned.xml@bullet", "no engine named 'bullet'"),
+        ("--models arm.xml turned.xml@bullet", "no engine named 'bullet'"),
+        ("hold arm.xml timestep 0.001 turned.xml", "an option of a side: type timestep=VALUE"),
+        ("hold arm.xml timestep=abc turned.xml", "timestep=abc is no value"),
+        ("hold arm.xml turned.xml --map a", "--map wants A=B"),
+        ("hold arm.xml turned.xml --map elbow=nosuch", "in turned.xml named 'nosuch'"),
+        ("hodl arm.xml turned.xml", "Did you mean 'hold'?"),
+        ("hold . turned.xml", ". is a folder: name a file in it"),
+        ("hold arm.xml turned.xml ball.xml", "compare takes two"),
+        ("hold arm.xml", "one side only: name the other"),
+        ("hold arm.xml turned.xml --why --jobs 0", "jobs must be at least 1; got 0"),
+        ("hold --why --jobs 2", "--jobs is of two sides"),
+        ("hold arm.xml turned.xml --jobs 2", "--jobs belongs to --why"),
+    ],
+)
+def test_what_is_mistyped_is_one_line(
+    files: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any, typed: str, says: str
+) -> None:
+    monkeypatch.chdir(files)
+    (files / "ball.xml").write_text((files / "arm.xml").read_text())
+    assert main(["compare", *typed.split()]) == 2
+    out, err = capsys.readouterr()
+    assert says in err
+    assert (out, err.count("\n")) == ("", 1)
 
 
 # What is run.
