@@ -21,6 +21,7 @@ _COLOURS = ("#1f5fa8", "#c2571a", "#2f8f4e", "#8a4fa0", "#b03a48", "#6b6b6b", "#
 _INK, _PAPER, _BELOW = "#222222", "#ffffff", "#f0f0f0"  # the last: behind the level of zero
 _WIDE = 30.0  # times the least value: beyond, colours are logarithmic
 _WRITTEN, _LONG = 150, 60  # cells whose figures are written; letters that fit under a map
+_UP = 24  # letters that fit beside a map
 _POWERS = 8  # that a log axis names, at most
 _TITLE = 80  # letters of a line of it
 
@@ -272,9 +273,10 @@ def _heat_map(axes: Any, picture: HeatMap) -> None:
                     rotation=45 if len("".join(picture.columns)) > _LONG else 0)  # fmt: skip
     axes.set_yticks(range(len(picture.rows)), picture.rows, fontsize=8)
     axes.set_xlabel(picture.across)
-    axes.set_ylabel(picture.up)
+    axes.set_ylabel(textwrap.fill(picture.up, _UP))
     scale = ScalarMappable(norm, colours.resampled(256))
-    bar = axes.figure.colorbar(scale, ax=axes, shrink=0.9, pad=0.02)
+    # Beside its map, whatever room the legends of other panels take.
+    bar = axes.figure.colorbar(scale, cax=axes.inset_axes((1.02, 0.0, 0.02, 1.0)))
     if wide:
         every = 1 + int(np.log10(high / low)) // _POWERS
         mantissas = (1, 2, 5) if high < 1e4 * low else (1,)
