@@ -280,6 +280,12 @@ SHARED = [
         balls("n", "m", m=SMALL, n=COARSE),
         ["shape of ball_shape", "shape of again_shape"],
     ),
+    # The mesh that one geom could take up is the one that another's is copied into.
+    (
+        balls("m", "k", m=SMALL, k={"size": 0.06}),
+        balls("n", "m", n=LARGE, m=SMALL),
+        ["shape of ball_shape", "shape of again_shape"],
+    ),
 ]
 
 

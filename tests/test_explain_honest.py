@@ -177,6 +177,24 @@ def test_a_sensor_counts_where_a_function_may_read_it(folder: Path, capsys: Any)
     assert "sensor p type" in capsys.readouterr().out
 
 
+def test_a_sensor_of_a_joint_by_another_name_is_the_same(folder: Path) -> None:
+    import statemachine as sm
+    from statemachine.compare.matching import match_models
+    from statemachine.compare.why.causes import sensors_of
+
+    sensor = (
+        '<sensor><jointpos name="p" joint="j1"/>'
+        '<framepos name="q" objtype="body" objname="a"/></sensor>'
+    )
+    left = file(folder, "l.xml", sensor=sensor)
+    text = (folder / left).read_text(encoding="utf-8")
+    for name, other in (("j1", "hinge"), ("a", "arm")):
+        text = text.replace(f'"{name}"', f'"{other}"')
+    (folder / "r.xml").write_text(text, encoding="utf-8")
+    models = [sm.load(folder / name) for name in ("l.xml", "r.xml")]
+    assert sensors_of(match_models(*models, {"j1": "hinge"})) == []
+
+
 def test_a_function_that_draws_without_a_seed_has_no_causes(folder: Path, capsys: Any) -> None:
     file(folder, "l.xml")
     assert main(["compare", "f.py:drawn", "l.xml", "l.xml", "damping=0.5", "--why"]) == 2

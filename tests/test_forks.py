@@ -137,6 +137,44 @@ def test_a_run_whose_process_dies_is_a_set_that_cannot_be_run(tmp_path: Path) ->
     assert ("gains of shoulder",) in found.impossible  # the mass stays what kills
 
 
+@forks
+def test_what_never_ends_in_a_fork_is_done_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where code waits for threads that did not come along."""
+    monkeypatch.setattr("statemachine.compare.forks._LEAST", 0.5)
+    here = os.getpid()
+
+    def waits() -> int:
+        while os.getpid() != here:
+            time.sleep(0.1)
+        return 7
+
+    assert in_forks([waits, partial(int, 1), partial(int, 2)], 2, lambda: None) == [7, 1, 2]
+    assert _gone()
+
+
+@forks
+def test_a_system_that_forks_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused() -> int:
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(os, "fork", refused)
+    assert in_forks([partial(int, k) for k in range(4)], 2, lambda: None) == [0, 1, 2, 3]
+
+
+def test_a_function_is_run_here_unless_asked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its threads would not come along."""
+
+    def never(*_args: object) -> None:
+        raise AssertionError("forked")
+
+    monkeypatch.setattr("statemachine.compare.why.trials.in_forks", never)
+    monkeypatch.setattr("statemachine.compare.forks._PAYS", 1e-9)
+    found = explained(tmp_path, ARM, _apart(ARM), seconds=0.1, scenario=replace(SWING, own=True))
+    assert found.runs > 10
+
+
 def test_how_many_forks() -> None:
     if forks_for(2, 1.0, 2) == 2:
         assert forks_for(10, 1.0, 3) == 3

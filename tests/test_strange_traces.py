@@ -418,3 +418,14 @@ def test_what_is_no_file_is_written_into_and_stays(tmp_path: Path) -> None:
     replace_file(link, lambda out: out.write(b"x"))
     assert link.is_symlink()
     assert (null.stat().st_mode, null.stat().st_rdev) == (before.st_mode, before.st_rdev)
+
+
+def test_what_a_library_says_of_a_file_is_not_lost(tmp_path: Path) -> None:
+    """Pillow and pyarrow raise an OSError that has words and no number."""
+
+    def fill(_file: object) -> None:
+        raise OSError("encoder error -2 when writing image file")
+
+    with pytest.raises(OSError, match="encoder error -2"):
+        replace_file(tmp_path / "a.png", fill)
+    assert list(tmp_path.iterdir()) == []

@@ -42,6 +42,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _given(options: argparse.Namespace, name: str) -> bool:
+    value = getattr(options, name)
+    return value is not None and value is not False  # 0 is given, and refused later
+
+
 def check(options: argparse.Namespace) -> None:
     """Refuse what has no meaning without --why, or with it.
 
@@ -51,7 +56,7 @@ def check(options: argparse.Namespace) -> None:
     if options.quantity and not (options.why or options.html):
         raise BadInputError("--quantity belongs to --why")
     for name in _OF_SIDES:
-        if getattr(options, name) not in (None, False) and not options.why:
+        if _given(options, name) and not options.why:
             raise BadInputError(f"--{name} belongs to --why")
     if options.budget is not None and options.budget < 1:
         raise BadInputError(f"--budget wants a number of runs, at least 1; got {options.budget}")
@@ -78,7 +83,7 @@ def run(options: argparse.Namespace, request: Any) -> int:
             result = of_sides(options, request, told)
         return show(explained.page(result), result, options.json)
     for name in _OF_SIDES:
-        if getattr(options, name) not in (None, False):
+        if _given(options, name):
             raise BadInputError(
                 f"--{name} is of two sides: {PROGRAM} compare {request.what[0]} LEFT RIGHT --why"
             )

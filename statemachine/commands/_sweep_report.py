@@ -99,6 +99,8 @@ def check(options: argparse.Namespace) -> None:
         raise BadInputError(
             "--report DIR is of a dataset that is there; with WHAT and --out it takes no folder"
         )
+    if options.report is not True and options.retry_failed:
+        raise BadInputError("--retry-failed is of a sweep that runs: say WHAT and --out DIR")
     if options.floor_cells is not None and options.floor_cells < 0:
         raise BadInputError(f"--floor-cells must not be negative; got {options.floor_cells}")
     if options.html is not None:

@@ -152,7 +152,8 @@ def run(options: argparse.Namespace) -> int:
             )
     except KeyboardInterrupt:
         if out.is_dir():
-            return complain(f"stopped; {out} has what was done. Type the same to go on", 130)
+            again = "Type the same" + ", without --retry-failed," * options.retry_failed
+            return complain(f"stopped; {out} has what was done. {again} to go on", 130)
         raise
     if options.report:
         return _reported(options, out, words.page(ready, summary), summary)

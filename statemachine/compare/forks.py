@@ -1,7 +1,9 @@
 """Runs shared among forks of this process, which have its models and its controllers as they are.
 
 Nothing has to be pickled but what a run gives. A fork keeps the number of threads by which NumPy
-multiplies large matrices: with another number the last bits may be others.
+multiplies large matrices: with another number the last bits may be others. Threads of other
+libraries do not come along, and code that waits for them would wait for ever: so each piece of work
+has a limit.
 """
 
 from __future__ import annotations
@@ -21,13 +23,14 @@ from ..processes import checked_jobs
 
 T = TypeVar("T")
 
-_PAYS = 0.1  # [s] of work: for less a fork is not worth its while
+_PAYS = 0.1  # [s] of work that a fork takes over; for less it costs more than it saves
+_LEAST, _LONGEST = 20.0, 50.0  # [s] without a result, or so many times what one takes
 _NONE = "this system has no forks"
 _MANY = 1000  # whose numbers fit into a pipe
 
 
 def forks_for(number: int, seconds: float, jobs: int | None) -> int:
-    """How many forks are to share some runs; 1 for none, which is as well in this process.
+    """How many forks are to share some runs; 1 means that this process makes them itself.
 
     There are none on Windows and macOS, nor, unless asked for, beside other threads or for work
     that is done sooner than shared.
@@ -49,28 +52,31 @@ def forks_for(number: int, seconds: float, jobs: int | None) -> int:
 
 
 def in_forks(
-    work: Sequence[Callable[[], T]], jobs: int, ended: Callable[[], None]
+    work: Sequence[Callable[[], T]], jobs: int, ended: Callable[[], None], seconds: float = 0.0
 ) -> list[T | None]:
     """Do pieces of work in forks of this process. An interrupt ends them all.
 
-    What raises in a fork is done again here, so that it is raised here. Where a fork ends before
-    its work is done, killed or by a fault of the engine, that is tried again in a fork of its own.
+    What raises in a fork is done again here, so that it is raised here; so is all where the system
+    makes no forks now, and what takes longer than its limit. Where a fork ends before its work is
+    done, killed or by a fault of the engine, that is tried again in a fork of its own.
 
     Args:
         work: What to call; what it returns can be pickled, and is not None.
         jobs: How many forks there are at once.
         ended: Called as each piece of work ends.
+        seconds: What one takes here, by the clock: the measure of its limit.
 
     Returns:
         What each returned; None where two forks have ended in it.
     """
     found: dict[int, tuple[bool, T | None]] = {}
+    limit = max(_LEAST, _LONGEST * seconds)
     for start in range(0, len(work), _MANY):
         numbers = range(start, min(start + _MANY, len(work)))
-        _shared(work, numbers, jobs, found, ended)
+        _shared(work, numbers, jobs, found, ended, limit)
     for number in range(len(work)):
         if number not in found:
-            _shared(work, [number], 1, found, ended)
+            _shared(work, [number], 1, found, ended, limit)
     results: list[T | None] = []
     for number, call in enumerate(work):
         well, result = found.get(number, (True, None))
@@ -84,6 +90,7 @@ def _shared(
     jobs: int,
     found: dict[int, tuple[bool, T | None]],
     ended: Callable[[], None],
+    limit: float,
 ) -> None:
     """Fill in what forks return, which take one number after the other from a pipe."""
     if sys.platform == "win32":
@@ -95,14 +102,20 @@ def _shared(
     results: list[Connection[Any, Any]] = []
     try:
         for _ in range(min(jobs, len(numbers))):
-            with _uninterrupted():
-                here, there = Pipe(duplex=False)
-                results.append(here)
-                forks.append(_fork(work, waiting, results, there))
-                there.close()
-        open_ = list(results)
+            try:
+                with _uninterrupted():
+                    here, there = Pipe(duplex=False)
+                    results.append(here)
+                    with there:
+                        forks.append(_fork(work, waiting, results, there))
+            except OSError:  # no more processes, or no more files: those that are there do it
+                break
+        open_ = results[: len(forks)]
         while open_:
-            for one in wait(open_):
+            ready = wait(open_, limit)
+            if not ready:
+                break
+            for one in ready:
                 assert isinstance(one, Connection)
                 try:
                     number, *result = one.recv()
@@ -111,6 +124,8 @@ def _shared(
                     continue
                 found[number] = result[0], result[1]
                 ended()
+        if open_ or not forks:  # what they did not do is done in this process
+            found.update((n, (False, None)) for n in numbers if n not in found)
     finally:
         with _uninterrupted():
             os.close(waiting)

@@ -109,7 +109,7 @@ def split_words(
         StateMachineError: As `parse_sides` does.
     """
     what, rest = tuple(words[:1]), words[1:]
-    _check_rest(what, rest)
+    _check_rest(what, rest, menagerie)
     if not what or any(word in SCENARIOS or is_trace(word) for word in rest):
         return tuple(words), ()  # two traces, or nothing that can be compared
     if not (what[0] in SCENARIOS or is_trace(what[0]) or is_function(what[0])):
@@ -128,7 +128,7 @@ def split_words(
     raise BadInputError(f"{said}, as in: {typed} {_another(sides)}")
 
 
-def _check_rest(what: Sequence[str], rest: Sequence[str]) -> None:
+def _check_rest(what: Sequence[str], rest: Sequence[str], menagerie: str | None) -> None:
     """Refuse a trace among sides, and an experiment that there is not before them."""
     sides = [word for word in rest if _is_file(word)]
     traces = [word for word in rest if is_trace(word)]
@@ -138,7 +138,7 @@ def _check_rest(what: Sequence[str], rest: Sequence[str]) -> None:
             f"statemachine compare {traces[0]} {sides[0]} {_another([Side(sides[0])])}"
         )
     known = what and (what[0] in SCENARIOS or is_trace(what[0]) or is_function(what[0]))
-    if sides and not known and not _is_file(what[0]) and "@" not in what[0]:
+    if sides and not known and not _is_side(what[0], menagerie):
         raise unknown_name("experiment", what[0], SCENARIOS)
 
 

@@ -88,7 +88,7 @@ class DifferencesPart(Protocol):
         """
         ...
 
-    def sensors(self, one: Any, two: Any) -> list[ModelDifference]:
+    def sensors(self, one: Any, two: Any, pairs: Counterparts) -> list[ModelDifference]:
         """What the sensors of two compiled models differ in, which only a controller reads."""
         ...
 

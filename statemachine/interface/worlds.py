@@ -336,8 +336,9 @@ def check_memory(n: int, each: float, made: int = 0, of_which: str = "") -> None
     free = free_memory()
     if free is None or (n - made) * each <= _SPARE * free:
         return
+    most = made + int(_SPARE * free / each)
     size = f"{each / 1e6:.0f} MB" if each >= 1e6 else f"{each / 1e3:.1f} kB"
     raise EngineError(
         f"{n} worlds do not fit into memory: one takes {size}{of_which and f', {of_which}'}, and "
-        f"{free / 1e9:.1f} GB are free: make {made + int(_SPARE * free / each)} at most"
+        f"{free / 1e9:.1f} GB are free: {f'make {most} at most' if most else 'not even one does'}"
     )

@@ -316,7 +316,10 @@ class _Case:
         other = np.tile(np.arange(len(chosen)), REFINED) if own else np.arange(len(at))
         gap = gap_between(self.quantity, runs[len(at) + other], runs[: len(at)])
         tried = [*values.tolist(), fit.value]
-        gaps = [*gap.reshape(REFINED, -1).mean(axis=1).tolist(), measured]
+        by_value = gap.reshape(REFINED, -1)
+        stood = np.isfinite(by_value).all(axis=0)  # the same pairs at every value
+        means = by_value[:, stood].mean(axis=1) if stood.any() else np.full(REFINED, np.nan)
+        gaps = [*means.tolist(), measured]
         place = int(np.nanargmin(gaps))
         apart = (high - low) / (REFINED - 1)
         return BestRun(tried[place], gaps[place], apart, (tuple(tried), tuple(gaps)))

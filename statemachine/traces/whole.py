@@ -72,6 +72,8 @@ def beside(*targets: Path) -> Iterator[list[str]]:
         except OSError as error:
             if isinstance(error, StateMachineError) or error.filename not in (None, *names):
                 raise
+            if error.errno is None:  # of a library, whose words say what it is
+                raise
             # A full disk names no file: the reader is told of the one that was asked for.
             raise OSError(error.errno, error.strerror, os.fspath(targets[0])) from None
 

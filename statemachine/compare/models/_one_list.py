@@ -329,7 +329,7 @@ def _keyframes(matched: Matched) -> Iterator[Difference]:
 
 def _sensors(matched: Matched) -> Iterator[Difference]:
     """What only a controller that reads them meets: it changes no motion by itself."""
-    found = sensors_of(matched.one, matched.two)
+    found = sensors_of(matched)
     rows = [
         _row("further", f"sensor {each.where}", name, _value(one), _value(two))
         for each in found

@@ -58,7 +58,7 @@ def differences_of(
     room: DifferencesPart = needed_part(DEFAULT, "differences")
     found = list(room.differences(one.compiled, two.compiled, matched, world=world))
     if sensors:
-        found += sensors_of(one, two)
+        found += sensors_of(matched)
     if finer:
         found = [part for each in found for part in room.entries(two.compiled, each)]
     for side, only in enumerate(matched.only):
@@ -69,10 +69,10 @@ def differences_of(
     return tuple(found)
 
 
-def sensors_of(one: Model, two: Model) -> list[ModelDifference]:
+def sensors_of(matched: Matched) -> list[ModelDifference]:
     """What the sensors of two Models differ in, which only a controller reads."""
     room: DifferencesPart = needed_part(DEFAULT, "differences")
-    return room.sensors(one.compiled, two.compiled)
+    return room.sensors(matched.one.compiled, matched.two.compiled, matched)
 
 
 def built(model: Model, edits: tuple[Edit, ...]) -> Model:

@@ -157,8 +157,9 @@ def explain(
         budget: How many sets of causes may be run, as far as orders are drawn.
         labels: What the sides are called.
         uncertain: What is not known of the start, for the chaos floor; None for no floor.
-        jobs: How many processes make the runs; None for one a processor where that pays. Where
-            the system has no forks the runs are made in this process. The figures are the same.
+        jobs: How many processes make the runs; None for one a processor where that pays, and
+            for one where a function commands. Without forks the runs are made in this process. The
+            figures are the same.
         progress: Told the fraction that is done.
 
     Raises:
@@ -191,7 +192,7 @@ def explain(
         )
     if scenario.own and not trials.repeats():
         raise BadInputError(
-            f"two runs of {labels[0] if labels else 'the left'} from the same start differ: "
+            f"two runs of {called[0]} from the same start differ: "
             f"{scenario.name} does not command the same twice, and so no gap has a cause; give "
             "what it draws a seed, and let it keep nothing from one run to the next"
         )

@@ -23,8 +23,8 @@ def telling(
 ) -> str:
     """The quantity that a gap is explained in.
 
-    It is the preferred one where that is beyond its tolerance. Else it is the one that is
-    farthest beyond, among those that are more than rounding and chaos make of a run.
+    It is the preferred one where that is beyond its tolerance, or where none is. Else it is the
+    one that is farthest beyond, among those that are more than rounding and chaos make of a run.
 
     Args:
         gaps: By quantity.

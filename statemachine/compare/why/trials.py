@@ -61,7 +61,8 @@ class Trials:
         seconds: Simulated time.
         seed: Of what the scenario draws.
         ran: Called after each run.
-        jobs: How many runs are made at once; None for one a processor where that pays.
+        jobs: How many runs are made at once; None for one a processor where that pays,
+            and for one where a function of the user's commands.
 
     Raises:
         BadInputError: `jobs` is less than 1.
@@ -202,12 +203,26 @@ class Trials:
             (side, self._acting(side, brought)) for brought in wanted for side in (0, 1)
         )
         new = [key for key in keys if key not in self._runs and key not in self._ahead]
-        jobs = forks_for(len(new), self._took, self._jobs)
+        jobs = self._forks_for(len(new))
         if jobs == 1:
             return
-        outcomes = in_forks([partial(self._outcome, *key) for key in new], jobs, self._ran)
+        work = [partial(self._outcome_or_error, *key) for key in new]
+        outcomes = in_forks(work, jobs, self._ran, self._took)
         for key, outcome in zip(new, outcomes, strict=True):
-            self._ahead[key] = outcome or _Outcome(None, _LOST)
+            if not isinstance(outcome, Exception):
+                self._ahead[key] = outcome or _Outcome(None, _LOST)
+
+    def _forks_for(self, number: int) -> int:
+        """How many forks make runs; none by default for a function, which may use any threads."""
+        jobs = 1 if self._jobs is None and self._scenario.own else self._jobs
+        return forks_for(number, self._took, jobs)
+
+    def _outcome_or_error(self, side: int, brought: frozenset[str]) -> _Outcome | Exception:
+        """An error is raised where the run is asked for, which may never be."""
+        try:
+            return self._outcome(side, brought)
+        except Exception as error:
+            return RuntimeError(str(error))
 
     def curves(self, side: int, brought: frozenset[str]) -> Curves | None:
         """A run of one side; None, with a reason in `ended`, if it cannot be or did not stand."""
@@ -332,8 +347,12 @@ class Trials:
             return (self.ruler.curves(trace),)
 
         runs = [partial(run, k) for k in range(RUNS)]
-        jobs = forks_for(RUNS, self._took, self._jobs)
-        found = in_forks(runs, jobs, lambda: None) if jobs > 1 else [call() for call in runs]
+        jobs = self._forks_for(RUNS)
+        found = (
+            in_forks(runs, jobs, lambda: None, self._took)
+            if jobs > 1
+            else [call() for call in runs]
+        )
         if None in found:
             raise EngineError(f"a run for the chaos floor could not be made: {_LOST}")
         return self.ruler.floor(first, [each[0] for each in found if each])

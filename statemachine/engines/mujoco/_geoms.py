@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -145,8 +146,10 @@ class Geoms(SolidPairs):
             values = (("corners of its hull", len(corners[0]), len(corners[1])),)
         subject = "hull" if meshes.apart(ours, theirs) <= VERTEX else "shape"
         together, why = ((a, b),), ""
-        edits = meshes.chosen(one, two, a, b)
-        if not edits:
+        edits: tuple[Edit, ...] = ()
+        if b in self._choices:
+            edits = (("geom_dataid", (b,), self._choices[b]),)
+        else:
             mesh = int(two.geom_dataid[b])
             if mesh in self._told:
                 return  # its geoms change together
@@ -159,6 +162,13 @@ class Geoms(SolidPairs):
         name = few([name_of(one, "geom", each) for each, _ in together]) or name
         unit = "m" if values[0][0] == "farthest corner" else ""
         yield ModelDifference(subject, "geom", name, values, unit, edits, (), why)
+
+    @cached_property
+    def _choices(self) -> dict[int, int]:
+        """By geom of the second model the mesh there that its counterpart has."""
+        one, two = self._one, self._two
+        pairs = [(a, b) for a, b in self.geoms if one.geom_type[a] == two.geom_type[b] == _MESH]
+        return meshes.chosen(one, two, pairs)
 
     def _as_there(self, a: int, b: int) -> tuple[Edit, ...]:
         """Edits that give a mesh geom the place and the bounds of its counterpart."""

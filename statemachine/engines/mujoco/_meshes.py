@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -96,13 +96,34 @@ def copied(one: Any, two: Any, ours: int, theirs: int) -> tuple[tuple[Edit, ...]
     return tuple(edits), ""
 
 
-def chosen(one: Any, two: Any, a: int, b: int) -> tuple[Edit, ...]:
-    """Edits that give a geom the mesh of one of the first model, if the second has that, too."""
-    ours = int(one.geom_dataid[a])
-    for mesh in range(two.nmesh):
-        if identical(one, ours, two, mesh):
-            return (("geom_dataid", (b,), mesh),)
-    return ()
+def chosen(one: Any, two: Any, pairs: Iterable[tuple[int, int]]) -> dict[int, int]:
+    """Meshes of the second model that its geoms can take to have those of the first.
+
+    A mesh into which another one has to be copied, since no other has that, is nobody's choice.
+
+    Args:
+        one: A compiled model.
+        two: Another.
+        pairs: Pairs of mesh geoms.
+
+    Returns:
+        The mesh, by geom of the second.
+    """
+    own = {b: int(two.geom_dataid[b]) for _, b in pairs}
+    found = {b: _counterpart(one, int(one.geom_dataid[a]), two, own[b]) for a, b in pairs}
+    while True:
+        kept = {mesh for b, mesh in found.items() if mesh == own[b]}
+        overwritten = {own[b] for b, mesh in found.items() if mesh is None} - kept
+        lost = [b for b, mesh in found.items() if mesh in overwritten]
+        if not lost:
+            return {b: mesh for b, mesh in found.items() if mesh is not None}
+        found |= dict.fromkeys(lost)
+
+
+def _counterpart(one: Any, ours: int, two: Any, first: int) -> int | None:
+    """A mesh of the second model that is identical to one of the first; `first` if it is."""
+    meshes = (first, *range(two.nmesh))
+    return next((mesh for mesh in meshes if identical(one, ours, two, mesh)), None)
 
 
 def identical(one: Any, ours: int, two: Any, theirs: int) -> bool:
