@@ -191,8 +191,8 @@ def test_a_sensor_of_a_joint_by_another_name_is_the_same(folder: Path) -> None:
     for name, other in (("j1", "hinge"), ("a", "arm")):
         text = text.replace(f'"{name}"', f'"{other}"')
     (folder / "r.xml").write_text(text, encoding="utf-8")
-    models = [sm.load(folder / name) for name in ("l.xml", "r.xml")]
-    assert sensors_of(match_models(*models, {"j1": "hinge"})) == []
+    one, two = (sm.load(folder / name) for name in ("l.xml", "r.xml"))
+    assert sensors_of(match_models(one, two, {"j1": "hinge"})) == []
 
 
 def test_a_function_that_draws_without_a_seed_has_no_causes(folder: Path, capsys: Any) -> None:
