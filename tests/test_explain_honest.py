@@ -85,6 +85,7 @@ def asked(capsys: Any, *words: str) -> tuple[int, dict[str, Any]]:
     return code, json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sides", [("l.xml", "r.xml"), ("r.xml", "l.xml")])
 @pytest.mark.parametrize("of_the_engine", [0, 1])
 def test_engine_settings_do_not_pay_for_another_file(
@@ -103,6 +104,7 @@ def test_engine_settings_do_not_pay_for_another_file(
     assert found["unexplained"] > 0.9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("option", "name", "word"),
     [("gravity=0,0,-3", "gravity", "3 m/s²"), ("timestep=0.001", "timestep", "1 ms")],

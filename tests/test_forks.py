@@ -49,6 +49,7 @@ def _feedback(model: sm.Model, _seed: int) -> Callable[[float, sm.Data], list[fl
     return controller
 
 
+@pytest.mark.slow
 @forks
 @pytest.mark.parametrize("jobs", [2, 3])
 def test_forks_give_the_figures_of_one_process(tmp_path: Path, jobs: int) -> None:
@@ -63,6 +64,7 @@ def test_forks_give_the_figures_of_one_process(tmp_path: Path, jobs: int) -> Non
         assert _figures(run(scenario=scenario, jobs=jobs)) == _figures(one)
 
 
+@pytest.mark.slow
 @forks
 def test_forks_give_the_figures_of_one_process_on_pybullet(tmp_path: Path) -> None:
     need_engine("pybullet")
@@ -196,6 +198,7 @@ def test_jobs_on_the_command(tmp_path: Path, capsys: pytest.CaptureFixture) -> N
     assert "jobs must be at least 1; got 0" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @forks
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_no_fork_stays(tmp_path: Path, number: int) -> None:

@@ -265,6 +265,7 @@ def test_the_record_names_the_distribution(monkeypatch: pytest.MonkeyPatch) -> N
         engine_version("pybullet")
 
 
+@pytest.mark.slow
 def test_all_goes_on_with_the_engines_that_are_there(
     cli: Cli, without_pybullet: dict[str, str]
 ) -> None:

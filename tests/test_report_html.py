@@ -177,6 +177,7 @@ def hostile(text: str) -> str:
     return f"{text}</script><img src=x onerror=window.hit=1>\"'&{{{{data}}}}\u202e\ud800"
 
 
+@pytest.mark.slow
 def test_names_that_are_markup_do_nothing(hold: Made, tmp_path: Path) -> None:
     def spoiled(trace: Trace) -> Trace:
         header = trace.header
@@ -457,6 +458,7 @@ def texts(blocks: list[Block]) -> list[str]:
     return said
 
 
+@pytest.mark.slow
 def test_names_in_a_list_have_no_comma(hold: Made, page: Path) -> None:
     with browser() as tab:
         open_page(tab, page)
@@ -546,6 +548,7 @@ def test_names_at_the_end_of_a_chart_do_not_cover_each_other() -> None:
     assert max(places) <= 100.0
 
 
+@pytest.mark.slow
 def test_ticks_have_their_labels_under_them(page: Path) -> None:
     with browser() as tab:
         open_page(tab, page)
@@ -973,6 +976,7 @@ def test_it_prints_with_all_sections_and_the_picture(page: Path) -> None:
         tab.nothing_wrong()
 
 
+@pytest.mark.slow
 def test_it_says_so_without_webgl(page: Path, tmp_path: Path) -> None:
     with browser() as tab:
         tab.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
