@@ -26,6 +26,18 @@ SHARED = ROOT.parent / "shared"
 REQUIRED = set(filter(None, os.environ.get("STATEMACHINE_REQUIRE", "").split(",")))
 
 
+def in_its_own_python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Code that was run in a folder by a Python of its own, which has this checkout."""
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        check=False,
+    )
+
+
 def need_engine(name: str) -> None:
     """Skip without an engine, or fail where STATEMACHINE_REQUIRE names it."""
     try:

@@ -39,7 +39,7 @@ from statemachine.sweep.rows import MEASURED, RowWriter, counted, remove_failed
 from statemachine.sweep.worker import run_batch
 from statemachine.traces import record_scenario
 
-from .conftest import ROOT, need_engine
+from .conftest import ROOT, in_its_own_python, need_engine
 
 pytest.importorskip("pyarrow")
 pytest.importorskip("joblib")
@@ -358,14 +358,7 @@ def test_two_drivers_are_refused(tmp_path: Path) -> None:
             "from pathlib import Path; from statemachine.sweep.folder import locked\n"
             f"with locked(Path({str(tmp_path)!r})): pass"
         )
-        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-        done = subprocess.run(
-            [sys.executable, "-c", code],
-            capture_output=True,
-            text=True,
-            env=environment,
-            check=False,
-        )
+        done = in_its_own_python(code, tmp_path)
         assert "another sweep runs in" in done.stderr
     with locked(tmp_path):  # it was let go
         pass
@@ -468,14 +461,7 @@ def test_a_full_disk_is_one_line_and_nothing_is_half_written(tmp_path: Path) -> 
         "sys.exit(main(['sweep', 'hold', '--vary', 'damping=1:2:8', '--backend', 'mujoco',"
         " '--seconds', '0.05', '--jobs', '1', '--out', 'full']))"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        check=False,
-    )
+    done = in_its_own_python(code, tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.count("\n") == 1, done.stderr
     assert re.search(r"full/cells/backend=mujoco/part-\w+\.parquet: File too large", done.stderr)

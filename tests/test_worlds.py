@@ -5,8 +5,6 @@ from __future__ import annotations
 import multiprocessing
 import os
 import pickle
-import subprocess
-import sys
 import threading
 import warnings
 from collections.abc import Iterator
@@ -32,7 +30,7 @@ from statemachine.errors import (
 )
 from statemachine.interface.worlds import WRITABLE
 
-from .conftest import ROOT, SHARED, need_engine
+from .conftest import SHARED, in_its_own_python, need_engine
 
 N = 4
 # Activation, mocap, an equality, a tendon, a ball joint, two substeps of a free body.
@@ -609,14 +607,7 @@ for _ in range(5):
     many.reset(worlds)
 worlds.close()
 """
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        check=False,
-    )
+    done = in_its_own_python(code, tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert not list(tmp_path.iterdir())
 

@@ -15,7 +15,7 @@ from ..perturbed import EXACT, Uncertainty, rerun_of
 from ..stages import FOUND
 from .factors import FACTORS, OFF_ORDER, PARITY_ORDER, Factor
 from .gap import Deviation
-from .results import ROUNDING, Attribution, Detection, FactorTrial, Way, telling
+from .results import ROUNDING, Attribution, Detection, FactorTrial, Way, bounds_of, telling
 from .runs import Runs
 from .sides import Change, Changes, same, side_of
 
@@ -80,12 +80,11 @@ def attribute(
         raise EndedEarlyError(
             f"as they come, a side does not reach the end: {runs.ended}", ended=runs.ended
         )
-    floors = {} if uncertain is None else runs.floor(uncertain)
-    bounds = {name: ROUNDING[unit] for name, unit in names.items()}
-    bounds |= {name: max(bounds[name], each.worst) for name, each in floors.items()}
+    perturbed = {} if uncertain is None else runs.floor(uncertain)
+    floors = {name: each.worst for name, each in perturbed.items()}
+    bounds = bounds_of(names, floors)
     gaps = {name: each.worst for name, each in first.items()}
     runs.quantity = quantity or telling(gaps, bounds, runs.natural)
-    floor = floors[runs.quantity].worst if floors else 0.0
     nothing = gaps[runs.quantity] <= bounds[runs.quantity]
     ladder, parity = ((), ({}, {})) if nothing else _ladder(runs)
     alone = () if nothing else _alone(runs, *parity)
@@ -108,7 +107,7 @@ def attribute(
         ladder=ladder,
         left=next((worst for worst in reversed(steps) if worst is not None), runs.first),
         negligible=ROUNDING[names[runs.quantity]],
-        floor=floor,
+        floor=floors.get(runs.quantity, 0.0),
         extent=runs.extent({}),
         touch=runs.touch,
         moments=len(runs.ruler.time),

@@ -23,7 +23,7 @@ from .between_engines import (
 )
 from .causes import Cause, causes, differences_of
 from .gap import Deviation
-from .results import ROUNDING, UNEXPLAINED, Attribution, telling
+from .results import ROUNDING, UNEXPLAINED, Attribution, bounds_of, telling
 from .shapley import Method, Shares, shapley
 from .trials import Measure, Trials
 
@@ -196,9 +196,9 @@ def explain(
             f"{scenario.name} does not command the same twice, and so no gap has a cause; give "
             "what it draws a seed, and let it keep nothing from one run to the next"
         )
-    floors = {} if uncertain is None else trials.floor(uncertain)
-    bounds = {name: ROUNDING[unit] for name, unit in units.items()}
-    bounds |= {name: max(bounds[name], _figure(each, measure)) for name, each in floors.items()}
+    perturbed = {} if uncertain is None else trials.floor(uncertain)
+    floors = {name: _figure(each, measure) for name, each in perturbed.items()}
+    bounds = bounds_of(units, floors)
     if quantity is None:
         gaps = {name: _figure(each, measure) for name, each in first.items()}
         tolerances = {name: trials.ruler.tolerance(name) for name in units}
@@ -255,7 +255,7 @@ def explain(
         located=parts[1],
         unexplained=parts[2],
         negligible=ROUNDING[units[quantity]],
-        floor=_figure(floors[quantity], measure) if floors else 0.0,
+        floor=floors.get(quantity, 0.0),
         impossible=found.impossible,
         unmatched=matched.only,
         notes=(*matched.notes, *trials.notes()),

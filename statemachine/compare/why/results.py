@@ -15,6 +15,16 @@ _NOTHING: Mapping[str, float] = {}
 UNEXPLAINED = 0.05  # of the gap: where more stays, the answer is no
 
 
+def bounds_of(units: Mapping[str, str], floors: Mapping[str, float]) -> dict[str, float]:
+    """What rounding and chaos make of a run, by quantity: a gap that is no larger says nothing.
+
+    Args:
+        units: Of the quantities.
+        floors: The chaos floor of each; empty where it is not known.
+    """
+    return {name: max(ROUNDING[unit], floors.get(name, 0.0)) for name, unit in units.items()}
+
+
 def telling(
     gaps: Mapping[str, float],
     bounds: Mapping[str, float],

@@ -19,6 +19,7 @@ from ...engines.model_differences import Edit, ModelDifference
 from ...errors import DivergedError, EngineError, ModelError, UnsupportedError
 from ...installed import DEFAULT
 from ...interface import Array, Model
+from ...processes import checked_jobs
 from ...scenarios import Controller, Scenario
 from ...traces import Trace
 from ..alike import beginning_with, retold
@@ -79,7 +80,7 @@ class Trials:
         ran: Callable[[], None],
         jobs: int | None = None,
     ) -> None:
-        forks_for(1, 0.0, jobs)  # refuses what is no number of them
+        checked_jobs(jobs)  # refuses what is no number of them
         self._models, self._matched, self._jobs = (one, two), matched, jobs
         self.seconds, self.seed, self._ran = seconds, seed, ran
         self._scenario = scenario
