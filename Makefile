@@ -4,6 +4,7 @@
 # make check        lint, format, layers and types only
 # make bench        the speed budget, as ratios
 # make fuzz         odd input for the parts that meet strangers; ends with what was tried
+# make mutate       300 faults in the source: which does no test notice? (an hour)
 # make help         all targets
 
 VENV   ?= .venv
@@ -15,7 +16,7 @@ PYTHON ?= $(shell for p in python3.11 python3 python3.12 python3.13 python3.14; 
 	$$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null \
 	&& { echo $$p; break; }; done)
 
-.PHONY: help lesson test test-slow test-pythons test-newest check format hooks bench fuzz picture extras report robots urdf traces docs notebook student-kit autograder clean
+.PHONY: help lesson test test-slow test-pythons test-newest check format hooks bench fuzz picture extras mutate reference report robots urdf traces docs notebook student-kit autograder clean
 
 help:
 	@sed -n 's/^# make /  make /p' Makefile
@@ -60,6 +61,7 @@ check: $(VENV)/test.stamp
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/lint-imports
+	@$(BIN)/python -m reference.size
 	@$(BIN)/pyright --pythonpath $(BIN)/python
 	@$(BIN)/check-jsonschema -q --builtin-schema vendor.github-workflows .github/workflows/*.yml
 	@$(BIN)/check-jsonschema -q --builtin-schema vendor.github-issue-forms .github/ISSUE_TEMPLATE/[!c]*.yml
@@ -79,6 +81,14 @@ bench: $(VENV)/run.stamp
 
 fuzz: $(VENV)/test.stamp
 	@$(BIN)/python -m fuzz --seed $(SEED) --seconds $(SECONDS)
+
+mutate: $(VENV)/test.stamp
+	@$(PIP) $(CONSTRAINTS) -e '.[mutate]'
+	@$(BIN)/python -m mutants
+
+# make reference    which figure is another than before the house became smaller?
+reference: $(VENV)/test.stamp
+	@$(BIN)/python -m reference compare
 
 # make picture      render models/so101/so101.png anew (needs EGL or OSMesa)
 picture: $(VENV)/test.stamp

@@ -1,0 +1,105 @@
+"""What is asked: the commands of each group, on models, on pairs of files, and by the interface."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+_ROBOTS = ROOT.parent / "shared" / "robots" / "models"
+
+# The arm's three scenes and its URDF; public robots are read from beside the checkout.
+MODELS = {
+    "arm": "so101",
+    "arm on a floor": "so101/scene",
+    "arm with a box": "so101/scene_box",
+    "arm's URDF": ROOT / "models" / "so101" / "so101.urdf",
+    "inverted pendulum": _ROBOTS / "gym/gymnasium/envs/mujoco/assets/inverted_pendulum.xml",
+    "reacher": _ROBOTS / "gym/gymnasium/envs/mujoco/assets/reacher.xml",
+    "hopper": _ROBOTS / "gym/gymnasium/envs/mujoco/assets/hopper.xml",
+    "floating ant": _ROBOTS / "gym/gymnasium/envs/mujoco/assets/ant.xml",
+    "cheetah": _ROBOTS / "dmc/dm_control/suite/cheetah.xml",
+    "fixed ant": _ROBOTS / "dmc/dm_control/third_party/ant/ant.xml",
+    "manipulator": _ROBOTS / "dmc/dm_control/suite/manipulator.xml",
+    "Newton's cradle": _ROBOTS / "mj/model/replicate/newton_cradle.xml",
+}
+PAIRS = tomllib.loads((HERE / "pairs.toml").read_text("utf-8"))
+_LESSONS = (
+    *("objects", "state", "write", "forward", "hold", "gravity", "reset", "replay", "time"),
+    *("speed", "questions"),
+)
+_AUDITED = {"arm with a box", "inverted pendulum", "fixed ant", "Newton's cradle"}
+_EXPERIMENTS = ("hold", "gravity", "droop", "fall", "box", "waves")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A command.
+
+    Attributes:
+        name: What is asked, as in the key of its figures.
+        kind: Section of words.toml for its output; "" for what prints no JSON.
+        arguments: Of `statemachine`.
+        writes: A trace that it writes, whose arrays are figures too.
+    """
+
+    name: str
+    kind: str
+    arguments: tuple[str, ...]
+    writes: str = ""
+
+
+def of_model(model: str, path: str) -> Iterator[Case]:
+    """Every question about a model, on both engines."""
+    both = ("--model", path, "--backend", "all")
+    for name in _LESSONS:
+        case = f"lesson {name}"
+        yield Case(case, case, ("lesson", name, *both, "--json"))
+        if name not in {"speed", "time"}:
+            yield Case(f"{case}, marks", "", ("lesson", name, *both, "--no-questions"))
+    for name in _EXPERIMENTS:
+        command = ("compare", name, "--model", path, "--json")
+        yield Case(f"compare {name}", "compare", command)
+    compare = ("compare", "hold", "--model", path, "--json")
+    yield Case("what explains hold", "why", (*compare, "--why"))
+    yield Case("one step of hold", "onestep", (*compare, "--one-step"))
+    yield Case("convergence of hold", "converge", (*compare, "--converge"))
+    models = ("compare", "--models", path, "--backends", "mujoco", "pybullet", "--json")
+    yield Case("what the engines make of it", "models", models)
+    yield Case("fingertip", "fingertip", ("fingertip", *both, "--poses", "20", "--json"))
+    if model in _AUDITED:
+        yield Case("audit", "audit", ("audit", *both, "--steps", "10", "--json"))
+    file = path if Path(path).exists() else str(_shipped(path))
+    yield Case("robots", "robots", ("robots", file, "--quick", "--json"))
+    for engine in ("mujoco", "pybullet"):
+        for name in ("waves", "gravity"):
+            out = f"{name}-{engine}.npz"
+            run = ("trace", "record", name, "--model", path, "--backend", engine, "-o", out)
+            yield Case(f"trace of {name}, {engine}", "", run, out)
+
+
+def _shipped(name: str) -> Path:
+    return ROOT / "models" / (f"{name}.xml" if "/" in name else f"{name}/{name}.xml")
+
+
+def of_pair(name: str, folder: Path) -> Iterator[Case]:
+    """What two files differ in, how far apart they run, and why."""
+    pair = PAIRS[name]
+    source = HERE / "pairs" / pair["file"]
+    other = HERE / "pairs" / pair.get("other", pair["file"])
+    text = other.read_text("utf-8")
+    for before, after in pair["edits"]:
+        if before not in text:
+            raise ValueError(f"{name}: {other.name} has no {before}")
+        text = text.replace(before, after)
+    changed = folder / f"right{other.suffix}"
+    changed.write_text(text, "utf-8")
+    left, *told_left = f"{source}{pair.get('left', '')}".split()
+    right, *told_right = f"{changed}{pair.get('right', '')}".split()
+    yield Case("files", "models", ("compare", "--models", str(source), str(changed), "--json"))
+    sides = ("compare", pair["of"], left, *told_left, right, *told_right, "--json")
+    yield Case("runs", "compare", sides)
+    yield Case("causes", "why", (*sides, "--why", "--jobs", "1"))

@@ -1,0 +1,144 @@
+"""Groups of figures: how each is computed, where it is kept, what has changed in it."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import platform
+import tempfile
+from collections.abc import Callable, Iterable
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from statemachine.cli import main as statemachine
+
+from . import questions
+from .cases import HERE, MODELS, PAIRS, Case, of_model, of_pair
+from .figures import Figures, curve, differences, of_output
+
+KEPT = HERE / "figures"
+# In `make test`: about half a minute.
+QUICK = ("engines", "inverted pendulum", "pair damping", "pair contact, radius", "worlds")
+_BACKENDS = ("mujoco", "pybullet")
+
+
+def machine() -> dict[str, str]:
+    """Wheels and kind of processor, on which the figures are the same to the bit."""
+    wheels = ("mujoco", "pybullet", "pin", "numpy", "scipy", "pyarrow")
+    features = np._core._multiarray_umath.__cpu_features__  # pyright: ignore[reportAttributeAccessIssue]
+    vectors = [name for name in ("AVX2", "AVX512F", "AVX512_SPR", "ASIMD") if features.get(name)]
+    kind = f"{platform.system()} {platform.machine()} {' '.join(vectors)}"
+    return {"processor": kind, "python": platform.python_version()[:4]} | {
+        name: version(name) for name in wheels
+    }
+
+
+def _of(case: Case) -> Figures:
+    """The figures of a command, with its exit code."""
+    shown = io.StringIO()
+    with contextlib.redirect_stdout(shown), contextlib.redirect_stderr(io.StringIO()):
+        try:
+            code = statemachine(list(case.arguments))
+        except SystemExit as end:
+            code = end.code
+    figures: Figures = {"exit code": code}
+    if code != 2:
+        figures |= of_output(shown.getvalue(), case.kind)
+    if case.writes and Path(case.writes).exists():
+        with np.load(case.writes) as arrays:
+            figures |= {name: curve(arrays[name]) for name in arrays.files if name != "header"}
+    return figures
+
+
+def _commands(cases: Iterable[Case]) -> dict[str, Figures]:
+    return {case.name: _of(case) for case in cases}
+
+
+def _engines() -> dict[str, Figures]:
+    """Every convention, the contract, and a Data of each engine."""
+    asked = _commands([Case("conventions", "conventions", ("conventions", "--json"))])
+    for backend in _BACKENDS:
+        asked[f"contract, {backend}"] = questions.contract(backend)
+        asked[f"Data, {backend}"] = questions.one_data(backend)
+    return asked
+
+
+def _worlds() -> dict[str, Figures]:
+    return {backend: questions.many_worlds(backend) for backend in _BACKENDS}
+
+
+def _sweep() -> dict[str, Figures]:
+    """A small sweep and what it says."""
+    vary = ("--vary", "timestep=0.002,0.005", "--vary", "damping=0.5x:2x:3", "--seeds", "2")
+    sweep = ("sweep", "hold", *vary, "--seconds", "0.5", "--out", "cells", "--jobs", "1", "--json")
+    report = ("sweep", "--report", "cells", "--jobs", "1", "--json")
+    return _commands([Case("sweep", "sweep", sweep), Case("report", "report", report)])
+
+
+def _students() -> dict[str, Figures]:
+    """What the judge says of each attempt, and of the solutions."""
+    files = dict(questions.student_files(Path.cwd()))
+    files["the solution"] = HERE.parent / "teaching" / "solutions" / "step_loop.py"
+    return _commands(
+        Case(name, "check", ("check", str(file), "--json")) for name, file in files.items()
+    )
+
+
+def _pair(name: str) -> dict[str, Figures]:
+    return _commands(of_pair(name, Path.cwd()))
+
+
+def _model(name: str) -> dict[str, Figures]:
+    return _commands(of_model(name, str(MODELS[name])))
+
+
+GROUPS: dict[str, Callable[[], dict[str, Figures]]] = {
+    "engines": _engines,
+    "worlds": _worlds,
+    "sweep": _sweep,
+    "students": _students,
+    **{f"pair {name}": partial(_pair, name) for name in PAIRS},
+    **{name: partial(_model, name) for name in MODELS},
+}
+
+
+def absent(group: str) -> bool:
+    """Whether a group is of a public model that is not beside this checkout."""
+    path = MODELS.get(group)
+    return isinstance(path, Path) and not path.exists()
+
+
+def figures(group: str) -> dict[str, Figures]:
+    """The figures of a group, computed now in an empty folder."""
+    here = Path.cwd()
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        try:
+            return json.loads(json.dumps(GROUPS[group]()))
+        finally:
+            os.chdir(here)
+
+
+def kept(group: str) -> Path:
+    """Where the figures of a group are kept."""
+    return KEPT / f"{group.replace(',', '').replace(' ', '_')}.json"
+
+
+def changes(group: str, now: dict[str, Figures]) -> list[str]:
+    """What has changed in a group since its figures were written."""
+    then = json.loads(kept(group).read_text("utf-8"))
+    return differences(then["figures"], now, exact=then["made on"] == machine())
+
+
+def write(group: str, now: dict[str, Figures]) -> list[str]:
+    KEPT.mkdir(exist_ok=True)
+    text = json.dumps({"made on": machine(), "figures": now}, ensure_ascii=False, indent=0)
+    place = kept(group)
+    place.with_suffix(".new").write_text(text + "\n", "utf-8")
+    place.with_suffix(".new").replace(place)
+    return []

@@ -1,0 +1,87 @@
+"""What is asked by Python: worlds, states, student files, and the checks of the contract."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+import statemachine as sm
+from statemachine import conformance
+from statemachine.worlds import get_state, make_worlds, record, reset, set_state, step
+
+from .figures import Figures, curve
+
+
+def contract(backend: str) -> Figures:
+    """What became of each check of the contract."""
+    return {outcome.check: str(outcome.result) for outcome in conformance.run(backend)}
+
+
+def one_data(backend: str) -> Figures:
+    """A Data with a box in its jaws: stepped, saved, restored and read."""
+    model = sm.load("so101/scene_box", backend=backend)
+    with sm.make_data(model) as data:
+        sm.reset(model, data, keyframe=0)
+        data.ctrl[:2] += (0.4, -0.2)
+        sm.step(model, data, 100)
+        saved = sm.get_state(model, data)
+        figures: Figures = {"qpos after 100 steps": data.qpos.tolist()}
+        futures = []
+        for _ in range(2):
+            sm.set_state(model, data, saved)
+            sm.step(model, data, 50)
+            futures.append(np.concatenate([data.qpos, data.qvel]))
+        figures["two restores have the same future"] = bool(np.array_equal(*futures))
+        sm.forward(model, data)
+        names = ["xpos", "xquat", "site_xpos", "site_xmat", "qacc", "qfrc_bias", "qfrc_actuator"]
+        names += ["qfrc_passive", "qfrc_constraint", "qfrc_contact", "qfrc_friction", "qfrc_limit"]
+        figures |= {name: curve(getattr(data, name)) for name in names}
+        figures["contacts"] = len(data.contacts)
+        figures["time [s]"] = data.time
+    return figures
+
+
+def many_worlds(backend: str) -> Figures:
+    """Eight worlds of one Model, each told another command."""
+    model = sm.load("so101/scene_box", backend=backend)
+    with make_worlds(model, 8, workers=2) as worlds:
+        reset(worlds, keyframe=0)
+        worlds.ctrl[:, 0] = np.linspace(-0.5, 0.5, 8)
+        step(worlds, 60)
+        figures = {"qpos after 60 steps": curve(worlds.qpos), "tips": curve(worlds.site_xpos)}
+        set_state(worlds, 5, get_state(worlds, 3))
+        rows = record(worlds, 20, ("qpos", "time"), every=5)
+        figures |= {f"recorded {name}": curve(array) for name, array in rows.items()}
+        reset(worlds, ids=[0, 2])
+        step(worlds, 5, ids=[0, 1])
+        figures["time [s]"] = worlds.time.tolist()
+    return figures
+
+
+_STUB = """
+WRONG, RIGHT = {}, {}
+def wrong(solves, *_, **__): return lambda f: WRONG.setdefault((solves, f.__name__), f)
+def right(solves, *_, **__): return lambda f: RIGHT.setdefault((solves, f.__name__), f)
+"""
+
+
+def student_files(folder: Path) -> Iterator[tuple[str, Path]]:
+    """Each attempt of tests/exercises in a file of its own, as a student hands it in."""
+    exercises = importlib.import_module("tests.exercises")
+    for name in ("gravity", "state", "forward", "replay"):
+        module = importlib.import_module(f"tests.exercises.{name}")
+        text = re.sub(r"^from \. import .*$", _STUB.replace("\\", r"\\"), inspect.getsource(module),
+                      flags=re.MULTILINE)  # fmt: skip
+        for attempt in (*exercises.WRONG, *exercises.RIGHT):
+            if attempt.function.__module__ == module.__name__:
+                solved, function = attempt.solves, attempt.function.__name__
+                file = folder / f"{solved} {function}.py"
+                found = f"({solved!r}, {function!r})"
+                line = f"demo_{solved} = {{**WRONG, **RIGHT}}[{found}]\n"
+                file.write_text(f"{text}\n\n{line}", "utf-8")
+                yield file.stem, file
