@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import threading
 from collections import defaultdict
 from pathlib import Path
 
@@ -24,6 +25,9 @@ def _name(context: str) -> None:
 
 
 def pytest_configure() -> None:
+    if measuring := Coverage.current():
+        # A test that interrupts a thread may do so where coverage.py holds its lock.
+        measuring._collector.data_lock = threading.RLock()  # pyright: ignore
     os.register_at_fork(after_in_child=lambda: _name(os.environ.get("PYTEST_CURRENT_TEST", "")))
 
 

@@ -84,8 +84,8 @@ class Covered:
         found: set[str] = set()
         for context in {context for line in lines for context in by_line.get(line, [])}:
             test, _, stage = context.rpartition(" (")
-            is_fixture = stage == "setup)" or test not in self._seconds
-            found.update(self._of_file[test.partition("::")[0]] if is_fixture else [test])
+            file = test.partition("::")[0]
+            found.update(self._of_file[file] if stage == "setup)" else [test])
         rooms = set(site.mutant.file.removesuffix(".py").replace("/", "_").split("_")[1:])
 
         def order(test: str) -> tuple[bool, float]:
