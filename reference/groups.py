@@ -72,6 +72,10 @@ def _worlds() -> dict[str, Figures]:
     return {backend: questions.many_worlds(backend) for backend in _BACKENDS}
 
 
+def _tasks() -> dict[str, Figures]:
+    return {backend: questions.tasks(backend) for backend in _BACKENDS}
+
+
 def _sweep() -> dict[str, Figures]:
     """A small sweep and what it says."""
     vary = ("--vary", "timestep=0.002,0.005", "--vary", "damping=0.5x:2x:3", "--seeds", "2")
@@ -100,6 +104,7 @@ def _model(name: str) -> dict[str, Figures]:
 GROUPS: dict[str, Callable[[], dict[str, Figures]]] = {
     "engines": _engines,
     "worlds": _worlds,
+    "tasks": _tasks,
     "sweep": _sweep,
     "students": _students,
     **{f"pair {name}": partial(_pair, name) for name in PAIRS},
@@ -137,7 +142,16 @@ def changes(group: str, now: dict[str, Figures]) -> list[str]:
 
 def write(group: str, now: dict[str, Figures]) -> list[str]:
     KEPT.mkdir(exist_ok=True)
-    text = json.dumps({"made on": machine(), "figures": now}, ensure_ascii=False, indent=0)
+    cases = [
+        f"{json.dumps(case, ensure_ascii=False)}: {{\n"
+        + ",\n".join(
+            f" {json.dumps(key, ensure_ascii=False)}: {json.dumps(value, ensure_ascii=False)}"
+            for key, value in found.items()
+        )
+        + "\n}"
+        for case, found in now.items()
+    ]
+    text = f'{{"made on": {json.dumps(machine())},\n"figures": {{\n' + ",\n".join(cases) + "\n}}"
     place = kept(group)
     place.with_suffix(".new").write_text(text + "\n", "utf-8")
     place.with_suffix(".new").replace(place)

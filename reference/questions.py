@@ -7,11 +7,14 @@ import inspect
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import gymnasium
 import numpy as np
 
 import statemachine as sm
 from statemachine import conformance
+from statemachine.gym.policies import play, random_policy, scripted_policy
 from statemachine.worlds import get_state, make_worlds, record, reset, set_state, step
 
 from .figures import Figures, curve
@@ -60,6 +63,20 @@ def many_worlds(backend: str) -> Figures:
         reset(worlds, ids=[0, 2])
         step(worlds, 5, ids=[0, 1])
         figures["time [s]"] = worlds.time.tolist()
+    return figures
+
+
+def tasks(backend: str) -> Figures:
+    """Four episodes of each task at once, by chance and by the scripted policy."""
+    figures: Figures = {}
+    for task in ("Reach", "HeldBox"):
+        envs: Any = gymnasium.make_vec(f"statemachine/{task}-v0", num_envs=4, backend=backend)
+        policies = {"random": random_policy(envs.task, 0), "scripted": scripted_policy(envs.task)}
+        for policy, actions in policies.items():
+            run = play(envs, actions, seed=0)
+            for name in ("distance", "steps", "returned"):
+                figures[f"{task} | {policy} | {name}"] = curve(getattr(run, name))
+        envs.close()
     return figures
 
 
