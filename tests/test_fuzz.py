@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from fuzz import command_lines, kills, models, traces
+import statemachine as sm
+from fuzz import command_lines, kills, mjb, models, traces
 from fuzz.__main__ import run_apart, targets
 from statemachine.traces import parquet_files
 
@@ -43,6 +44,14 @@ def test_a_digest_that_is_not_looked_at_is_found(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(traces, "turns", lambda _seconds: range(40))
     monkeypatch.setattr(traces, "_CHANGES", [traces._flip] * 3)
     assert any("other numbers" in line for line in traces.run(1, 0.0).failures)
+
+
+def test_a_binary_model_that_is_not_refused_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = sm.load
+    monkeypatch.setenv("XDG_CACHE_HOME", "")  # which the target sets
+    monkeypatch.setattr(sm, "load", lambda file: plain(file) if file.suffix == ".xml" else None)
+    monkeypatch.setattr(mjb, "turns", lambda _seconds: range(1, 4))
+    assert len(mjb.run(1, 0.0).failures) == 3
 
 
 BROKEN_PARSER = """

@@ -28,9 +28,9 @@ from ..errors import ModelError
 from ..interface import Array, JointType, Keyframe
 from ..interface.checks import HUGE, TINY
 from ..models import mesh_file
-from ._delays import delay_steps, with_room
+from ._delays import delay_steps, from_binary, with_room
 from ._edits import edited, servos, step_length
-from ._mjb import check_binary
+from .binary import is_binary, read_binary
 
 __all__ = [
     "check_numbers",
@@ -82,14 +82,14 @@ def compile_file(path: str | os.PathLike[str]) -> mujoco.MjModel:
 
     Raises:
         ModelError: MuJoCo cannot compile the file, with its reason; or it compiles one
-            with a number that no step can be taken with.
+            with a number that no step can be taken with; or the file is binary, and nobody
+            said that it is to be trusted (see `binary`).
     """
     text = os.fspath(path)
-    if text.lower().endswith(".mjb"):
-        check_binary(text)
+    binary = read_binary(text) if is_binary(text) else None
     try:
-        if text.lower().endswith(".mjb"):
-            raw = mujoco.MjModel.from_binary_path(text)
+        if binary is not None:
+            raw = from_binary(binary)
         else:
             raw = _with_packages(Path(text)) or mujoco.MjModel.from_xml_path(text)
     except (ValueError, MemoryError, mujoco.FatalError) as error:
