@@ -111,11 +111,7 @@ def run_sweep(
             known = {cell: kind for cell, kind in known.items() if kind == DONE}
         total = len(ready)
         missing = total - len(known)
-        writer = RowWriter(
-            folder,
-            ready.design.factors,
-            {name: manifest[name] for name in ("request", "files", "function", "versions")},
-        )
+        writer = RowWriter(folder, ready.design.factors, ready.provenance())
         kinds = Counter(known.values())
         ran = 0
         batches = _batches(ready, known, jobs if client is None else _workers(client))
