@@ -623,6 +623,26 @@ def test_a_driver_that_is_killed_goes_on(policy: str, tmp_path: Path, start: Sta
     assert {cell.id for cell in prepared(sweep).cells("mujoco")} == set(cells)
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="looks at /dev/shm")
+def test_a_sweep_that_is_killed_with_its_workers_leaves_nothing_for_long(
+    policy: str, tmp_path: Path, start: Start
+) -> None:
+    words = ["sweep", f"{policy}:slow", "--vary", "gain=1:60:60", "--model", "so101"]
+    words += ["--seconds", "0.1", "--backend", "mujoco", "--jobs", "2", "--out", "out"]
+    driver = start(*words)
+    _until(lambda: list((tmp_path / "out").glob("cells/*/part-*.parquet")))
+    shared = {path.name for path in Path("/dev/shm").glob(f"*{driver.pid}*")}
+    assert not [name for name in shared if name.startswith("joblib")]
+    os.killpg(driver.pid, signal.SIGKILL)
+    driver.communicate()
+    large = tmp_path / "out" / ".joblib" / f"joblib_memmapping_folder_{driver.pid}_0"
+    large.mkdir(parents=True)
+    assert start(*words).wait() == 0
+    assert not large.exists()
+    assert not list(Path("/dev/shm").glob(f"*{driver.pid}*"))
+
+
 STOPPED = "statemachine: stopped; out has what was done. Type the same to go on\n"
 
 
