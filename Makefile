@@ -80,7 +80,7 @@ bench: $(VENV)/run.stamp
 	@$(BIN)/python -m benchmarks
 
 fuzz: $(VENV)/test.stamp
-	@$(BIN)/python -m fuzz --seed $(SEED) --seconds $(SECONDS)
+	@$(BIN)/python -m fuzz --seed $(SEED) --times $(TIMES)
 
 mutate: $(VENV)/test.stamp
 	@$(PIP) $(CONSTRAINTS) -e '.[mutate]'
@@ -137,9 +137,9 @@ clean:
 	rm -rf .venv .venv-newest .venv-3.* build dist docs/_build docs/path docs/reference docs/comparisons .pytest_cache .ruff_cache .hypothesis
 
 CONSTRAINTS ?= -c constraints.txt
-# Of make fuzz: what is drawn, and how long each target draws.
+# Of make fuzz: what is drawn, and how many times as much.
 SEED    ?= 0
-SECONDS ?= 60
+TIMES   ?= 1
 
 $(VENV)/run.stamp: pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "no Python 3.11 or newer with venv and ensurepip here" \

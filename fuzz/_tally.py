@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,14 +19,6 @@ class Tally:
 
     tried: int = 0
     failures: list[str] = field(default_factory=list)
-
-
-def turns(seconds: float) -> Iterator[int]:
-    """0, 1, 2 … until the time is over; at least one."""
-    end, turn = time.monotonic() + seconds, 0
-    while turn == 0 or time.monotonic() < end:
-        yield turn
-        turn += 1
 
 
 def limit_memory() -> None:

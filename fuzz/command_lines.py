@@ -6,8 +6,9 @@ import random
 import tempfile
 from pathlib import Path
 
-from ._tally import Tally, command, run_bounded, turns
+from ._tally import Tally, command, run_bounded
 
+TRIES = 150
 # Well; the result says no; bad input; an engine is missing; nowhere to write.
 _CODES = (0, 1, 2, 3, 74)
 _NUMBERS = [
@@ -43,13 +44,13 @@ _BASES = [
 ]
 
 
-def run(seed: int, seconds: float) -> Tally:
+def run(seed: int, tries: int) -> Tally:
     """Change one word of commands that are well."""
     draw, tally = random.Random(seed), Tally()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         _furnish(folder)
-        for _ in turns(seconds):
+        for _ in range(tries):
             words = odd(draw)
             tally.tried += 1
             problem = examine(command(*words), folder)

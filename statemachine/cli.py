@@ -100,7 +100,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.showwarning = _show_warning
     try:
         options = _options(list(sys.argv[1:] if arguments is None else arguments))
-        code = options.run(options)
+        code = _run(options)
         sys.stdout.flush()
         return code
     except MissingEngineError as error:
@@ -145,6 +145,14 @@ def _options(words: list[str]) -> argparse.Namespace:
     if getattr(options, "run", None) is None:
         options.run = lesson.overview
     return options
+
+
+def _run(options: argparse.Namespace) -> int:
+    if getattr(options, "trust_binary", False):
+        from .backends.binary import TRUST
+
+        os.environ[TRUST] = "1"  # which workers inherit
+    return options.run(options)
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *where: Any) -> None:

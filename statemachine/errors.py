@@ -11,12 +11,22 @@ import difflib
 from collections.abc import Iterable
 from typing import Any
 
+_LONGEST = 2000  # characters of a message
+
+
+def cut(message: str) -> str:
+    """A message, without its middle where names in a file made it too long to be read."""
+    if len(message) <= _LONGEST:
+        return message
+    half = (_LONGEST - 5) // 2
+    return f"{message[:half]} […] {message[-half:]}"
+
 
 class StateMachineError(Exception):
     """Base of every error that this library raises on purpose."""
 
     def __init__(self, message: str, **facts: Any) -> None:
-        super().__init__(message)
+        super().__init__(cut(message))
         # BaseException pickles (class, args, __dict__): facts travel with it.
         self.__dict__.update(facts)
 
@@ -128,6 +138,9 @@ class StaleReadError(StateMachineError, RuntimeError):
 
 class EngineWarning(UserWarning):
     """A warning that an engine gave, brought up into Python."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(cut(message))
 
 
 class DivergedWarning(UserWarning):

@@ -218,6 +218,11 @@ class RobotPicture:
     near: str = ""
 
 
+def _one_line(cell: str) -> str:
+    """A cell; the name of a file or a joint may have line breaks."""
+    return "?".join(cell.splitlines()) if len(f"{cell}.".splitlines()) > 1 else cell
+
+
 @dataclass(frozen=True)
 class Table:
     """Rows of cells, already formatted.
@@ -237,6 +242,10 @@ class Table:
     words: frozenset[int] = frozenset({0})
     emphasis: frozenset[int] = frozenset()
     wide: frozenset[int] = frozenset()
+
+    def __post_init__(self) -> None:
+        rows = [[_one_line(cell) for cell in row] for row in self.rows]
+        object.__setattr__(self, "rows", rows)
 
     def narrow(self) -> Table:
         """The table without its wide columns."""

@@ -66,6 +66,16 @@ def test_markdown_takes_nothing_for_its_own() -> None:
     assert "(nothing)" in printed
 
 
+def test_a_line_break_in_a_name_breaks_no_table(capsys: pytest.CaptureFixture[str]) -> None:
+    names = ["a\nb.xml", "a\r\nb.xml", "a\u2028b.xml", "\na?b.xml"]
+    table = Table(("file", "n"), [(name, "1") for name in names])
+    lines = md.block_as_markdown(table, lambda _: "").splitlines()
+    assert [line.count("|") for line in lines] == [3] * 6
+    terminal.show(Page("t", "o", [table]))
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()[-5:-1]]
+    assert rows == [["a?b.xml", "1"]] * 3 + [["?a?b.xml", "1"]]
+
+
 def test_what_follows_a_heading_is_folded_under_its_words() -> None:
     asked = Question("Which?", ("x", "y"), 1, "So it is.")
     page = Page("t", "o", [asked, Printed({"a": "1\n"}), Text("p"), Heading("More*"), Text("q")])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import subprocess
 import sys
@@ -10,11 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from fuzz import command_lines, kills, models, traces
+import statemachine as sm
+from fuzz import command_lines, kills, mjb, models, threads, traces
 from fuzz.__main__ import run_apart, targets
+from statemachine.errors import BusyDataError
 from statemachine.traces import parquet_files
 
-from .conftest import ROOT
+from .conftest import ROOT, in_its_own_python
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="limits and kills are POSIX's")
 
@@ -22,27 +25,60 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="limits and kills are
 @pytest.mark.slow
 @pytest.mark.parametrize("target", targets())
 def test_each_target_runs_in_a_process_of_its_own(target: str) -> None:
-    tally = run_apart(target, seed=3, seconds=1.0)
+    """Each with so many tries that none takes long, and the slow ones with several, too."""
+    tally = run_apart(target, seed=3, times=0.04)
     assert tally.failures == []
-    assert tally.tried >= 1
+    assert tally.tried == round(0.04 * importlib.import_module(f"fuzz.{target}").TRIES)
 
 
 def test_the_same_seed_draws_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[list[str]] = []
     monkeypatch.setattr(command_lines, "_furnish", lambda _folder: None)
-    monkeypatch.setattr(command_lines, "turns", lambda _seconds: range(20))
     monkeypatch.setattr(command_lines, "examine", lambda words, _folder: seen.append(words) or "")
     for seed in (1, 1, 2):
-        assert command_lines.run(seed, 0.0).tried == 20
+        assert command_lines.run(seed, 20).tried == 20
     assert seen[:20] == seen[20:40] != seen[40:]
 
 
 def test_a_digest_that_is_not_looked_at_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pyarrow")
     monkeypatch.setattr(parquet_files, "_digest", lambda _text, _columns: "0" * 64)
-    monkeypatch.setattr(traces, "turns", lambda _seconds: range(40))
     monkeypatch.setattr(traces, "_CHANGES", [traces._flip] * 3)
-    assert any("other numbers" in line for line in traces.run(1, 0.0).failures)
+    assert any("other numbers" in line for line in traces.run(1, 40).failures)
+
+
+def test_a_binary_model_that_is_not_refused_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = sm.load
+    monkeypatch.setenv("XDG_CACHE_HOME", "")  # which the target sets
+    monkeypatch.setattr(sm, "load", lambda file: plain(file) if file.suffix == ".xml" else None)
+    assert len(mjb.run(1, 4).failures) == 3
+
+
+# A step that looks for no other thread; MuJoCo lets go of Python's lock within it.
+UNGUARDED = """
+import json, mujoco, statemachine as sm
+from fuzz import threads
+sm.step = lambda model, data, count=1: mujoco.mj_step(model.raw, data.raw, count)
+threads.available = lambda: (["mujoco"], [])
+print(json.dumps(threads.run(1, 20).failures))
+"""
+
+
+def test_two_threads_in_one_data_are_found() -> None:
+    done = in_its_own_python(UNGUARDED, ROOT)
+    if done.returncode == 0:
+        assert any("others than one thread's" in line for line in json.loads(done.stdout))
+    else:  # which a target's own process turns into a failure
+        assert done.returncode < 0, done.stderr
+
+
+def test_a_data_that_stays_taken_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    def step(_model: sm.Model, _data: sm.Data, _count: int = 1) -> None:
+        raise BusyDataError("taken for ever")
+
+    monkeypatch.setattr(sm, "step", step)
+    (failure,) = threads.run(1, 1).failures
+    assert failure.endswith(": refused when all threads were gone")
 
 
 BROKEN_PARSER = """
@@ -62,8 +98,7 @@ def test_a_command_line_that_ends_in_a_traceback_is_found(monkeypatch: pytest.Mo
     )
     monkeypatch.setattr(command_lines, "_furnish", lambda _folder: None)
     monkeypatch.setattr(command_lines, "_BASES", [["doctor", "--json"]])
-    monkeypatch.setattr(command_lines, "turns", lambda _seconds: range(4))
-    assert any("traceback" in line for line in command_lines.run(1, 0.0).failures)
+    assert any("traceback" in line for line in command_lines.run(1, 4).failures)
 
 
 def test_what_is_no_good_end_of_a_command_is_said(tmp_path: Path) -> None:
@@ -83,8 +118,7 @@ def test_a_reader_of_models_that_fails_is_found(monkeypatch: pytest.MonkeyPatch)
     broken = models._READER.replace("import statemachine as sm", lines)
     assert broken != models._READER
     monkeypatch.setattr(models, "_READER", broken)
-    monkeypatch.setattr(models, "turns", lambda _seconds: range(2))
-    tally = models.run(1, 0.0)
+    tally = models.run(1, 2)
     assert len(tally.failures) == 2
     assert "KeyError" in tally.failures[0]
 
@@ -103,8 +137,7 @@ whole.beside = csv_files.beside = beside
 @pytest.mark.slow
 def test_a_writer_that_writes_in_place_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kills, "_WRITER", IN_PLACE + kills._WRITER)
-    monkeypatch.setattr(kills, "turns", lambda _seconds: range(8))
-    assert any("half a file" in line for line in kills.run(1, 0.0).failures)
+    assert any("half a file" in line for line in kills.run(1, 8).failures)
 
 
 def test_a_target_that_crashes_is_a_failure(tmp_path: Path) -> None:
@@ -120,7 +153,7 @@ def test_a_target_that_crashes_is_a_failure(tmp_path: Path) -> None:
         "    code = ends[target] or f'open({words[4]!r}, \"w\").write({ends_well!r})'\n"
         "    return plain([sys.executable, '-c', code], **others)\n"
         "fuzz.subprocess.Popen = start\n"
-        "sys.argv = ['fuzz', 'kills', 'models', '--seconds', '0']\n"
+        "sys.argv = ['fuzz', 'kills', 'models', '--times', '0']\n"
         "sys.exit(fuzz.main())\n"
     )
     done = subprocess.run(
@@ -136,4 +169,6 @@ def test_a_target_that_crashes_is_a_failure(tmp_path: Path) -> None:
 def test_every_file_of_the_folder_is_a_target() -> None:
     assert {"command_lines", "kills", "models", "traces"} <= set(targets())
     for name in targets():
-        assert callable(importlib.import_module(f"fuzz.{name}").run)
+        module = importlib.import_module(f"fuzz.{name}")
+        assert callable(module.run)
+        assert module.TRIES >= 100  # slow ones get their share, too

@@ -85,21 +85,6 @@ def test_malformed_files(tmp_path: Path, content: str, capfd: pytest.CaptureFixt
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_broken_binary_model(tmp_path: Path) -> None:
-    file = tmp_path / "bad.mjb"
-    file.write_bytes(b"nonsense" * 10)
-    with pytest.raises(errors.ModelError):
-        sm.load(file)
-
-
-def test_a_binary_model(tmp_path: Path) -> None:
-    import mujoco
-
-    file = tmp_path / "arm.mjb"
-    mujoco.mj_saveModel(sm.load("so101").raw, str(file))
-    assert sm.load(file).nq == 6
-
-
 def test_a_file_with_a_unicode_name_and_spaces(tmp_path: Path) -> None:
     file = tmp_path / "Ärm № 1.xml"
     file.write_text("<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>")

@@ -157,6 +157,7 @@ PRINTS = {
         "HeldBox pybullet scripted within 1 cm: 16 of 16, 150.0 steps",
     ),
     "docs/interface.md": ("no joint named 'elbow'; known: ", "0.001\n", "options of replace: "),
+    "docs/models.md": ("13 coordinates",),
     "docs/platforms.md": ("armature: emulated", "position servo: emulated"),
     "docs/randomised_worlds.md": ("the fingertip is ", "in world 7"),
     "docs/robots.md": ("True {}",),

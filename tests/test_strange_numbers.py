@@ -1,16 +1,14 @@
-"""Numbers without end, binary models that are damaged, and arguments of the wrong kind."""
+"""Numbers without end, and arguments of the wrong kind."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.backends import _mjb
 from statemachine.errors import ModelError, StateMachineError
 
 ARM = (
@@ -63,50 +61,6 @@ def test_public_models_are_not(menagerie: Path) -> None:
     assert files
     for file in files:
         sm.load(file)
-
-
-@pytest.fixture
-def binary(tmp_path: Path) -> Path:
-    file = tmp_path / "arm.mjb"
-    mujoco.mj_saveModel(sm.load("so101/scene_box").raw, str(file))
-    return file
-
-
-def test_a_sound_binary_model_is_tried_once(binary: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    tries, right = [], _mjb.subprocess.run
-    monkeypatch.setattr(
-        _mjb.subprocess, "run", lambda *a, **k: (tries.append(a), right(*a, **k))[1]
-    )
-    for _ in range(2):
-        model = sm.load(binary)
-        with sm.make_data(model) as data:
-            sm.step(model, data, 5)
-    assert len(tries) == 1
-
-
-def test_a_binary_model_that_crashes_a_process_is_refused(
-    binary: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    crash = "import ctypes; ctypes.string_at(0)"
-    monkeypatch.setattr(_mjb, "_CODE", crash)
-    with pytest.raises(ModelError, match=r"damaged.*compile it anew"):
-        sm.load(binary)
-    monkeypatch.setattr(_mjb, "_CODE", "import time; time.sleep(60)")
-    monkeypatch.setattr(_mjb, "_SECONDS", 0.5)
-    with pytest.raises(ModelError, match=r"within 0\.5 s"):
-        sm.load(binary)
-
-
-def test_a_binary_model_with_a_wild_number_is_refused(binary: Path) -> None:
-    """The ids of bodies that geoms belong to are read as they are in the file."""
-    raw = mujoco.MjModel.from_binary_path(str(binary))
-    ids = raw.geom_bodyid.tobytes()
-    whole = binary.read_bytes()
-    assert whole.count(ids) >= 1
-    wild = np.full_like(raw.geom_bodyid, 2**30).tobytes()
-    binary.write_bytes(whole.replace(ids, wild))
-    with pytest.raises(ModelError):
-        sm.load(binary)
 
 
 @pytest.mark.parametrize("model", [5, None, b"so101", ["so101"], 1.5, object()])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import random
 import re
 import signal
 import subprocess
@@ -35,7 +36,7 @@ from statemachine.sweep import (
 )
 from statemachine.sweep.factors import parse_vary, with_kinds
 from statemachine.sweep.folder import locked, settle_manifest
-from statemachine.sweep.rows import MEASURED, RowWriter, counted, remove_failed
+from statemachine.sweep.rows import KEY, MEASURED, RowWriter, counted, remove_failed
 from statemachine.sweep.worker import run_batch
 from statemachine.traces import record_scenario
 
@@ -104,8 +105,8 @@ def values(folder: Path) -> Any:
 def test_the_guide_lists_the_columns() -> None:
     page = (ROOT / "docs" / "sweeps.md").read_text("utf-8")
     rows = dict(re.findall(r"^\| `([^`]+)` \| (.*) \|$", page.partition("| column |")[2], re.M))
-    for name, kind, says in COLUMNS:
-        assert rows[name] == f"{kind} | {says}"
+    for name, kind, unit, says in COLUMNS:
+        assert rows[name] == f"{kind} | {unit} | {says}".replace("|  |", "| |")
 
 
 Start = Callable[..., "subprocess.Popen[str]"]
@@ -379,14 +380,95 @@ def test_rows_are_written_whole_and_read_in_order(tmp_path: Path) -> None:
     assert set(table["backend"].to_pylist()) == {"mujoco"}
     assert set(table["vary.timestep"].to_pylist()) == {0.005, 0.01}
     assert table.column_names == [
-        *[name for name, _, _ in COLUMNS[:3]],
+        *[name for name, *_ in COLUMNS[:3]],
         "vary.timestep",
-        *[name for name, _, _ in COLUMNS[3:]],
+        *[name for name, *_ in COLUMNS[3:]],
         "backend",
     ]
     (place / "part-0.parquet").write_bytes(b"no parquet")
     with pytest.raises(BadInputError, match="cannot be read"):
         dict(counted(tmp_path))
+
+
+@pytest.fixture
+def dataset(tmp_path: Path) -> Path:
+    """A sweep of one file."""
+    run_sweep(small("hold", "damping=0.5x,1x", "timestep=0.005"), tmp_path / "s", jobs=1)
+    return tmp_path / "s"
+
+
+def _part(folder: Path) -> Path:
+    (part,) = folder.glob("cells/*/*.parquet")
+    return part
+
+
+def test_a_flipped_bit_is_never_another_value(dataset: Path) -> None:
+    part, draw = _part(dataset), random.Random(1)
+    whole = part.read_bytes()
+    places = [
+        *range(len(whole) - 200, len(whole)),
+        *(draw.randrange(len(whole)) for _ in range(400)),
+    ]
+    for place in places:
+        bad = bytearray(whole)
+        bad[place] ^= 1 << draw.randrange(8)
+        part.write_bytes(bytes(bad))
+        for read in (read_cells, lambda folder: dict(counted(folder))):
+            with pytest.raises(BadInputError, match=re.escape(f"{part} cannot be read")):
+                read(dataset)
+    part.write_bytes(whole)
+    assert read_cells(dataset).num_rows == 2
+
+
+def test_other_readers_can_verify_the_pages(dataset: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    part = _part(dataset)
+    group = parquet.read_metadata(part).row_group(0)
+    (energy,) = [
+        column for k in range(group.num_columns)
+        if (column := group.column(k)).path_in_schema == "energy"
+    ]  # fmt: skip
+    content = bytearray(part.read_bytes())
+    content[energy.data_page_offset + energy.total_compressed_size - 60] ^= 1
+    assert parquet.read_table(part, page_checksum_verification=True).num_rows == 2
+    part.write_bytes(bytes(content))
+    with pytest.raises(OSError, match="CRC checksum"):
+        parquet.read_table(part, page_checksum_verification=True)
+
+
+def test_a_file_says_what_it_is_without_the_manifest(dataset: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    schema = parquet.read_schema(_part(dataset))
+    facts = {field.name: field.metadata for field in schema}
+    assert all(facts.values())
+    assert b"multiple of the model's own" in facts["vary.damping"][b"meaning"]
+    assert facts["vary.damping"][b"unit"] == b""
+    assert facts["vary.timestep"] == {b"unit": b"s", b"meaning": b"timestep of the model"}
+    assert facts["max_qvel"][b"unit"] == b"rad/s or m/s"
+    told = json.loads(schema.metadata[KEY])
+    assert told["design"]["vary"] == ["damping=0.5x,1x", "timestep=0.005"]
+    assert told["design"]["seeds"] == 1
+    assert told["request"]["what"] == "hold"
+    assert told["files"]
+
+
+def test_every_kind_of_factor_has_a_meaning() -> None:
+    told = {
+        "model=so101": ("", "the model, by its name or file"),
+        "qpos[elbow_flex]=0,1": ("rad or m", "qpos[elbow_flex] where the run starts"),
+        "mass=1,2": ("", "mass, a keyword argument of the function"),
+        "damping=1,2": ("N·m·s/rad or N·s/m", "damping of the model"),
+        "contacts=on": ("", "contacts of the model"),
+    }
+    found = with_kinds(parse_vary(told), ["damping", "contacts"], ["mass"])
+    assert [(vary.unit, vary.meaning) for vary in found] == list(told.values())
+
+
+def test_a_file_of_another_sweep_is_refused(dataset: Path, tmp_path: Path) -> None:
+    run_sweep(small("hold", "armature=1x,2x"), tmp_path / "other", jobs=1)
+    _part(tmp_path / "other").rename(_part(dataset).with_name("part-other.parquet"))
+    with pytest.raises(BadInputError, match=r"part-other\.parquet has other columns"):
+        read_cells(dataset)
 
 
 def test_an_extra_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -539,6 +621,26 @@ def test_a_driver_that_is_killed_goes_on(policy: str, tmp_path: Path, start: Sta
     assert len(cells) == len(set(cells)) == 60
     sweep = small(f"{policy}:slow", "gain=1:60:60", seconds=0.1)
     assert {cell.id for cell in prepared(sweep).cells("mujoco")} == set(cells)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="looks at /dev/shm")
+def test_a_sweep_that_is_killed_with_its_workers_leaves_nothing_for_long(
+    policy: str, tmp_path: Path, start: Start
+) -> None:
+    words = ["sweep", f"{policy}:slow", "--vary", "gain=1:60:60", "--model", "so101"]
+    words += ["--seconds", "0.1", "--backend", "mujoco", "--jobs", "2", "--out", "out"]
+    driver = start(*words)
+    _until(lambda: list((tmp_path / "out").glob("cells/*/part-*.parquet")))
+    shared = {path.name for path in Path("/dev/shm").glob(f"*{driver.pid}*")}
+    assert not [name for name in shared if name.startswith("joblib")]
+    os.killpg(driver.pid, signal.SIGKILL)
+    driver.communicate()
+    large = tmp_path / "out" / ".joblib" / f"joblib_memmapping_folder_{driver.pid}_0"
+    large.mkdir(parents=True)
+    assert start(*words).wait() == 0
+    assert not large.exists()
+    assert not list(Path("/dev/shm").glob(f"*{driver.pid}*"))
 
 
 STOPPED = "statemachine: stopped; out has what was done. Type the same to go on\n"

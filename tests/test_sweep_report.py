@@ -250,6 +250,17 @@ def test_settings_agree_by_the_tolerance(tmp_path: Path) -> None:
     assert max(map(len, said.splitlines())) <= 80
 
 
+def test_a_sweep_that_failed_everywhere_has_no_report(tmp_path: Path) -> None:
+    design = Design((grid("x", 0, 1, 2, kind="parameter"),))
+    for name, failed in (("one", {"pybullet"}), ("both", {"mujoco", "pybullet"})):
+        folder = made_up(
+            tmp_path / name, design, nowhere, nowhere,
+            fails=lambda backend, _values, _seed, failed=failed: backend in failed,
+        )  # fmt: skip
+        with pytest.raises(BadInputError, match=r"no setting .* both mujoco and pybullet"):
+            of(folder)
+
+
 def test_a_gap_inside_the_chaos_floor_is_no_difference(tmp_path: Path) -> None:
     from statemachine.sweep import analysis, analysis_agreement
     from statemachine.sweep.analysis_gaps import gaps_of

@@ -123,7 +123,7 @@ def test_everything_is_on_the_page_and_nothing_is_asked_of_the_network(stage: St
         assert stage.tab.get_by_text(f"{joint} [°]").count() == 1
     for text in ("gripperframe", "tips apart", "joints apart", "paused"):
         stage.says(text)
-    assert stage.slider(1) == pytest.approx(0)
+    stage.until(lambda: stage.slider(1) == pytest.approx(0))
     assert stage.tab.get_by_text("Share").count() == 0
     hosts = {url.split("/")[2] for url in stage.tab.requests if not url.startswith("blob:")}
     assert hosts == {f"127.0.0.1:{stage.server.get_port()}"}
@@ -195,8 +195,8 @@ def test_both_arms_are_seen_and_the_ghost_can_be_put_away(stage: Stage) -> None:
     for _ in range(40):  # a few frames for the browser to draw
         stage.live.turn()
         stage.tab.wait_for_timeout(30)
+    stage.until(lambda: _colours(stage.tab)[0] > 3000)
     yellow, blue = _colours(stage.tab)
-    assert yellow > 3000
     assert blue < yellow / 20
     session.advance(200)
     gap = session.frame().gap
@@ -214,7 +214,7 @@ def test_two_tabs_show_the_same(stage: Stage) -> None:
     stage.reset()
     other = stage.open()
     try:
-        assert stage.slider(1, other) == stage.slider(1)
+        stage.until(lambda: stage.slider(1, other) == stage.slider(1))
         shown = stage.slider(1) - 0.1
         other.get_by_role("slider").nth(1).focus()
         other.keyboard.press("ArrowLeft")

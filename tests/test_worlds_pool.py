@@ -360,6 +360,17 @@ def test_nothing_is_left_and_closed_is_closed(model: sm.Model) -> None:
     assert not running(numbers)
 
 
+@linux
+def test_worlds_that_are_collected_leave_no_descriptor(model: sm.Model) -> None:
+    def collected() -> int:
+        step(make_worlds(model, 1))
+        gc.collect()
+        return len(os.listdir("/proc/self/fd"))
+
+    first = collected()
+    assert [collected() for _ in range(3)] == [first] * 3
+
+
 def test_what_is_derived_is_computed_when_it_is_read(model: sm.Model) -> None:
     with make_worlds(model, 2, workers=1, derived=("xpos", "qacc")) as worlds:
         assert not worlds.xpos.any()

@@ -19,6 +19,7 @@ from ..interface import Model
 from ..models import resolve
 from ._hidden_data import HiddenData, HiddenModel
 from ._hidden_world import HiddenWorld, Moment
+from .binary import is_binary, read_binary
 
 __all__ = [
     "Backend",
@@ -108,6 +109,7 @@ def load(
     *,
     defaults: Literal["model", "engine"] = "model",
     menagerie: str | os.PathLike[str] | None = None,
+    trust_binary: bool = False,
     **options: Any,
 ) -> Model:
     """Compile a model's file into a Model. The slow part, done once.
@@ -118,6 +120,8 @@ def load(
         defaults: "model" keeps the contract of this library on every backend;
             "engine" gives what the engine's own users get when they load the file.
         menagerie: A menagerie folder to look the name up in.
+        trust_binary: Whether a binary model (.mjb) is read that this library did not write.
+            MuJoCo does not check one: a damaged or malicious file can crash or harm the process.
         **options: As `Model.replace` takes them, before anything of the file is refused:
             `contacts=False` loads a robot of whose geoms the engine knows no shape.
 
@@ -127,12 +131,14 @@ def load(
         BadInputError: The value of an option has the wrong shape, kind or size.
         MissingEngineError: The backend's engine is not installed here.
         ModelFileError: The file is not there.
-        ModelError: The engine cannot read the file.
+        ModelError: The engine cannot read the file, or it is a binary model of others.
     """
     entry = _find(backend)
     if not isinstance(defaults, str) or defaults not in ("model", "engine"):
         raise unknown_name("defaults", defaults, ("model", "engine"))
     path = resolve(model, menagerie)
+    if trust_binary and is_binary(path):
+        read_binary(path, trust=True)  # the loader knows its bytes then
     if entry.engine:
         require(entry.engine)
     module, _, function = entry.loader.partition(":")

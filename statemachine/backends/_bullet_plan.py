@@ -127,7 +127,9 @@ def _padding(raw: mujoco.MjModel) -> Array:
     """
     share, data = _SHARE * raw.dof_armature, mujoco.MjData(raw)
     random = np.random.default_rng(0)
-    low, high = np.where(raw.jnt_limited[:, None].astype(bool), raw.jnt_range, [-np.pi, np.pi]).T
+    with np.errstate(over="ignore"):
+        limited = raw.jnt_limited.astype(bool) & np.isfinite(np.ptp(raw.jnt_range, axis=1))
+    low, high = np.where(limited[:, None], raw.jnt_range, [-np.pi, np.pi]).T
     poses = [raw.qpos0, *raw.key_qpos]
     scalar = np.isin(raw.jnt_type, [int(mujoco.mjtJoint.mjJNT_HINGE), _SLIDE])
     for _ in range(_SAMPLE):

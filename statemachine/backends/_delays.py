@@ -164,13 +164,19 @@ def _appended(m: mujoco.MjModel, kept: Ints) -> tuple[Ints, Ints]:
 
 def _of_size(m: mujoco.MjModel, nhistory: int) -> mujoco.MjModel:
     """A copy whose Data have buffers of another size."""
-    blob = _saved(m)
+    blob = saved(m)
     at = _history_offset()
     blob[at : at + 8] = np.frombuffer(struct.pack("<q", nhistory), np.uint8)
-    return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": blob.tobytes()})
+    return from_binary(blob.tobytes())
 
 
-def _saved(m: mujoco.MjModel) -> np.ndarray:
+def from_binary(content: bytes) -> mujoco.MjModel:
+    """The compiled model in the bytes of an MJB file."""
+    return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": content})
+
+
+def saved(m: mujoco.MjModel) -> np.ndarray:
+    """A compiled model in the bytes of an MJB file."""
     blob = np.empty(mujoco.mj_sizeModel(m), np.uint8)
     mujoco.mj_saveModel(m, None, blob)
     return blob
@@ -183,9 +189,9 @@ def _history_offset() -> int:
     It is the first in which two models with other buffers differ; sizes come before arrays.
     """
     few, more = (mujoco.MjModel.from_xml_string(_SMALL.format(count)) for count in (1, 2))
-    at = int(np.flatnonzero(_saved(few) != _saved(more))[0])
+    at = int(np.flatnonzero(saved(few) != saved(more))[0])
     for model in (few, more):
-        found = struct.unpack("<q", _saved(model)[at : at + 8].tobytes())[0]
+        found = struct.unpack("<q", saved(model)[at : at + 8].tobytes())[0]
         if found != model.nhistory:
             raise NotImplementedError("this MuJoCo saves its models in another way")
     return at

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import os
 import re
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -24,13 +25,13 @@ from xml.sax.saxutils import escape, unescape
 import mujoco
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import EngineWarning, ModelError, shown
 from ..interface import Array, JointType, Keyframe
 from ..interface.checks import HUGE, TINY
 from ..models import mesh_file
-from ._delays import delay_steps, with_room
+from ._delays import delay_steps, from_binary, with_room
 from ._edits import edited, servos, step_length
-from ._mjb import check_binary
+from .binary import is_binary, read_binary
 
 __all__ = [
     "check_numbers",
@@ -54,6 +55,10 @@ _FREE_USE = {"numeric_data", "actuator_acc0"} | {
     name for name in dir(mujoco.MjModel) if name.endswith("_user")
 }
 _NEVER_NEGATIVE = {"dof_armature", "dof_frictionloss"}
+_SELDOM_NEGATIVE = (
+    *("dof_damping", "jnt_stiffness", "tendon_damping", "tendon_stiffness"),
+    *("geom_friction", "pair_friction"),
+)
 
 
 @contextmanager
@@ -82,30 +87,40 @@ def compile_file(path: str | os.PathLike[str]) -> mujoco.MjModel:
 
     Raises:
         ModelError: MuJoCo cannot compile the file, with its reason; or it compiles one
-            with a number that no step can be taken with.
+            with a number that no step can be taken with; or the file is binary, and nobody
+            said that it is to be trusted (see `binary`).
     """
     text = os.fspath(path)
-    if text.lower().endswith(".mjb"):
-        check_binary(text)
+    binary = read_binary(text) if is_binary(text) else None
     try:
-        if text.lower().endswith(".mjb"):
-            raw = mujoco.MjModel.from_binary_path(text)
+        if binary is not None:
+            raw = from_binary(binary)
         else:
             raw = _with_packages(Path(text)) or mujoco.MjModel.from_xml_path(text)
     except (ValueError, MemoryError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split()) or "out of memory"
         raise ModelError(f"MuJoCo cannot read {text}: {reason}") from error
     check_numbers(raw, text)
+    if doubtful := "; ".join(_doubtful(raw)):
+        warnings.warn(f"{text}: {doubtful}", EngineWarning, stacklevel=4)
     return raw
 
 
 def check_numbers(raw: mujoco.MjModel, name: str) -> None:
     """Raise ModelError if a number of a compiled model is none, or has an impossible sign.
 
+    So it does for a name that is no text.
+
     Args:
         raw: The compiled model.
         name: What the message calls it.
     """
+    try:
+        raw.names.decode()
+    except UnicodeDecodeError as error:
+        start = raw.names.rfind(b"\0", 0, error.start) + 1
+        wrong = raw.names[start : raw.names.index(b"\0", start)]
+        raise ModelError(f"{name} has a name that is not UTF-8: {shown(wrong)}") from None
     for problem in _problems(raw):
         raise ModelError(f"{name} has a number that nothing can be computed with: {problem}")
 
@@ -155,6 +170,20 @@ def _problems(raw: mujoco.MjModel) -> Iterator[str]:
         if name in _NEVER_NEGATIVE:
             for row in np.argwhere(array < 0)[:1]:
                 yield f"{name}{_owner(raw, name, row)} is negative"
+        if name == "jnt_axis" or name.endswith("_quat"):  # of a length that overflowed
+            for row in np.argwhere(~array.any(axis=-1))[:1]:
+                yield f"{name}{_owner(raw, name, row)} has no direction"
+
+
+def _doubtful(raw: mujoco.MjModel) -> Iterator[str]:
+    """What has a sign that engines take, and that is seldom meant."""
+    for name in _SELDOM_NEGATIVE:
+        for row in np.argwhere(getattr(raw, name) < 0)[:1]:
+            yield f"{name}{_owner(raw, name, row)} is negative"
+    affine = raw.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
+    for column, gain in ((1, "kp"), (2, "kv")):
+        for row in np.argwhere(affine & (raw.actuator_biasprm[:, column] > 0))[:1]:
+            yield f"{gain}{_owner(raw, 'actuator_biasprm', row)} is negative"
 
 
 def _owner(raw: mujoco.MjModel, name: str, row: Array) -> str:

@@ -27,10 +27,11 @@ from ..interface import (
     State,
 )
 from ..interface.checks import TINY, check_finite
-from ._delays import hold
+from ._delays import hold, saved
 from ._edits import CONSTANTS_FOLLOW, varied
 from ._mujoco_alarms import AlarmError, Alarms, ended, gave_up, pass_on
 from ._mujoco_record import INTEGRATORS, capabilities
+from .binary import write_binary
 from .compiled import (
     check_numbers,
     compile_file,
@@ -105,6 +106,17 @@ class MujocoModel(Model):
     @property
     def compiled(self) -> mujoco.MjModel:
         return self.raw
+
+    def save_binary(self, path: str | os.PathLike[str]) -> None:
+        """Write the compiled model as a binary model (.mjb), which this user's `load` takes back.
+
+        Args:
+            path: The file; one that is there is replaced.
+
+        Raises:
+            OSError: It cannot be written.
+        """
+        write_binary(path, saved(self.raw).tobytes())
 
     def with_compiled(self, compiled: mujoco.MjModel) -> MujocoModel:
         check_numbers(compiled, str(self.path))

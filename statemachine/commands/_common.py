@@ -62,12 +62,23 @@ def add_backend(
 
 
 def add_menagerie(parser: argparse.ArgumentParser, default: str | None = None) -> None:
-    """The option --menagerie."""
+    """The options --menagerie and --trust-binary, of commands that load a model."""
+    add_trust(parser, default or False)
     parser.add_argument(
         "--menagerie",
         default=default or os.environ.get("MENAGERIE") or None,
         metavar="DIR",
         help="look the model up in this folder of public models (default $MENAGERIE)",
+    )
+
+
+def add_trust(parser: argparse.ArgumentParser, default: Any = False) -> None:
+    """The option --trust-binary; `cli.main` does what it says."""
+    parser.add_argument(
+        "--trust-binary",
+        action="store_true",
+        default=default,
+        help="read a binary model (.mjb) that this library did not write; it can do harm",
     )
 
 

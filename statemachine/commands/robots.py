@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ._common import SAYS_NO, add_json, complain, show
+from ._common import SAYS_NO, add_json, add_trust, complain, show
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -45,6 +45,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="how many models at once (default: one for each processor)",
     )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of what is drawn (0)")
+    add_trust(parser)
     add_json(parser, "table")
     parser.set_defaults(run=run)
 

@@ -228,6 +228,10 @@ def gaps_of(
     Raises:
         BadInputError: No setting has a run on both.
     """
+    lacking = BadInputError(
+        f"no setting of this sweep has a run on both {sides[0]} and {sides[1]}; of cells that "
+        "failed, the column error says why"
+    )
     points = tuple(design.points())
     place = {point.id: k for k, point in enumerate(points)}
     keys = [table[name].to_pylist() for name in ("backend", "point", "seed", "status")]
@@ -244,10 +248,12 @@ def gaps_of(
                     where.append(place[point] * seeds + seed)
                 else:
                     failed[table["error_class"][k].as_py()] += 1
+        if not rows:
+            raise lacking
         found.append(_spread(_read(table.take(rows), hinges), where, len(points), seeds))
     left, right = found
     if not (left.done & right.done).any():
-        raise BadInputError(f"no setting of this sweep has a run on both {sides[0]} and {sides[1]}")
+        raise lacking
     missing = 2 * len(points) * seeds - count
     left, right = alike(left, right)
     return SweepGaps(

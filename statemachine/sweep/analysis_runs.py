@@ -18,29 +18,12 @@ from ..traces.controllers import is_function
 from .analysis_gaps import SweepRuns, runs_of
 from .apart import apart
 from .cell import CellRules, SweepCell
-from .factors import Value, Vary
+from .factors import UNITS, Value, Vary
 from .prepare import prepared
 from .request import REQUEST, PreparedSweep, Sweep
 from .settings import options_at
 
 Setting = tuple[tuple[Value, ...], int]  # values of the factors, and a seed
-
-
-# What an option or a start is in, of a hinge and of a slide.
-_UNITS = {
-    "timestep": ("s", "s"),
-    "latency": ("s", "s"),
-    "gravity": ("m/s²", "m/s²"),
-    "mass": ("kg", "kg"),
-    "qpos": ("rad", "m"),
-    "qvel": ("rad/s", "m/s"),
-    "max_qvel": ("rad/s", "m/s"),
-    "armature": ("kg·m²", "kg"),
-    "damping": ("N·m·s/rad", "N·s/m"),
-    "frictionloss": ("N·m", "N"),
-    "kp": ("N·m/rad", "N/m"),
-    "kv": ("N·m·s/rad", "N·s/m"),
-}
 
 
 @dataclass(frozen=True)
@@ -203,7 +186,7 @@ def _unit(vary: Vary, model: Model) -> str:
     """What the numbers of a factor are in."""
     if vary.times or vary.kind == "parameter":
         return ""
-    hinge, slide = _UNITS.get(vary.name, ("", ""))
+    hinge, slide = UNITS.get(vary.name, ("", ""))
     kinds = set(model.jnt_type.tolist())
     if vary.place in model.joint_names:
         kinds = {int(model.jnt_type[model.joint_id(vary.place)])}

@@ -22,7 +22,7 @@ from ..processes import checked_jobs
 from ..scenarios.runs import Progress, silent
 from .apart import Batch, Results, apart, deaf, require_joblib
 from .cell import DONE, CellRules
-from .folder import check_folder, locked, settle_manifest
+from .folder import SCRATCH, check_folder, locked, settle_manifest
 from .prepare import prepared
 from .request import PreparedSweep, Sweep
 from .rows import CELLS, RowWriter, counted, remove_failed
@@ -111,17 +111,13 @@ def run_sweep(
             known = {cell: kind for cell, kind in known.items() if kind == DONE}
         total = len(ready)
         missing = total - len(known)
-        writer = RowWriter(
-            folder,
-            ready.design.factors,
-            {name: manifest[name] for name in ("request", "files", "function", "versions")},
-        )
+        writer = RowWriter(folder, ready.design.factors, ready.provenance())
         kinds = Counter(known.values())
         ran = 0
         batches = _batches(ready, known, jobs if client is None else _workers(client))
         with unwinding():
             try:
-                with closing(_results(ready.rules, batches, jobs, client)) as found:
+                with closing(_results(ready.rules, batches, jobs, client, folder)) as found:
                     for rows in found:
                         writer.add(rows)
                         kinds.update(row.get("error_class") or row["status"] for row in rows)
@@ -170,7 +166,9 @@ def _batches(ready: PreparedSweep, known: Mapping[str, str], jobs: int) -> Itera
     return (batch for turn in turns for batch in turn if batch is not None)
 
 
-def _results(rules: CellRules, batches: Iterator[Batch], jobs: int, client: Any) -> Results:
+def _results(
+    rules: CellRules, batches: Iterator[Batch], jobs: int, client: Any, folder: Path
+) -> Results:
     """The rows of all batches, as they are ready.
 
     Where a worker dies, what was being run is run again apart from everything else, cell by cell
@@ -182,7 +180,7 @@ def _results(rules: CellRules, batches: Iterator[Batch], jobs: int, client: Any)
     feed = _Feed(batches)
     while True:
         try:
-            with closing(_parallel(rules, feed, jobs, client)) as found:
+            with closing(_parallel(rules, feed, jobs, client, folder)) as found:
                 yield from found
             return
         except StateMachineError:
@@ -233,11 +231,16 @@ def _numbered(number: int, rules: CellRules, batch: Batch, own: bool) -> tuple[i
     return number, run_batch(rules, batch, own)
 
 
-def _parallel(rules: CellRules, feed: _Feed, jobs: int, client: Any) -> Results:
+def _parallel(rules: CellRules, feed: _Feed, jobs: int, client: Any, folder: Path) -> Results:
     """The rows of the batches of a feed, through joblib."""
     joblib = require_joblib()
     if client is None:
-        how = joblib.parallel_config(backend="loky", n_jobs=jobs, inner_max_num_threads=1)
+        how = joblib.parallel_config(
+            backend="loky",
+            n_jobs=jobs,
+            inner_max_num_threads=1,
+            temp_folder=os.fspath(folder / SCRATCH),
+        )
     else:
         how = joblib.parallel_config(backend="dask", client=client)
     with how, warnings.catch_warnings():

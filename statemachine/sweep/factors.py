@@ -16,6 +16,28 @@ Value = bool | float | str
 
 STATES = ("qpos", "qvel")
 MODEL = "model"
+# What an option or a start is in, of a hinge and of a slide.
+UNITS = {
+    "timestep": ("s", "s"),
+    "latency": ("s", "s"),
+    "gravity": ("m/s²", "m/s²"),
+    "mass": ("kg", "kg"),
+    "qpos": ("rad", "m"),
+    "qvel": ("rad/s", "m/s"),
+    "max_qvel": ("rad/s", "m/s"),
+    "armature": ("kg·m²", "kg"),
+    "damping": ("N·m·s/rad", "N·s/m"),
+    "frictionloss": ("N·m", "N"),
+    "kp": ("N·m/rad", "N/m"),
+    "kv": ("N·m·s/rad", "N·s/m"),
+}
+_MEANINGS: dict[Kind, str] = {
+    "model": "the model, by its name or file",
+    "option": "{} of the model",
+    "state": "{} where the run starts",
+    "parameter": "{}, a keyword argument of the function",
+}
+_OWN = "{} as a multiple of the model's own value: 0.5 is half of it"
 _NAME = re.compile(r"([A-Za-z_]\w*)(?:\[([^\[\]]+)\])?")
 _SWITCHES = {"on": True, "off": False, "true": True, "false": False}
 _TIMES = ("x", "×")  # behind a number: times the model's own value
@@ -53,6 +75,18 @@ class Vary:
     def column(self) -> str:
         """Its column in the dataset."""
         return f"vary.{self.label}"
+
+    @property
+    def unit(self) -> str:
+        """What its column is in; "" of what is no number or has none."""
+        if self.times or self.kind == "parameter":
+            return ""
+        return " or ".join(dict.fromkeys(UNITS.get(self.name, ())))
+
+    @property
+    def meaning(self) -> str:
+        """What its column says."""
+        return (_OWN if self.times else _MEANINGS[self.kind]).format(self.label)
 
     @property
     def numeric(self) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +19,8 @@ from .rows import CELLS
 
 MANIFEST = "sweep.json"
 SCHEMA = 1
-_LOCK = ".lock"
+SCRATCH = ".joblib"  # where joblib puts large arguments of its workers
+_LOCK = ".lock"  # with the number of the process that holds it
 # What a dataset is of, whatever its design: another of these is another sweep.
 _SAME = ("request", "files", "function", "versions")
 
@@ -27,6 +29,8 @@ _SAME = ("request", "files", "function", "versions")
 def locked(folder: Path) -> Iterator[None]:
     """Hold the folder; the lock ends with the process, however that ends.
 
+    What a driver that was killed has left is removed.
+
     Raises:
         BadInputError: Another process holds it.
     """
@@ -34,9 +38,21 @@ def locked(folder: Path) -> Iterator[None]:
     try:
         if not _taken(handle):
             raise BadInputError(f"another sweep runs in {folder}: one at a time")
+        shutil.rmtree(folder / SCRATCH, ignore_errors=True)
+        if os.name != "nt":
+            _remove_semaphores(os.pread(handle, 20, 0).decode(errors="replace"))
+            os.ftruncate(handle, 0)
+            os.pwrite(handle, str(os.getpid()).encode(), 0)
         yield
     finally:
         os.close(handle)
+
+
+def _remove_semaphores(driver: str) -> None:
+    """Remove those of a driver, by its number, that was killed with all of its processes."""
+    if driver.isdecimal() and not Path("/proc", driver).exists():
+        for path in Path("/dev/shm").glob(f"sem.loky-{driver}-*"):
+            path.unlink(missing_ok=True)
 
 
 def _taken(handle: int) -> bool:

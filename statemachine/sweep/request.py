@@ -13,7 +13,7 @@ from ..traces.controllers import is_function
 from .cell import CellRules, SweepCell
 from .design import Design, DesignPoint, digest
 from .folder import SCHEMA
-from .rows import COLUMNS
+from .rows import described
 
 SPREAD = ("1deg", "1mm")
 # What a dataset is of, beside the experiment: cells of other values are of another sweep.
@@ -110,6 +110,13 @@ class PreparedSweep:
             for seed in range(self.sweep.seeds):
                 yield cell_of(point, seed, backend)
 
+    def provenance(self) -> dict[str, Any]:
+        """What was asked for, for the metadata of each file: the design as it was typed."""
+        names = ("schema", "command", "request", "files", "function", "versions", "design")
+        told = {name: value for name, value in self.manifest().items() if name in names}
+        told["design"].pop("factors")  # their values may be many
+        return told
+
     def manifest(self) -> dict[str, Any]:
         """All of it as plain values, for sweep.json."""
         asked = self.sweep
@@ -139,10 +146,7 @@ class PreparedSweep:
             },
             "points": len(self.design),
             "cells": len(self),
-            "columns": {
-                **{vary.column: f"value of {vary.label}" for vary in self.design.factors},
-                **{name: says for name, _, says in COLUMNS},
-            },
+            "columns": described(self.design.factors),
         }
 
 

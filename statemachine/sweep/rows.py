@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import importlib
+import hashlib
+import io
 import itertools
 import json
 import time
@@ -12,44 +13,44 @@ from typing import Any
 
 from ..errors import BadInputError
 from ..installed import require_extra
-from ..traces.whole import replace_file
+from ..traces.whole import replace_bytes
 from .cell import DONE
 from .factors import Vary
 
 CELLS = "cells"  # the folder of the dataset, in that of the sweep
 KEY = b"statemachine.sweep"  # of the provenance, in the metadata of each file
-# The columns beside those of the factors: name, type, what it is. docs/sweeps.md shows it.
+_DIGEST = b"statemachine.sha256"  # beside it, of all other bytes of the file
+_DIGITS = hashlib.sha256().digest_size * 2
+# The columns beside those of the factors: name, type, unit, what it is. docs/sweeps.md shows it.
 COLUMNS = (
-    ("cell", "string", "digest of point, seed and backend: what names a row"),
-    ("point", "string", "digest of the varied values: the same for every seed and backend"),
-    ("seed", "int64", "what was drawn from"),
-    ("status", "string", "done or failed"),
+    ("cell", "string", "", "digest of point, seed and backend: what names a row"),
+    ("point", "string", "", "digest of the varied values: the same for every seed and backend"),
+    ("seed", "int64", "", "what was drawn from"),
+    ("status", "string", "", "done or failed"),
     (
-        "error_class",
-        "string",
+        *("error_class", "string", ""),
         "of a failed cell, such as DivergedError or TimedOutError",
     ),
-    ("error", "string", "of a failed cell: what happened, in one line"),
+    ("error", "string", "", "of a failed cell: what happened, in one line"),
     (
-        "wall_seconds",
-        "double",
-        "by the clock, loading included [s]; all else can be repeated",
+        *("wall_seconds", "double", "s"),
+        "by the clock, loading included; all else can be repeated",
     ),
-    ("steps", "int64", "timesteps that were taken"),
-    ("time", "double", "simulated time at the end [s]"),
-    ("qpos", "list<double>", "(nq,) at the end [rad or m]"),
-    ("qvel", "list<double>", "(nv,) at the end [rad/s or m/s]"),
-    ("tip", "list<double>", "(3,) fingertip at the end, in world axes [m]; none without a site"),
-    ("max_qvel", "double", "the largest size of a velocity in any step [rad/s or m/s]"),
-    ("energy_start", "double", "kinetic and potential energy at the start [J]"),
-    ("energy", "double", "the same at the end"),
-    ("first_touch", "double", "when the first step began in contact [s]; none if none did"),
-    ("touch", "string", "which bodies touched then"),
-    ("sample_time", "list<double>", "(n,) moments that are kept [s]"),
-    ("sample_qpos", "list<list<double>>", "(n, nq) at these moments"),
-    ("sample_tip", "list<list<double>>", "(n, 3) at these moments"),
-    ("engine_version", "string", "version of the engine"),
-    ("library_version", "string", "version of this library"),
+    ("steps", "int64", "", "timesteps that were taken"),
+    ("time", "double", "s", "simulated time at the end"),
+    ("qpos", "list<double>", "rad or m", "(nq,) at the end"),
+    ("qvel", "list<double>", "rad/s or m/s", "(nv,) at the end"),
+    ("tip", "list<double>", "m", "(3,) fingertip at the end, in world axes; none without a site"),
+    ("max_qvel", "double", "rad/s or m/s", "the largest size of a velocity in any step"),
+    ("energy_start", "double", "J", "kinetic and potential energy at the start"),
+    ("energy", "double", "J", "the same at the end"),
+    ("first_touch", "double", "s", "when the first step began in contact; none if none did"),
+    ("touch", "string", "", "which bodies touched then"),
+    ("sample_time", "list<double>", "s", "(n,) moments that are kept"),
+    ("sample_qpos", "list<list<double>>", "rad or m", "(n, nq) at these moments"),
+    ("sample_tip", "list<list<double>>", "m", "(n, 3) at these moments"),
+    ("engine_version", "string", "", "version of the engine"),
+    ("library_version", "string", "", "version of this library"),
 )
 MEASURED = ("wall_seconds",)
 _SOON, _LATE, _SHARE = 5.0, 60.0, 0.02  # seconds between two files, and of the time so far
@@ -77,10 +78,20 @@ def schema_of(factors: Sequence[Vary], provenance: Mapping[str, Any]) -> Any:
         "list<double>": arrow.list_(arrow.float64()),
         "list<list<double>>": arrow.list_(arrow.list_(arrow.float64())),
     }
-    fields = [arrow.field(name, kinds[kind]) for name, kind, _ in COLUMNS]
-    varied = [arrow.field(vary.column, _kind(arrow, vary)) for vary in factors]
+    facts = described(factors)
+    types = {name: kinds[kind] for name, kind, _, _ in COLUMNS}
+    types |= {vary.column: _kind(arrow, vary) for vary in factors}
+    fields = [arrow.field(name, types[name], metadata=facts[name]) for name in facts]
     text = json.dumps(provenance, sort_keys=True)
-    return arrow.schema([*fields[:3], *varied, *fields[3:]], metadata={KEY: text.encode()})
+    return arrow.schema(fields, metadata={KEY: text.encode()})
+
+
+def described(factors: Sequence[Vary]) -> dict[str, dict[str, str]]:
+    """Unit and meaning of each column, in their order."""
+    facts = {name: {"unit": unit, "meaning": says} for name, _, unit, says in COLUMNS}
+    varied = {vary.column: {"unit": vary.unit, "meaning": vary.meaning} for vary in factors}
+    first = dict.fromkeys(name for name, *_ in COLUMNS[:3])
+    return {name: facts[name] for name in first} | varied | facts
 
 
 def _kind(arrow: Any, vary: Vary) -> Any:
@@ -172,47 +183,57 @@ def _read(part: Path, columns: Sequence[str] | None = None) -> Any:
     """A file of the dataset as a Table.
 
     Raises:
-        BadInputError: It is damaged.
+        BadInputError: It is damaged, or this library did not write it.
+        OSError: It cannot be opened.
     """
-    _, parquet = require_parquet()
-    try:
-        return parquet.read_table(part, columns=columns, partitioning=None)
-    except Exception as error:
+    arrow, parquet = require_parquet()
+    content = part.read_bytes()
+    if _sealed(content) != content:
         raise BadInputError(
-            f"{part} cannot be read ({type(error).__name__}); remove it, and its cells are "
-            "run again"
-        ) from None
+            f"{part} cannot be read: it is not as it was written. Remove it, and its cells are run "
+            "again"
+        )
+    source = arrow.BufferReader(content)
+    return parquet.read_table(source, columns=columns, page_checksum_verification=True)
 
 
 def _write(part: Path, table: Any) -> None:
+    """Write a file: each page with Parquet's checksum, and all of it with a digest."""
     _, parquet = require_parquet()
-    replace_file(part, lambda out: parquet.write_table(table, out, compression="zstd"))
+    out = io.BytesIO()
+    with parquet.ParquetWriter(
+        out, table.schema, compression="zstd", write_page_checksum=True
+    ) as writer:
+        writer.write_table(table)
+        writer.add_key_value_metadata({_DIGEST.decode(): "0" * _DIGITS})
+    replace_bytes(part, _sealed(out.getvalue()))
+
+
+def _sealed(content: bytes) -> bytes:
+    """A file with the digest of all its other bytes in the place that its footer has for it."""
+    start = content.rfind(_DIGEST) + len(_DIGEST) + 2  # behind the key a type and a length
+    before, after = content[:start], content[start + _DIGITS :]
+    return before + hashlib.sha256(before + after).hexdigest().encode() + after
 
 
 def read_cells(folder: str | Path) -> Any:
-    """The dataset of a sweep as a pyarrow Table, in the order of its cells' ids.
+    """The dataset of a sweep as a pyarrow Table, in the order of the cells' ids.
 
     The column `backend`, which the folders' names tell, is the last.
 
     Raises:
-        BadInputError: There is no dataset, or a file of it is damaged.
+        BadInputError: There is no dataset, or a file of it is damaged or of another one.
         MissingEngineError: pyarrow is not installed.
     """
     arrow, _ = require_parquet()
-    folder = Path(folder)
-    if not _parts(folder):
+    tables: list[Any] = []
+    for part in _parts(Path(folder)):
+        table = _read(part)
+        backend = part.parent.name.partition("=")[2]
+        names = arrow.repeat(arrow.scalar(backend, arrow.string()), table.num_rows)
+        tables.append(table.append_column("backend", names))
+        if not tables[0].schema.equals(tables[-1].schema):
+            raise BadInputError(f"{part} has other columns than the files before it: remove it")
+    if not tables:
         raise BadInputError(f"{folder} has no cells of a sweep")
-    dataset = importlib.import_module("pyarrow.dataset")
-    backend = arrow.schema([("backend", arrow.string())])
-    try:
-        found = dataset.dataset(
-            folder / CELLS,
-            format="parquet",
-            partitioning=dataset.partitioning(backend, flavor="hive"),
-            exclude_invalid_files=False,
-        )
-        return found.to_table().sort_by("cell")
-    except (arrow.ArrowException, OSError):
-        for part in _parts(folder):
-            _read(part)  # says which one
-        raise
+    return arrow.concat_tables(tables).sort_by("cell")

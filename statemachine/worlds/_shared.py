@@ -12,6 +12,7 @@ import os
 import secrets
 import sys
 import tempfile
+import weakref
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -48,6 +49,8 @@ class SharedBlock:
         else:
             with tempfile.TemporaryFile() as file:
                 self._file = os.dup(file.fileno())
+        # Worlds may be collected without having been closed.
+        self._end = weakref.finalize(self, os.close, self._file)
         os.ftruncate(self._file, size)
         self.handle = str(self._file)
         self.memory = mmap.mmap(self._file, size)
@@ -62,7 +65,7 @@ class SharedBlock:
     def close(self) -> None:
         """Let go of it; who still has an array of it keeps that."""
         if sys.platform != "win32":
-            os.close(self._file)
+            self._end()
         del self.memory
 
 

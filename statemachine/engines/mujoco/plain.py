@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...backends.binary import is_binary, read_binary
 from ...installed import require
 from ...interface import Array
 
@@ -22,11 +23,11 @@ def run(path: Path, commands: Array, keyframe: int | None) -> Array | None:
         None where MuJoCo alone cannot open the file: it looks for no ROS packages.
     """
     mujoco = require("mujoco")
-    open_file = mujoco.MjModel.from_xml_path
-    if path.suffix.lower() == ".mjb":
-        open_file = mujoco.MjModel.from_binary_path
     try:
-        model = open_file(str(path))
+        if is_binary(path):
+            model = mujoco.MjModel.from_binary_path(path.name, {path.name: read_binary(path)})
+        else:
+            model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError:
         return None
     data = mujoco.MjData(model)
