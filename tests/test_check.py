@@ -22,7 +22,7 @@ import pytest
 
 from statemachine import cli as command_line
 from statemachine.errors import MissingEngineError
-from statemachine.grading import exercise, recording
+from statemachine.grading import exercise, own_files, recording
 from statemachine.grading.answers import Answer
 from statemachine.grading.calls import FaultError
 from statemachine.grading.examine import FunctionVerdict, answers_of, answers_of_file, judged
@@ -120,7 +120,7 @@ def test_pybullet_judges_alike(attempt: Attempt, prepared: Prepare) -> None:
 
 
 _HEAD = """
-import ctypes, os, runpy, socket, subprocess, sys, threading, time
+import ctypes, os, socket, subprocess, sys, threading, time
 import numpy as np
 import statemachine as sm
 """
@@ -129,7 +129,7 @@ import statemachine as sm
 def _grade(folder: Path, *functions: str, limit: float = 5.0) -> dict[str, exercise.Judgement]:
     """The judgements on a file of these functions, by name; `RIGHT.f` is the solution's."""
     file = folder / "student.py"
-    right = f"RIGHT = runpy.run_path({str(SOLUTION)!r})\n"
+    right = f"RIGHT = {{}}; exec({SOLUTION.read_text(encoding='utf-8')!r}, RIGHT)\n"
     file.write_text(_HEAD + right + "\n".join(functions), encoding="utf-8")
     grade = exercise.run(file, time_limit=limit)
     assert grade.right == sum(each.passed for each in grade.functions)
@@ -345,6 +345,55 @@ def test_a_forged_record_is_judged_like_any_other(tmp_path: Path) -> None:
     for name in ("state", "forward", "replay"):
         assert "what its process recorded is no record of a run (" in _one(found[name])
     assert "(it is gone)" in _one(found["forward"])
+
+
+def test_what_reads_somebody_s_answers_is_not_graded(tmp_path: Path) -> None:
+    (tmp_path / "bob.py").write_text(SOLUTION.read_text(encoding="utf-8"), encoding="utf-8")
+    (tmp_path / "notes.txt").write_text("hello")
+    source = "exec(open({!r}).read(), n := {{}}); return n[{!r}]"
+    beside = "exec(open(__file__.replace('student', 'bob')).read(), n := {}); return n"
+    found = _grade(
+        tmp_path,
+        "def demo_gravity(model, seconds=4):\n    "
+        + source.format(str(SOLUTION), "demo_gravity")
+        + "(model, seconds)",
+        f"def demo_state(model):\n    {beside}['demo_state'](model)",
+        "def demo_forward(model):\n    import bob\n    return bob.demo_forward(model)",
+        "def demo_replay(model, ctrl, nstep=600):\n"
+        f"    open({str(tmp_path / 'notes.txt')!r}).read()\n"
+        "    return RIGHT['demo_replay'](model, ctrl, nstep)",
+    )
+    for name in ("gravity", "state", "forward"):
+        assert not found[name].judged
+        assert _one(found[name]).startswith("not graded: it reads ")
+    assert "solutions/step_loop.py, which was not handed in with it" in _one(found["gravity"])
+    for name in ("state", "forward"):
+        assert f"{(tmp_path / 'bob.py').as_posix()}, which" in _one(found[name])
+    assert found["replay"].passed
+    assert found["replay"].remarks[1:] == (
+        f"please look at this: it reads {(tmp_path / 'notes.txt').as_posix()}",
+    )
+
+
+def test_what_belongs_to_a_file_is_given_along(tmp_path: Path) -> None:
+    student = tmp_path / "student.py"
+    student.write_text("import helper\nfrom tools import more\nDATA = 'table.json'\n")
+    (tmp_path / "helper.py").write_text("import deeper\n")
+    for name in ("deeper.py", "table.json", "unnamed.py", ".hidden.py", "tools.txt"):
+        (tmp_path / name).write_text("")
+    (tmp_path / "tools").mkdir()
+    (tmp_path / "tools" / "__init__.py").write_text("from more import demo_gravity\n")
+    (tmp_path / "more.py").write_text("def demo_gravity(model): return bob\n")
+    assert set(own_files.named_by(student)) == {
+        "student.py", "helper.py", "deeper.py", "table.json", "tools/__init__.py", "tools.txt",
+    }  # fmt: skip
+    env = tmp_path / "env"
+    env.mkdir()
+    for name in ("pyvenv.cfg", "x.py"):
+        (env / name).write_text("")
+    whole = own_files.in_folder(tmp_path)
+    assert {"more.py", "unnamed.py", "tools/__init__.py"} < set(whole)
+    assert not {"env/x.py", ".hidden.py"} & set(whole)
 
 
 def test_a_judge_that_is_replaced_is_another_process_s(tmp_path: Path) -> None:

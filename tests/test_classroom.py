@@ -177,6 +177,39 @@ def test_the_same_code_is_told_and_unwritten_files_are_not(folder: Path, judged:
     assert not entries["cy"].judged
 
 
+def test_functions_that_are_alike_are_told_whatever_is_named_how(
+    folder: Path, judged: list[str]
+) -> None:
+    text = SOLUTION.read_text()
+    for name, other in (("angles", "a"), ("slots", "s"), ("once", "f"), ("data", "d")):
+        text = text.replace(name, other)
+    (folder / "gus.py").write_text(text.replace("0.8", "0.80"))
+    (folder / "hal.py").write_text(
+        "def demo_state(model):\n    a, b = ([*x, n] for x, n in ((model.jnt_qposadr, model.nq),"
+        " (model.jnt_dofadr, model.nv)))\n    return dict(zip(a, b)), 6.0\n"
+    )
+    entries = {e.name: e for e in judge_all(submissions([folder]), "mujoco")}
+    assert entries["gus.py"].alike == "100% ann"
+    assert entries["gus.py"].same_as == ""
+    assert entries["ann"].alike.startswith("100% ")
+    assert entries["bob"].alike == ""  # it is not written yet
+    assert float(entries["hal.py"].alike.partition("%")[0]) < 50
+    (row,) = (row for row in csv.DictReader(io.StringIO(as_csv([entries["gus.py"]]))))
+    assert row["alike"] == "100% ann"
+
+
+def test_a_file_in_a_class_is_judged_alone(folder: Path) -> None:
+    (folder / "helper.py").write_text("ANSWER = 1\n")
+    text = SOLUTION.read_text().replace("import math", "import helper\nimport math")
+    for place in (folder / "gus.py", folder / "ann" / "my_solution.py"):
+        place.write_text(text)
+    found = [each for each in submissions([folder]) if each.name in ("ann", "gus.py")]
+    ann, gus = judge_all(found, "mujoco")
+    assert ann.right == 4
+    assert not gus.judged
+    assert "helper.py, which was not handed in with it" in gus.functions[0].remarks[0]
+
+
 def test_a_table_is_resumed(folder: Path, judged: list[str], tmp_path: Path) -> None:
     table = tmp_path / "grades.csv"
     first = judge_all(submissions([folder]), "mujoco", table=table)

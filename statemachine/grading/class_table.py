@@ -13,7 +13,7 @@ from ..traces.whole import replace_text
 from .exercise import Judgement
 from .judges import JUDGES
 
-_HEAD = ("file", "right", "of", *JUDGES, "remarks", "same_as", "sha256", "made_with")
+_HEAD = ("file", "right", "of", *JUDGES, "remarks", "same_as", "alike", "sha256", "made_with")
 _WORDS = {"right", "wrong", "not written", "not judged"}
 
 
@@ -29,6 +29,8 @@ class ClassEntry:
         refusal: Why it could not.
         made_with: Backend, versions and limit that the verdict comes from.
         same_as: The first submission whose code is the same, comments and layout aside.
+        alike: How much of the functions' syntax is that of another submission, names and
+            constants aside, and of which one the most.
     """
 
     name: str
@@ -37,6 +39,7 @@ class ClassEntry:
     refusal: str
     made_with: str
     same_as: str = ""
+    alike: str = ""
 
     @property
     def right(self) -> int:
@@ -66,6 +69,7 @@ def as_csv(entries: Iterable[ClassEntry]) -> str:
             *(words.get(name, "not judged") for name in JUDGES),
             "\n".join([entry.refusal] if entry.refusal else remarks),
             entry.same_as,
+            entry.alike,
             entry.sha256,
             entry.made_with,
         )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ast
-import hashlib
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,9 +11,10 @@ from pathlib import Path
 from ..errors import BadInputError
 from ..processes import checked_jobs
 from .class_table import ClassEntry, read, write
-from .exercise import LARGEST, TIME_LIMIT, ExerciseJudge, Grade
-from .judges import JUDGES
+from .exercise import TIME_LIMIT, ExerciseJudge, Grade
+from .own_files import digest, has_functions, in_folder
 from .parallel import in_parallel
+from .similarity import code_of, likeness, shape_of
 
 _NAMES = ("step_loop.py", "test_arm.py")  # of the exercise's own files
 
@@ -32,6 +31,13 @@ class Submission:
     path: Path | None
     refusal: str = ""
     folder: Path | None = None
+
+    @property
+    def own(self) -> dict[str, Path]:
+        """The files that belong to it, by their names in its folder; alone in that of a class."""
+        if self.path is None:
+            return {}
+        return in_folder(self.folder) if self.folder else {self.path.name: self.path}
 
 
 def submissions(paths: Sequence[str | os.PathLike[str]]) -> list[Submission]:
@@ -82,7 +88,7 @@ def is_one_students(folder: Path) -> bool:
     if not any((folder / name).is_file() for name in _NAMES):
         return False
     return not any(
-        _has_a_function(file)
+        has_functions(file)
         for entry in folder.iterdir()
         if not _skipped(entry) and entry.name not in _NAMES
         for file in (entry.rglob("*.py") if entry.is_dir() else [entry])
@@ -113,7 +119,7 @@ def _in_entry(entry: Path) -> list[Submission]:
         return [Submission(entry.name, entry)] if entry.suffix.lower() == ".py" else []
     if not entry.is_dir():
         return []
-    files = [file for file in sorted(entry.rglob("*.py")) if _has_a_function(file)]
+    files = [file for file in sorted(entry.rglob("*.py")) if has_functions(file)]
     files = [file for file in files if file.name == _NAMES[0]] or files
     if len(files) == 1:
         return [Submission(entry.name, files[0], folder=entry)]
@@ -124,17 +130,6 @@ def _in_entry(entry: Path) -> list[Submission]:
         names = ", ".join(file.relative_to(entry).as_posix() for file in files[:3])
         text = f"{len(files)} files in it have the functions: {names}"
     return [Submission(entry.name, None, text)]
-
-
-def _has_a_function(file: Path) -> bool:
-    try:
-        if not file.is_file():  # a pipe would wait for somebody to write
-            return False
-        with file.open("rb") as content:
-            start = content.read(LARGEST)
-    except OSError:
-        return False
-    return any(f"def {name}".encode() in start for name in JUDGES)
 
 
 def judge_all(
@@ -165,23 +160,24 @@ def judge_all(
     jobs = checked_jobs(jobs, processors=2)
     before = read(table) if table is not None and table.exists() else {}
     entries: dict[str, ClassEntry] = {}
-    code_of = cache(_code)  # the table is written after each file, and asks for all of them
-    with ExerciseJudge(backend, time_limit) as judge:
+    compared = _Compared(found)
+    own = {each.path: each.own for each in found if each.path}
+    with ExerciseJudge(backend, time_limit, own=own) as judge:
         versions = " ".join(f"{name} {version}" for name, version in judge.versions.items())
         made_with = f"{backend}, {versions}, {time_limit:g} s"
         work: dict[str, Callable[[], ClassEntry]] = {}
         for each in found:
-            digest = _digest(each)
-            known = before.get((digest, made_with))
+            content = digest(each.own)
+            known = before.get((content, made_with))
             if known is not None and known.judged:
                 entries[each.name] = replace(known, name=each.name)
             else:
-                work[each.name] = partial(_entry, judge, each, digest, made_with)
+                work[each.name] = partial(_entry, judge, each, content, made_with)
 
         def ended(name: str, entry: ClassEntry) -> None:
             entries[name] = entry
             if table is not None:
-                write(table, _in_order(found, entries, code_of))
+                write(table, compared.in_order(entries))
 
         in_parallel(
             work,
@@ -190,80 +186,46 @@ def judge_all(
             stop=judge.stop.set,
             progress=lambda waiting: progress(1 - waiting / len(found)),
         )
-    done = _in_order(found, entries, code_of)
+    done = compared.in_order(entries)
     if table is not None:
         write(table, done)
     return done
 
 
-def _entry(judge: ExerciseJudge, submission: Submission, digest: str, made_with: str) -> ClassEntry:
+def _entry(judge: ExerciseJudge, submission: Submission, sha256: str, made_with: str) -> ClassEntry:
     if submission.path is None:
-        return ClassEntry(submission.name, digest, (), submission.refusal, made_with)
+        return ClassEntry(submission.name, sha256, (), submission.refusal, made_with)
     try:
         grade: Grade = judge.judge(submission.path)
     except BadInputError as error:
-        return ClassEntry(submission.name, digest, (), str(error), made_with)
-    return ClassEntry(submission.name, digest, grade.functions, "", made_with)
+        return ClassEntry(submission.name, sha256, (), str(error), made_with)
+    return ClassEntry(submission.name, sha256, grade.functions, "", made_with)
 
 
-def _in_order(
-    found: Sequence[Submission],
-    entries: Mapping[str, ClassEntry],
-    code_of: Callable[[Path | None], str],
-) -> list[ClassEntry]:
-    """The entries in the order of the submissions, each told which earlier one it equals."""
-    done = []
-    first: dict[str, str] = {}
-    for each in found:
-        if each.name not in entries:
-            continue
-        entry, same = entries[each.name], ""
-        if any(judgement.written for judgement in entry.functions):
-            code = code_of(each.path)
-            same = first.setdefault(code, each.name) if code else ""
-        done.append(replace(entry, same_as="" if same == each.name else same))
-    return done
+class _Compared:
+    """Submissions, each compared with all others; each pair once, though a table asks often."""
 
+    def __init__(self, found: Sequence[Submission]) -> None:
+        self._found = found
+        self._code, shape = cache(code_of), cache(shape_of)
+        self._likeness = cache(lambda left, right: likeness(shape(left), shape(right)))
 
-def _digest(submission: Submission) -> str:
-    """Of the file, and of what it may import out of the student's folder.
-
-    "" where there is none, or where it is too large to be judged.
-    """
-    if submission.path is None:
-        return ""
-    folder = submission.folder
-    try:
-        files = [submission.path] if folder is None else sorted(folder.rglob("*.py"))
-        whole = hashlib.sha256()
-        for file in files:
-            if not file.is_file() or file.stat().st_size > LARGEST:
-                if file == submission.path:
-                    return ""
+    def in_order(self, entries: Mapping[str, ClassEntry]) -> list[ClassEntry]:
+        """The entries in the order of the submissions, each with those that are like it."""
+        done = []
+        first: dict[str, str] = {}
+        for each in self._found:
+            if each.name not in entries:
                 continue
-            name = b"" if folder is None else os.fsencode(file.relative_to(folder))
-            content = file.read_bytes()
-            whole.update(b"%d %d " % (len(name), len(content)) + name + content)
-        return whole.hexdigest()
-    except OSError:
-        return ""
+            entry, same = entries[each.name], ""
+            if any(judgement.written for judgement in entry.functions):
+                code = self._code(each.path)
+                same = first.setdefault(code, each.name) if code else ""
+            others = ((self._alike(each, other), other.name) for other in self._found)
+            part, name = max(others, key=lambda other: other[0])
+            alike = f"{part:.0%} {name}" if part else ""
+            done.append(replace(entry, same_as="" if same == each.name else same, alike=alike))
+        return done
 
-
-def _code(path: Path | None) -> str:
-    """A digest of what a file does, without its comments, docstrings and layout; or ""."""
-    try:
-        tree = ast.parse(path.read_bytes()) if path is not None else None
-        if tree is None:
-            return ""
-        for node in ast.walk(tree):
-            body = getattr(node, "body", None)
-            if (
-                isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef))
-                and body
-                and isinstance(body[0], ast.Expr)
-                and isinstance(body[0].value, ast.Constant)
-            ):
-                node.body = body[1:] or [ast.Pass()]
-        return hashlib.sha256(ast.dump(tree).encode(errors="replace")).hexdigest()
-    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):
-        return ""
+    def _alike(self, left: Submission, right: Submission) -> float:
+        return 0.0 if left is right else self._likeness(left.path, right.path)

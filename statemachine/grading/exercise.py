@@ -8,17 +8,16 @@ the answers and the runs that are asked for. They must be right, so he has to wo
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 import shutil
 import sys
 import tempfile
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +28,7 @@ from ..installed import DEFAULT, engine_version
 from . import sandbox
 from .examine import judged
 from .judges import JUDGES, judge_of
+from .own_files import LARGEST, digest, has_solutions, named_by
 from .recording import START, FunctionRecording, Limits, record
 from .unwinding import unwinding
 from .worlds import ExerciseWorld, Scenes
@@ -36,7 +36,6 @@ from .worlds import ExerciseWorld, Scenes
 TIME_LIMIT = 5.0  # [s] of computing for a function, from when its worlds are ready
 WALL_LIMIT = 120.0  # [s] on the clock for it, which a busy machine may need too
 _TIMES = 4  # a busy machine needs longer on the clock: so many times what may be computed, at least
-LARGEST = 1_000_000  # bytes of a student's file
 
 
 @dataclass(frozen=True)
@@ -127,9 +126,17 @@ class ExerciseJudge:
     """
 
     def __init__(
-        self, backend: str, time_limit: float = TIME_LIMIT, wall_limit: float = WALL_LIMIT
+        self,
+        backend: str,
+        time_limit: float = TIME_LIMIT,
+        wall_limit: float = WALL_LIMIT,
+        own: Mapping[Path, Mapping[str, Path]] | None = None,
     ) -> None:
-        """Arguments as `run` has them."""
+        """Arguments as `run` has them.
+
+        `own` has for a submission all files that belong to it, by their names in its folder; for
+        others these are what they name beside them.
+        """
         if not 0 < time_limit <= 3600:
             raise BadInputError(
                 f"the time limit must be above 0 s, and at most 3600; got {time_limit:g}"
@@ -141,6 +148,7 @@ class ExerciseJudge:
             self.versions[engine] = engine_version(engine)
         self.limits = Limits(time_limit, max(wall_limit, _TIMES * time_limit))
         self.stop = threading.Event()
+        self._own = own or {}
         self._cleanup = ExitStack()
         self._lock = threading.Lock()
         self._key: dict[str, tuple[list[ExerciseWorld], list[Any]]] = {}
@@ -170,24 +178,30 @@ class ExerciseJudge:
             BadInputError: There is no such file, or it is no Python file.
         """
         path = _python_file(Path(file))
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        own = self._own.get(Path(file)) or named_by(path)
         folder = Path(tempfile.mkdtemp(dir=self._folder))
-        judgements = self._all(path, folder, progress)
+        judgements = self._all(_copied(path, own, folder / "own"), folder, progress)
         shutil.rmtree(folder, ignore_errors=True)
         limits = self.limits
         return Grade(
-            path.name, digest, self.backend, self.versions, judgements, limits.cpu, limits.wall
+            path.name,
+            digest({path.name: path}),
+            self.backend,
+            self.versions,
+            judgements,
+            limits.cpu,
+            limits.wall,
         )
 
     def _all(
-        self, path: Path, folder: Path, progress: Callable[[float], None]
+        self, copy: _Copy, folder: Path, progress: Callable[[float], None]
     ) -> tuple[Judgement, ...]:
         """All functions at once, so that the slowest decides how long it takes."""
         backend, limits, stop = self.backend, self.limits, threading.Event()
         with ThreadPoolExecutor(len(JUDGES)) as pool:
             try:
                 futures = {
-                    name: pool.submit(_recorded, path, name, backend, limits, folder / name, stop)
+                    name: pool.submit(_recorded, copy, name, backend, limits, folder / name, stop)
                     for name in JUDGES
                 }
                 # Meanwhile what is right is worked out here, where no code of the student's runs.
@@ -199,7 +213,7 @@ class ExerciseJudge:
                     waiting = wait(waiting, timeout=0.1).not_done
                     progress(1 - len(waiting) / len(futures))
                 return tuple(
-                    _judgement(path, name, limits, *key[name], future.result())
+                    _judgement(copy, name, limits, *key[name], future.result())
                     for name, future in futures.items()
                 )
             finally:
@@ -243,18 +257,48 @@ def _python_file(path: Path) -> Path:
     return path
 
 
+@dataclass(frozen=True)
+class _Copy:
+    """A student's file alone with what belongs to it: `path` in `folder`; it was in `before`."""
+
+    path: Path
+    folder: Path
+    before: Path
+
+    def others(self, reads: Iterable[str]) -> dict[str, bool]:
+        """Files that are not its own, by name; whether it may not be judged for that."""
+        others = {}
+        for each in map(Path, reads):
+            beside = each.is_relative_to(self.folder)
+            file = self.before / each.relative_to(self.folder) if beside else each
+            if file.exists():
+                here = file.relative_to(Path.cwd()) if file.is_relative_to(Path.cwd()) else file
+                others[here.as_posix()] = beside or has_solutions(file)
+        return others
+
+
+def _copied(path: Path, own: Mapping[str, Path], folder: Path) -> _Copy:
+    for name, file in own.items():
+        target = folder / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(file, target)
+    (name,) = (name for name, file in own.items() if file.resolve() == path)
+    folder = folder.resolve()
+    return _Copy(folder / name, folder, path.parents[name.count("/")])
+
+
 def _recorded(
-    path: Path, name: str, backend: str, limits: Limits, folder: Path, stop: threading.Event
+    copy: _Copy, name: str, backend: str, limits: Limits, folder: Path, stop: threading.Event
 ) -> FunctionRecording:
     """A recording; if the process did not get ready, a second one."""
-    recording = record(path, name, backend, limits, folder / "1", stop)
+    recording = record(copy.path, copy.folder, name, backend, limits, folder / "1", stop)
     if recording.began or recording.refusal or recording.broken or stop.is_set():
         return recording
-    return record(path, name, backend, limits, folder / "2", stop)
+    return record(copy.path, copy.folder, name, backend, limits, folder / "2", stop)
 
 
 def _judgement(
-    path: Path,
+    copy: _Copy,
     name: str,
     limits: Limits,
     worlds: list[ExerciseWorld],
@@ -267,6 +311,26 @@ def _judgement(
         if isinstance(known, type) and issubclass(known, StateMachineError):
             raise known(text)
         raise EngineError(text)
+    others = copy.others(recording.reads)
+    if borrowed := ", ".join(other for other, matters in others.items() if matters):
+        text = (
+            f"not graded: it reads {borrowed}, which was not handed in with it. Is that your own? "
+            "Put it into this file"
+        )
+        return Judgement(name, True, False, (text,), judged=False)
+    looks = tuple(f"please look at this: it reads {other}" for other in others)
+    judgement = _verdict(copy.path, name, limits, worlds, rights, recording)
+    return replace(judgement, remarks=judgement.remarks + looks)
+
+
+def _verdict(
+    path: Path,
+    name: str,
+    limits: Limits,
+    worlds: list[ExerciseWorld],
+    rights: list[Any],
+    recording: FunctionRecording,
+) -> Judgement:
     if recording.forbidden:
         return Judgement(name, True, False, tuple(recording.forbidden))
     try:

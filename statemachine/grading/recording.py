@@ -52,6 +52,7 @@ class FunctionRecording:
         refusal: The kind of an error, and what it said, where there is no engine.
         answers: What came of the function, world after world, as far as it came.
         forbidden: What the student's code tried and may not do.
+        reads: Names of the files that it opened and that are not its own; see `guard.Guard`.
         trace: What its fault handler wrote.
         broken: Why the record is none, if it is none.
     """
@@ -63,16 +64,24 @@ class FunctionRecording:
     refusal: tuple[str, str] | None = None
     answers: list[Answer | FaultError] = field(default_factory=list)
     forbidden: list[str] = field(default_factory=list)
+    reads: list[str] = field(default_factory=list)
     broken: str = ""
 
 
 def record(
-    path: Path, name: str, backend: str, limits: Limits, folder: Path, stop: threading.Event
+    path: Path,
+    own: Path,
+    name: str,
+    backend: str,
+    limits: Limits,
+    folder: Path,
+    stop: threading.Event,
 ) -> FunctionRecording:
     """Run a function of a file on its worlds.
 
     Args:
         path: The file.
+        own: The folder of all files that belong to it.
         name: Of the function.
         backend: Of the backend.
         limits: From when the worlds are ready.
@@ -85,6 +94,7 @@ def record(
     job = folder / "job"
     facts = {
         "file": str(path),
+        "own": str(own),
         "function": name,
         "backend": backend,
         "cpu": limits.cpu,
@@ -134,11 +144,11 @@ def _add(recording: FunctionRecording, line: bytes, nonce: str) -> None:
             recording.refusal = _text(found["kind"]), _text(found["text"])
         case "running" if not recording.began:
             recording.began, recording.cpu = True, float(found["cpu"])
+        case "forbidden" | "reads" as kind if recording.began:
+            getattr(recording, kind).append(_text(found["text"]))
         case "answer" if recording.began:
-            recording.forbidden = [_text(text) for text in found["refused"]]
             recording.answers.append(decode(found["answer"]))
         case "fault" if recording.began:
-            recording.forbidden = [_text(text) for text in found["refused"]]
             written = found["written"] is True
             recording.answers.append(FaultError(_text(found["text"]), written))
         case _:
