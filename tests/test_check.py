@@ -192,12 +192,31 @@ def test_what_does_not_get_ready_is_tried_again(monkeypatch: pytest.MonkeyPatch)
     assert exercise.run(SOLUTION).passed
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="the time asleep is told by /proc")
+@pytest.mark.slow
+def test_a_file_that_sleeps_costs_little_more_than_one_that_computes(tmp_path: Path) -> None:
+    file = tmp_path / "student.py"
+    calls = "time.sleep(1e6)", "ctypes.PyDLL(None).sleep(10**6)", "LOCK.acquire()", "sig.pause()"
+    waits = "def {}(*_):\n    {}\n"
+    file.write_text(
+        "import ctypes, threading, time, signal as sig\nLOCK = threading.Lock(); LOCK.acquire()\n"
+        + "".join(waits.format(*pair) for pair in zip(JUDGES, calls, strict=True))
+    )
+    before = time.monotonic()
+    grade = exercise.run(file)
+    assert time.monotonic() - before < 60
+    for line, judgement in zip((4, 6, 8, 10), grade.functions, strict=True):
+        assert not judgement.judged
+        assert _one(judgement).startswith(f"line {line}: nothing could be judged: not at its end ")
+        assert "after 10 s on the clock" in _one(judgement)
+
+
 @pytest.mark.slow
 def test_a_right_answer_passes_on_a_busy_machine() -> None:
     busy = "import time; end = time.monotonic() + 60\nwhile time.monotonic() < end: pass"
-    others = [subprocess.Popen([sys.executable, "-c", busy]) for _ in range(6)]
+    others = [subprocess.Popen([sys.executable, "-c", busy]) for _ in range(8)]
     try:
-        grade = exercise.run(SOLUTION)
+        grade = exercise.run(SOLUTION, wall_limit=4.0, time_limit=2.0)
     finally:
         for other in others:
             other.kill()
@@ -445,6 +464,9 @@ def test_it_reaches_neither_us_nor_the_files(
         ("x = 1 / 0\n", "line 1: ZeroDivisionError: division by zero (in `x = 1 / 0`)"),
         ("import not_there\n", "No module named 'not_there'"),
         ("x = '\\udc80'.encode()\n", "UnicodeEncodeError"),
+        ("# caf\xe9\n", "loaded: line 1: this is not UTF-8, and Python refuses the file. Save"),
+        ("import os\n\nx = '\xe9'\n", "the file cannot be loaded: line 3: this is not UTF-8"),
+        ("# -*- coding: latin-1 -*-\nx = '\xe9'\n", "the file has no function demo_gravity"),
         ("", "the file has no function demo_gravity"),
         ("demo_gravity = 4\n", "demo_gravity is no function: int"),
         ("def demo_gravity(): pass\n", "too many positional arguments"),
@@ -455,7 +477,7 @@ def test_a_file_that_cannot_be_called_is_told_in_a_line(
     content: str, message: str, tmp_path: Path, prepared: Prepare
 ) -> None:
     file = tmp_path / "student.py"
-    file.write_text(content)
+    file.write_text(content, encoding="latin-1")
     judge, there = judge_of("demo_gravity"), prepared("demo_gravity", "mujoco")
     worlds, rights = there
     answers = answers_of_file(file, "demo_gravity", worlds)

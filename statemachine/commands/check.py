@@ -36,7 +36,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         default=5.0,
         metavar="S",
         help="seconds that each function of FILE may compute (default 5); time in which the "
-        "machine is busy with others does not count, up to 120 s on the clock, or four times S",
+        "machine is busy with others does not count, up to 120 s on the clock, or 8 times S; "
+        "what only waits may do so for 10 s, or twice S",
     )
     parser.add_argument(
         "--csv",

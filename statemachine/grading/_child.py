@@ -67,7 +67,7 @@ def main(job_file: str) -> None:
     Guard(path, Path(job["own"]), Path(job["answers"]).parent, record.note)
     sys.path.insert(0, str(path.parent))  # as when the file is run; engines are loaded by now
     record.say("running", cpu=time.process_time())
-    limit_cpu(job["cpu"], job["wall"], trace)
+    limit_cpu(job["cpu"], trace)
     for answer in answers_of_file(path, job["function"], worlds):
         if isinstance(answer, FaultError):
             record.say("fault", text=str(answer), written=answer.written)

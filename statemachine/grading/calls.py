@@ -55,6 +55,16 @@ def load_file(path: Path) -> dict[str, Any]:
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[_MODULE] = module  # dataclasses and pickle look it up there
+    content = path.read_bytes()
+    try:
+        importlib.util.decode_source(content)  # which compiling bytes does not ask of comments
+    except (UnicodeDecodeError, SyntaxError):
+        lines = enumerate(content.split(b"\n"), start=1)
+        line = next((k for k, text in lines if text.decode(errors="ignore").encode() != text), 1)
+        raise FaultError(
+            f"the file cannot be loaded: line {line}: this is not UTF-8, and Python refuses the "
+            "file. Save it as UTF-8"
+        ) from None
     try:
         spec.loader.exec_module(module)
     except BaseException as error:

@@ -34,8 +34,8 @@ from .unwinding import unwinding
 from .worlds import ExerciseWorld, Scenes
 
 TIME_LIMIT = 5.0  # [s] of computing for a function, from when its worlds are ready
-WALL_LIMIT = 120.0  # [s] on the clock for it, which a busy machine may need too
-_TIMES = 4  # a busy machine needs longer on the clock: so many times what may be computed, at least
+WALL_LIMIT = 10.0  # [s] on the clock for it, those apart in which others have the processor
+_TIMES = 2  # so many times what may be computed, at least
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,7 @@ class Grade:
         file: Its name; sha256: the digest of its content.
         backend: The backend that it ran on; versions: of what it ran with.
         functions: One after the other, in the exercise's order.
-        cpu_limit: What each function might compute [s], and wall_limit, what it might take on
-            the clock [s].
+        cpu_limit: What each function might compute [s], and wall_limit, what it might wait [s].
     """
 
     file: str
@@ -103,8 +102,8 @@ def run(
         time_limit: What each function may compute, after everything it needs is ready [s];
             this does not pass while the machine is busy with others.
         progress: Told the fraction that is done.
-        wall_limit: What each may take on the clock, from the same moment [s]; at least four
-            times `time_limit`.
+        wall_limit: What each may take on the clock, from the same moment [s], where it waits for
+            something else than a processor; at least twice `time_limit`.
 
     Raises:
         BadInputError: There is no such file, or it is no Python file.
@@ -357,14 +356,15 @@ def _unfinished(path: Path, name: str, limits: Limits, recording: FunctionRecord
     last = trace.rpartition("Timeout (")[2]
     lines = re.findall(rf'File "{re.escape(str(path))}", line (\d+)', last)
     where = f"line {lines[0]}: " if lines else ""
-    by_itself = os.name == "posix" and trace.startswith("Timeout")
-    if not outcome.timed_out and (outcome.out_of_cpu or not by_itself):
+    if not outcome.timed_out:
         return Judgement(name, True, False, (where + _how_it_ended(limits, outcome),))
     computed = max(0.0, outcome.cpu - recording.cpu)
+    busy, clock = "is this machine busy?", outcome.wall
+    if outcome.asleep > limits.wall:
+        busy, clock = "does it wait for something (sleep, a lock)?", limits.wall
     text = (
-        f"{where}nothing could be judged: not at its end after {limits.wall:g} s on the clock, "
-        f"of which it computed for {computed:.1f} s. Does it wait for something, or is this "
-        "machine busy?"
+        f"{where}nothing could be judged: not at its end after {clock:.3g} s on the clock, "
+        f"of which it computed for {computed:.1f} s: {busy}"
     )
     return Judgement(name, True, False, (text,), judged=False)
 

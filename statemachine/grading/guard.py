@@ -31,7 +31,9 @@ _REFUSED = {
     "socket.getaddrinfo": "it wants to use the network",
 }
 _READS = ("open", "os.link", "os.rename")  # with the name of a file first
-_SYSTEM = ("/usr", "/etc", "/proc", "/sys", "/dev", "/lib", "/System", "/Library")
+_SYSTEM: tuple[str, ...] = ()
+if sys.platform != "win32":
+    _SYSTEM = ("/usr", "/etc", "/proc", "/sys", "/dev", "/lib", "/System", "/Library")
 
 
 class Guard:
@@ -61,8 +63,9 @@ class Guard:
     def _hear(self, event: str, arguments: tuple[Any, ...]) -> None:
         if event in _REFUSED:
             where = _line_in(sys._getframe(), self._file)
-            text = f"{where}{_REFUSED[event]} ({event}), which no exercise needs"
-            self._once("forbidden", text)
+            if where is not None:
+                text = f"{where}{_REFUSED[event]} ({event}), which no exercise needs"
+                self._once("forbidden", text)
             raise PermissionError(f"{_REFUSED[event]}: not here")
         if event in _READS:
             self._look_at(arguments[0])
@@ -72,8 +75,9 @@ class Guard:
     def _look_at(self, name: Any) -> None:
         with suppress(TypeError, ValueError):  # the number of an open file; no name at all
             path = os.path.realpath(os.fsdecode(name))
-            missing = path.startswith(self._own) and "__pycache__" not in path
-            if os.path.exists(path) != missing and (missing or not path.startswith(self._open)):
+            inside = path + os.sep
+            missing = inside.startswith(self._own) and "__pycache__" not in path
+            if os.path.exists(path) != missing and (missing or not inside.startswith(self._open)):
                 self._once("reads", path)
 
     def _once(self, kind: str, text: str) -> None:
@@ -82,10 +86,15 @@ class Guard:
             self._tell(kind, text)
 
 
-def _line_in(frame: Any, path: Path) -> str:
-    """'line 12: ', the innermost line of the student's file; nothing if there is none."""
+def _line_in(frame: Any, path: Path) -> str | None:
+    """'line 12: ', the innermost line of the student's file; nothing if there is none.
+
+    None where a package wants it, which does without: of matplotlib, a program that lists fonts.
+    """
     while frame is not None:
         if frame.f_code.co_filename == str(path):
             return f"line {frame.f_lineno}: "
+        if "site-packages" in frame.f_code.co_filename:
+            return None
         frame = frame.f_back
     return ""
