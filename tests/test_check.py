@@ -100,6 +100,29 @@ def test_a_wrong_solution_is_told_what_is_wrong(attempt: Attempt, prepared: Prep
     assert not any(re.search(r"\b1 (steps|joints|numbers)", text) for text in texts), texts
 
 
+def test_hints_do_not_lead_astray(prepared: Prepare) -> None:
+    wrong = {attempt.name: attempt for attempt in WRONG}
+    for name, misleading in (
+        ("replay-one_run_under_two_names", "copy"),
+        ("replay-command_for_position", "did not begin"),
+        ("gravity-speed_for_position", "no gravity"),
+        ("gravity-nothing_read_from_the_runs", "no gravity"),
+        ("forward-two_readings", "positions is"),
+    ):
+        texts = _texts(_verdict(wrong[name], prepared(wrong[name].solves, "mujoco")))
+        assert not any(misleading in text for text in texts), texts
+    speeds = wrong["gravity-speed_for_position"]
+    for text in _texts(_verdict(speeds, prepared("demo_gravity", "mujoco"))):
+        assert text.endswith("that is its speed, qvel; its position is in qpos")
+
+
+def test_what_is_said_of_a_right_solution_is_short_and_true(prepared: Prepare) -> None:
+    for attempt in RIGHT:
+        (text,) = _texts(_verdict(attempt, prepared(attempt.solves, "mujoco")))
+        assert len(text) <= 96, text
+        assert "untouched" not in text  # who writes zeros into zeros is right, too
+
+
 def test_every_wrong_solution_has_a_message_of_its_own() -> None:
     assert len(WRONG) >= 16
     assert len({attempt.message for attempt in WRONG}) == len(WRONG)
@@ -309,7 +332,21 @@ def test_output_cannot_pass_for_a_verdict_nor_get_in_its_way(tmp_path: Path) -> 
     assert "it ended the process, with code 0" in _one(found["gravity"])
     assert found["state"].passed, found["state"].remarks
     assert found["forward"].passed, found["forward"].remarks
-    assert "EOFError" in _one(found["replay"])
+    assert "line 19: EOFError: it asks for input, and nobody types here" in _one(found["replay"])
+
+
+@pytest.mark.slow
+def test_a_long_print_is_not_said_to_have_no_end(tmp_path: Path) -> None:
+    found = _grade(
+        tmp_path,
+        "def demo_gravity(model, seconds=4):\n    for _ in range(400): print('x' * 10**6)",
+        "def demo_state(model):\n"
+        "    for _ in range(100): print('x' * 10**6)\n    return RIGHT['demo_state'](model)",
+        "def demo_forward(model): raise NotImplementedError",
+        "def demo_replay(model, ctrl, nstep=600): raise NotImplementedError",
+    )
+    assert "it prints more than 256 MB, and was ended there" in _one(found["gravity"])
+    assert found["state"].passed
 
 
 def test_what_is_replaced_under_the_judge_does_not_help(tmp_path: Path) -> None:

@@ -32,6 +32,11 @@ class Remark:
     holds: bool = False
 
 
+def reason(*rows: tuple[object, str]) -> str:
+    """The text of the first row that holds; "" if none does."""
+    return next((text for holds, text in rows if holds), "")
+
+
 class FaultError(Exception):
     """A fault after which there is nothing more to look at; the text is the remark.
 
@@ -122,26 +127,26 @@ def call(function: Function, world: ExerciseWorld) -> Answer:
 
 def said(error: BaseException, file: Path) -> str:
     """An error in one line, with the line that it came from, in the file or one beside it."""
-    place, line, text = _line(error, file)
+    place, line, code = _line(error, file)
     where = f"line {line}: " if line else ""
     if line and place != file:
         where = f"{place.name}, {where}"
-    source = f" (in `{text}`)" if text else ""
-    if isinstance(error, SyntaxError):
-        return f"{where}{error.msg}{source}"
-    if isinstance(error, SystemExit):
-        return (
-            f"{where}it ends the program (sys.exit with {error.code!r}) where it should return"
-            f"{source}"
-        )
-    if isinstance(error, MemoryError):
-        return f"{where}it asks for more memory than there is for it{source}"
-    if isinstance(error, RecursionError):
-        return f"{where}it calls itself without end{source}"
+    source = f" (in `{code}`)" if code else ""
     words = " ".join(str(error).split())
     if len(words) > _LONGEST:
         words = words[:_LONGEST] + " …"
-    return f"{where}{type(error).__name__}{': ' * bool(words)}{words}{source}"
+    known: dict[type[BaseException], str] = {
+        SystemExit: "it ends the program (sys.exit with "
+        f"{getattr(error, 'code', None)!r}) where it should return",
+        MemoryError: "it asks for more memory than there is for it",
+        RecursionError: "it calls itself without end",
+        EOFError: "EOFError: it asks for input, and nobody types here. A function gets what it "
+        'needs as arguments; the rest belongs below `if __name__ == "__main__":`',
+        SyntaxError: str(getattr(error, "msg", "")),
+    }
+    other = f"{type(error).__name__}{': ' * bool(words)}{words}"
+    text = next((text for kind, text in known.items() if isinstance(error, kind)), other)
+    return f"{where}{text}{source}"
 
 
 def _line(error: BaseException, file: Path) -> tuple[Path, int, str]:

@@ -26,6 +26,7 @@ from ..backends import backend_engine
 from ..errors import BadInputError, EngineError, StateMachineError
 from ..installed import DEFAULT, engine_version
 from . import sandbox
+from .calls import reason
 from .examine import judged
 from .judges import JUDGES, judge_of
 from .own_files import LARGEST, digest, has_solutions, named_by
@@ -384,12 +385,17 @@ def _not_ready(outcome: sandbox.ProcessOutcome) -> str:
 
 def _how_it_ended(limits: Limits, outcome: sandbox.ProcessOutcome) -> str:
     """What became of a process that gave no verdict."""
-    if outcome.out_of_cpu:
-        return f"still running after {limits.cpu:g} s of computing: a loop that does not end?"
-    if outcome.flooded:
-        return "it prints without end: a loop that does not end?"
-    if outcome.out_of_memory:
-        return "it asks for more memory than there is for it"
-    if outcome.signal is not None:
-        return f"it crashed the process ({sandbox.signal_name(outcome.signal)})"
-    return f"it ended the process, with code {outcome.returncode}: a function must return"
+    name = sandbox.signal_name(outcome.signal or 0)
+    return reason(
+        (
+            outcome.out_of_cpu,
+            f"still running after {limits.cpu:g} s of computing: a loop that does not end?",
+        ),
+        (
+            outcome.flooded,
+            "it prints more than 256 MB, and was ended there: a loop that does not end?",
+        ),
+        (outcome.out_of_memory, "it asks for more memory than there is for it"),
+        (outcome.signal is not None, f"it crashed the process ({name})"),
+        (True, f"it ended the process, with code {outcome.returncode}: a function must return"),
+    )
