@@ -55,6 +55,19 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="of a class: how many files are judged at once (default: one for two processors)",
     )
     parser.add_argument(
+        "--roster",
+        type=Path,
+        default=None,
+        metavar="LIST",
+        help="of a class: a CSV file with a row for each student, whose cells (a name, a number) "
+        "are looked for in the names of files; who handed in nothing is a row of the table",
+    )
+    parser.add_argument(
+        "--tests",
+        action="store_true",
+        help="of a class: run the test_arm.py in each student's folder on arms with faults, too",
+    )
+    parser.add_argument(
         "--gradescope",
         type=file_name,
         default=None,
@@ -74,14 +87,16 @@ def run(options: argparse.Namespace) -> int:
     from ..traces.whole import check_place
 
     folder = any(Path(file).is_dir() for file in options.files)
-    table = options.csv or options.jobs is not None
+    table = options.csv or options.roster or options.tests or options.jobs is not None
     one = options.gradescope or (folder and not table and is_one_students(Path(options.files[0])))
     several = len(options.files) > 1 or (folder and not one)
     if (options.mutants is not None or several) and options.gradescope:
         options.parser.error("--gradescope goes with one FILE, or one FOLDER")
     there = all(Path(file).exists() for file in options.files)
     if not several and there and table:
-        options.parser.error("--csv and --jobs go with several files, or a folder")
+        options.parser.error(
+            "--csv, --jobs, --roster and --tests go with several files, or a folder"
+        )
     if options.mutants is not None:
         return _mutants.run(options)
     if options.only:
@@ -128,6 +143,8 @@ def _class(options: argparse.Namespace) -> int:
     from ..report.progress import progress
 
     found = classroom.submissions(options.files)
+    if options.roster:
+        found = classroom.enrolled(found, options.roster)
     try:
         with progress(f"{len(found)} files") as report:
             entries = classroom.judge_all(
@@ -136,6 +153,7 @@ def _class(options: argparse.Namespace) -> int:
                 time_limit=options.time_limit,
                 jobs=options.jobs,
                 table=options.csv,
+                tests=options.tests,
                 progress=report,
             )
     except KeyboardInterrupt:

@@ -2,42 +2,60 @@
 
 from __future__ import annotations
 
+import csv
 import os
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 
-from ..errors import BadInputError
+from ..errors import BadInputError, StateMachineError
 from ..processes import checked_jobs
-from .class_table import ClassEntry, read, write
-from .exercise import TIME_LIMIT, ExerciseJudge, Grade
+from .calls import reason
+from .class_table import NOTHING, ClassEntry, read, write
+from .exercise import TIME_LIMIT, ExerciseJudge
+from .mutants.run import examine
 from .own_files import digest, has_functions, in_folder
 from .parallel import in_parallel
+from .predictions import score
 from .similarity import code_of, likeness, shape_of
 
 _NAMES = ("step_loop.py", "test_arm.py")  # of the exercise's own files
+_PREDICTIONS = "lesson.json"
+# What is handed in and cannot be judged as it is, by the end of its name.
+_UNREAD = {
+    ".ipynb": "a notebook: save it as a Python file, and hand in that",
+    **dict.fromkeys((".zip", ".gz", ".tar", ".7z", ".rar"), "an archive: unpack it"),
+}
+_HEADINGS = {"name", "student", "number", "id", "file"}  # of a roster
 
 
 @dataclass(frozen=True)
 class Submission:
     """A student's file: what it is called in the table, and where it is.
 
-    `path` is None where a student's folder has no file that could be judged, or several.
-    `folder` is that folder; what else is in it may be imported.
+    `path` is None where there is no file that could be judged, or several; `refusal` says why.
+    `folder` is a student's folder; what else is in it may be imported. `student` is who handed it
+    in, by a roster.
     """
 
     name: str
     path: Path | None
     refusal: str = ""
     folder: Path | None = None
+    student: str = ""
 
     @property
     def own(self) -> dict[str, Path]:
         """The files that belong to it, by their names in its folder; alone in that of a class."""
-        if self.path is None:
-            return {}
-        return in_folder(self.folder) if self.folder else {self.path.name: self.path}
+        if self.folder:
+            return in_folder(self.folder)
+        return {self.path.name: self.path} if self.path else {}
+
+    def named(self, name: str) -> Path | None:
+        """The first of its files that is called so."""
+        return next((file for file in self.own.values() if file.name == name), None)
 
 
 def submissions(paths: Sequence[str | os.PathLike[str]]) -> list[Submission]:
@@ -70,13 +88,13 @@ def submissions(paths: Sequence[str | os.PathLike[str]]) -> list[Submission]:
 
 
 def not_looked_at(paths: Sequence[str | os.PathLike[str]]) -> list[str]:
-    """Names of the files in class folders that are no Python files."""
+    """Names of the files in class folders that nobody hands in."""
     folders = [each for each in map(Path, paths) if each.is_dir() and not is_one_students(each)]
     return [
         entry.name
         for folder in folders
         for entry in sorted(folder.iterdir())
-        if entry.is_file() and not _skipped(entry) and entry.suffix.lower() != ".py"
+        if entry.is_file() and not _skipped(entry) and entry.suffix.lower() not in (".py", *_UNREAD)
     ]
 
 
@@ -115,21 +133,68 @@ def submission_in(folder: Path) -> Path:
 
 
 def _in_entry(entry: Path) -> list[Submission]:
-    if entry.is_file():
-        return [Submission(entry.name, entry)] if entry.suffix.lower() == ".py" else []
     if not entry.is_dir():
-        return []
+        refusal = reason(
+            (entry.is_file(), _UNREAD.get(entry.suffix.lower(), "")),
+            (entry.is_symlink(), "a link to nothing"),
+            (True, "a pipe or a device, and no file"),
+        )
+        python = entry.is_file() and entry.suffix.lower() == ".py"
+        return [Submission(entry.name, entry if python else None, refusal)] * bool(
+            python or refusal
+        )
     files = [file for file in sorted(entry.rglob("*.py")) if has_functions(file)]
     files = [file for file in files if file.name == _NAMES[0]] or files
     if len(files) == 1:
         return [Submission(entry.name, files[0], folder=entry)]
     text = "no Python file in it has one of the functions"
+    if notebooks := sorted(entry.rglob("*.ipynb")):
+        text += f". {notebooks[0].name} is {_UNREAD['.ipynb']}"
     if (tests := entry / _NAMES[1]).is_file():
         text += f". Did you mean statemachine check --mutants {tests.as_posix()}?"
     if files:
         names = ", ".join(file.relative_to(entry).as_posix() for file in files[:3])
         text = f"{len(files)} files in it have the functions: {names}"
-    return [Submission(entry.name, None, text)]
+    return [Submission(entry.name, None, text, entry)]
+
+
+def enrolled(found: Sequence[Submission], roster: Path) -> list[Submission]:
+    """The submissions of the students on a roster, and after them those of nobody on it.
+
+    Args:
+        found: All submissions. Each is the student's whose row has its name or the words of its
+            name (a name, a number) in any order.
+        roster: A CSV file with a row for each student, who is called what is in the first cell.
+
+    Raises:
+        BadInputError: The roster cannot be read.
+    """
+    try:
+        text = roster.read_text(encoding="utf-8-sig")
+        most = max(",;\t", key=text.count)
+        rows = csv.reader(text.splitlines(), delimiter=most)
+        cells = [list(filter(None, map(str.strip, row))) for row in rows]
+    except (OSError, UnicodeError, csv.Error) as error:
+        raise BadInputError(f"the roster {roster.name} cannot be read: {error}") from None
+    left, done = list(found), []
+    for row in filter(None, cells):
+        if row is cells[0] and _HEADINGS & set(map(str.casefold, row)):
+            continue
+        theirs = [each for each in left if {each.name, Path(each.name).stem} & set(row)]
+        keys = [words for cell in row if len(cell) > 2 and (words := _words(cell))]
+        theirs = theirs or [each for each in left if any(key <= _words(each.name) for key in keys)]
+        if len(theirs) == 1:
+            left.remove(theirs[0])
+            done.append(replace(theirs[0], student=row[0]))
+        else:
+            names = ", ".join(each.name for each in theirs)
+            refusal = f"{len(theirs)} may be theirs: {names}" if theirs else NOTHING
+            done.append(Submission(row[0], None, refusal, student=row[0]))
+    return done + left
+
+
+def _words(name: str) -> frozenset[str]:
+    return frozenset(re.findall(r"[^\W_]+", name.casefold()))
 
 
 def judge_all(
@@ -139,6 +204,7 @@ def judge_all(
     time_limit: float = TIME_LIMIT,
     jobs: int | None = None,
     table: Path | None = None,
+    tests: bool = False,
     progress: Callable[[float], None] = lambda _: None,
 ) -> list[ClassEntry]:
     """Judge every submission, several at once.
@@ -151,6 +217,7 @@ def judge_all(
             for every two processors.
         table: A CSV file that is written anew after each file. What it says already of the same
             content, judged with the same versions and limit, is taken over and not judged again.
+        tests: Whether the tests in students' folders are run on arms with faults, too.
         progress: Told the fraction that is done.
 
     Raises:
@@ -168,11 +235,13 @@ def judge_all(
         work: dict[str, Callable[[], ClassEntry]] = {}
         for each in found:
             content = digest(each.own)
-            known = before.get((content, made_with))
-            if known is not None and known.judged:
-                entries[each.name] = replace(known, name=each.name)
-            else:
-                work[each.name] = partial(_entry, judge, each, content, made_with)
+            entry = ClassEntry(each.name, content, (), each.refusal, made_with)
+            known = before.get((content, made_with), entry)
+            if known.judged:
+                entry = entries[each.name] = replace(known, name=each.name)
+            file = each.named(_PREDICTIONS)
+            entry = replace(entry, student=each.student, predictions=score(file) if file else "")
+            work[each.name] = partial(_entry, judge, each, entry, tests)
 
         def ended(name: str, entry: ClassEntry) -> None:
             entries[name] = entry
@@ -192,14 +261,31 @@ def judge_all(
     return done
 
 
-def _entry(judge: ExerciseJudge, submission: Submission, sha256: str, made_with: str) -> ClassEntry:
-    if submission.path is None:
-        return ClassEntry(submission.name, sha256, (), submission.refusal, made_with)
+def _entry(
+    judge: ExerciseJudge, submission: Submission, entry: ClassEntry, tests: bool
+) -> ClassEntry:
+    """The entry with what is not known yet."""
+    if submission.path is not None and not entry.judged:
+        try:
+            entry = replace(entry, functions=judge.judge(submission.path).functions)
+        except BadInputError as error:
+            entry = replace(entry, refusal=str(error))
+    file = submission.named(_NAMES[1])
+    if tests and file is not None and not entry.tests:
+        entry = replace(entry, tests=_caught(file, judge.backend))
+    return entry
+
+
+def _caught(file: Path, backend: str) -> str:
+    """How many faults a student's tests catch, and which they do not."""
     try:
-        grade: Grade = judge.judge(submission.path)
-    except BadInputError as error:
-        return ClassEntry(submission.name, sha256, (), str(error), made_with)
-    return ClassEntry(submission.name, sha256, grade.functions, "", made_with)
+        found = examine(file, backend)
+    except StateMachineError as error:
+        return str(error)
+    if found.failures:
+        return f"{found.failures[0].test} fails on the arm without a fault"
+    missed = ", ".join(mutant.name for mutant in found.survivors)
+    return f"{found.caught} of {len(found.trials)}" + f"; not {missed}" * bool(missed)
 
 
 class _Compared:

@@ -34,6 +34,7 @@ from .recording import START, FunctionRecording, Limits, record
 from .unwinding import unwinding
 from .worlds import ExerciseWorld, Scenes
 
+LOOK = "please look at this"
 TIME_LIMIT = 5.0  # [s] of computing for a function, from when its worlds are ready
 WALL_LIMIT = 10.0  # [s] on the clock for it, those apart in which others have the processor
 _TIMES = 2  # so many times what may be computed, at least
@@ -318,7 +319,7 @@ def _judgement(
             "Put it into this file"
         )
         return Judgement(name, True, False, (text,), judged=False)
-    looks = tuple(f"please look at this: it reads {other}" for other in others)
+    looks = tuple(f"{LOOK}: it reads {other}" for other in others)
     judgement = _verdict(copy.path, name, limits, worlds, rights, recording)
     return replace(judgement, remarks=judgement.remarks + looks)
 

@@ -224,22 +224,33 @@ def _unmoved(start: Inputs, answer: Answer, model: Model, away: str) -> str:
     place = address(model)
     old = f"that is the old pose, {away}"
     states = [each for each in (*answer.forwards, *answer.ends) if each.qpos.shape == (model.nq,)]
-    if any(each.qpos[place] == ANGLE for each in answer.forwards):
-        return f"it was read before the second forward: {old}"
-    if any(each.qpos[place] != start.qpos[place] for each in states):
-        return f"derived values were read before forward: {old}"
-    for name in ("qpos", "ctrl", "qvel"):
-        for each in states:
-            if written := _written(start, each)[name]:
-                what = {
-                    "qpos": f"which is {owner(model, written[0])!r}" if name == "qpos" else "",
-                    "ctrl": "a command, on which the arm would act with time",
-                    "qvel": "a speed",
-                }[name]
-                return f"you wrote {name}[{written[0]}], {what}: {old}; {LIFT} is at qpos[{place}]"
-    return (
-        f"nothing was written into qpos of a Data (into a copy of it?): {old}; "
-        f"data.qpos[…] = {ANGLE} writes"
+    written = [
+        (name, entry)
+        for name in ("qpos", "ctrl", "qvel")
+        for each in states
+        for entry in _written(start, each)[name]
+    ]
+    name, entry = [*written, ("qpos", place)][0]
+    what = {
+        "qpos": f"which is {owner(model, entry)!r}" if name == "qpos" else "",
+        "ctrl": "a command, on which the arm would act with time",
+        "qvel": "a speed",
+    }[name]
+    return reason(
+        (
+            any(each.qpos[place] == ANGLE for each in answer.forwards),
+            f"it was read before the second forward: {old}",
+        ),
+        (
+            any(each.qpos[place] != start.qpos[place] for each in states),
+            f"derived values were read before forward: {old}",
+        ),
+        (written, f"you wrote {name}[{entry}], {what}: {old}; {LIFT} is at qpos[{place}]"),
+        (
+            True,
+            f"nothing was written into qpos of a Data (into a copy of it?): {old}; "
+            f"data.qpos[…] = {ANGLE} writes",
+        ),
     )
 
 

@@ -275,12 +275,15 @@ def _by_the_clock(given: Array, limp: bool, world: ExerciseWorld, fall: Fall) ->
 
 
 def _command(answer: Answer) -> list[Remark]:
-    """Whether ctrl was written."""
-    for run in answer.runs:
-        if run.ctrl.any() or run.ctrl_changed is not None:
-            command = listed(answer.ends[run.data].ctrl)
-            return [Remark(f"ctrl was written ({command}): here it must stay as a new Data has it")]
-    return []
+    """Whether ctrl was written, to anything but what a new Data has."""
+    return [
+        Remark(
+            f"ctrl was written ({listed(answer.ends[run.data].ctrl)}): here it must stay as a new "
+            "Data has it"
+        )
+        for run in answer.runs
+        if run.ctrl.any() or run.ctrl_changed is not None
+    ][:1]
 
 
 def _left(answer: Answer) -> list[Remark]:

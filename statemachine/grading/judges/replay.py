@@ -188,11 +188,12 @@ def _faults(run: EngineRun, world: ExerciseWorld, start: Start) -> dict[str, str
     name = max(gaps, key=lambda each: gaps[each])
     moved = run.qpos[abs(run.qpos - start.qpos) > _START]
     elsewhere = not (gaps["qpos"] <= _START and gaps["qvel"] <= _START)
+    misplaced = bool(elsewhere and moved.size and np.isin(moved, ctrl).all())
     of = ", the keyframe's time" if run.time == start.time else ""
     return {
         "start": reason(
             (
-                elsewhere and moved.size and np.isin(moved, ctrl).all(),
+                misplaced,
                 "the command was written into qpos, and the arm was there at once: write it into "
                 "ctrl, and the servos take it there",
             ),
@@ -204,7 +205,7 @@ def _faults(run: EngineRun, world: ExerciseWorld, start: Start) -> dict[str, str
             (run.time, f"it began at {run.time:g} s{of}: set data.time to zero"),
         ),
         "ctrl": reason(
-            (not same_bits(run.ctrl, ctrl), _command(run, ctrl, start)),
+            (not (misplaced or same_bits(run.ctrl, ctrl)), _command(run, ctrl, start)),
             (
                 run.ctrl_changed is not None,
                 f"ctrl was changed after step {run.ctrl_changed}: it must stay fixed",
