@@ -47,7 +47,11 @@ def _template(name: str) -> bytes:
     content = (ROOT / "exercises" / name).read_bytes()
     unwritten = content.count(b"raise NotImplementedError(")
     if (name == "step_loop.py" and unwritten != 4) or _changed(ROOT / "exercises" / name):
-        raise SystemExit(f"exercises/{name} is not as it is handed out: restore it first")
+        raise SystemExit(
+            f"exercises/{name} is not as it is handed out: restore it first. To keep what was "
+            f"tried: cp exercises/{name} my_{name}; then: git restore --staged --worktree "
+            f"exercises/{name}"
+        )
     return content
 
 

@@ -22,7 +22,7 @@ import pytest
 
 from statemachine import cli as command_line
 from statemachine.errors import MissingEngineError
-from statemachine.grading import exercise, recording
+from statemachine.grading import exercise, own_files, recording
 from statemachine.grading.answers import Answer
 from statemachine.grading.calls import FaultError
 from statemachine.grading.examine import FunctionVerdict, answers_of, answers_of_file, judged
@@ -100,6 +100,29 @@ def test_a_wrong_solution_is_told_what_is_wrong(attempt: Attempt, prepared: Prep
     assert not any(re.search(r"\b1 (steps|joints|numbers)", text) for text in texts), texts
 
 
+def test_hints_do_not_lead_astray(prepared: Prepare) -> None:
+    wrong = {attempt.name: attempt for attempt in WRONG}
+    for name, misleading in (
+        ("replay-one_run_under_two_names", "copy"),
+        ("replay-command_for_position", "did not begin"),
+        ("gravity-speed_for_position", "no gravity"),
+        ("gravity-nothing_read_from_the_runs", "no gravity"),
+        ("forward-two_readings", "positions is"),
+    ):
+        texts = _texts(_verdict(wrong[name], prepared(wrong[name].solves, "mujoco")))
+        assert not any(misleading in text for text in texts), texts
+    speeds = wrong["gravity-speed_for_position"]
+    for text in _texts(_verdict(speeds, prepared("demo_gravity", "mujoco"))):
+        assert text.endswith("that is its speed, qvel; its position is in qpos")
+
+
+def test_what_is_said_of_a_right_solution_is_short_and_true(prepared: Prepare) -> None:
+    for attempt in RIGHT:
+        (text,) = _texts(_verdict(attempt, prepared(attempt.solves, "mujoco")))
+        assert len(text) <= 96, text
+        assert "untouched" not in text  # who writes zeros into zeros is right, too
+
+
 def test_every_wrong_solution_has_a_message_of_its_own() -> None:
     assert len(WRONG) >= 16
     assert len({attempt.message for attempt in WRONG}) == len(WRONG)
@@ -120,7 +143,7 @@ def test_pybullet_judges_alike(attempt: Attempt, prepared: Prepare) -> None:
 
 
 _HEAD = """
-import ctypes, os, runpy, socket, subprocess, sys, threading, time
+import ctypes, os, socket, subprocess, sys, threading, time
 import numpy as np
 import statemachine as sm
 """
@@ -129,7 +152,7 @@ import statemachine as sm
 def _grade(folder: Path, *functions: str, limit: float = 5.0) -> dict[str, exercise.Judgement]:
     """The judgements on a file of these functions, by name; `RIGHT.f` is the solution's."""
     file = folder / "student.py"
-    right = f"RIGHT = runpy.run_path({str(SOLUTION)!r})\n"
+    right = f"RIGHT = {{}}; exec({SOLUTION.read_text(encoding='utf-8')!r}, RIGHT)\n"
     file.write_text(_HEAD + right + "\n".join(functions), encoding="utf-8")
     grade = exercise.run(file, time_limit=limit)
     assert grade.right == sum(each.passed for each in grade.functions)
@@ -192,12 +215,31 @@ def test_what_does_not_get_ready_is_tried_again(monkeypatch: pytest.MonkeyPatch)
     assert exercise.run(SOLUTION).passed
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="the time asleep is told by /proc")
+@pytest.mark.slow
+def test_a_file_that_sleeps_costs_little_more_than_one_that_computes(tmp_path: Path) -> None:
+    file = tmp_path / "student.py"
+    calls = "time.sleep(1e6)", "ctypes.PyDLL(None).sleep(10**6)", "LOCK.acquire()", "sig.pause()"
+    waits = "def {}(*_):\n    {}\n"
+    file.write_text(
+        "import ctypes, threading, time, signal as sig\nLOCK = threading.Lock(); LOCK.acquire()\n"
+        + "".join(waits.format(*pair) for pair in zip(JUDGES, calls, strict=True))
+    )
+    before = time.monotonic()
+    grade = exercise.run(file)
+    assert time.monotonic() - before < 60
+    for line, judgement in zip((4, 6, 8, 10), grade.functions, strict=True):
+        assert not judgement.judged
+        assert _one(judgement).startswith(f"line {line}: nothing could be judged: not at its end ")
+        assert "after 10 s on the clock" in _one(judgement)
+
+
 @pytest.mark.slow
 def test_a_right_answer_passes_on_a_busy_machine() -> None:
     busy = "import time; end = time.monotonic() + 60\nwhile time.monotonic() < end: pass"
-    others = [subprocess.Popen([sys.executable, "-c", busy]) for _ in range(6)]
+    others = [subprocess.Popen([sys.executable, "-c", busy]) for _ in range(8)]
     try:
-        grade = exercise.run(SOLUTION)
+        grade = exercise.run(SOLUTION, wall_limit=4.0, time_limit=2.0)
     finally:
         for other in others:
             other.kill()
@@ -290,7 +332,21 @@ def test_output_cannot_pass_for_a_verdict_nor_get_in_its_way(tmp_path: Path) -> 
     assert "it ended the process, with code 0" in _one(found["gravity"])
     assert found["state"].passed, found["state"].remarks
     assert found["forward"].passed, found["forward"].remarks
-    assert "EOFError" in _one(found["replay"])
+    assert "line 19: EOFError: it asks for input, and nobody types here" in _one(found["replay"])
+
+
+@pytest.mark.slow
+def test_a_long_print_is_not_said_to_have_no_end(tmp_path: Path) -> None:
+    found = _grade(
+        tmp_path,
+        "def demo_gravity(model, seconds=4):\n    for _ in range(400): print('x' * 10**6)",
+        "def demo_state(model):\n"
+        "    for _ in range(100): print('x' * 10**6)\n    return RIGHT['demo_state'](model)",
+        "def demo_forward(model): raise NotImplementedError",
+        "def demo_replay(model, ctrl, nstep=600): raise NotImplementedError",
+    )
+    assert "it prints more than 256 MB, and was ended there" in _one(found["gravity"])
+    assert found["state"].passed
 
 
 def test_what_is_replaced_under_the_judge_does_not_help(tmp_path: Path) -> None:
@@ -347,6 +403,55 @@ def test_a_forged_record_is_judged_like_any_other(tmp_path: Path) -> None:
     assert "(it is gone)" in _one(found["forward"])
 
 
+def test_what_reads_somebody_s_answers_is_not_graded(tmp_path: Path) -> None:
+    (tmp_path / "bob.py").write_text(SOLUTION.read_text(encoding="utf-8"), encoding="utf-8")
+    (tmp_path / "notes.txt").write_text("hello")
+    source = "exec(open({!r}).read(), n := {{}}); return n[{!r}]"
+    beside = "exec(open(__file__.replace('student', 'bob')).read(), n := {}); return n"
+    found = _grade(
+        tmp_path,
+        "def demo_gravity(model, seconds=4):\n    "
+        + source.format(str(SOLUTION), "demo_gravity")
+        + "(model, seconds)",
+        f"def demo_state(model):\n    {beside}['demo_state'](model)",
+        "def demo_forward(model):\n    import bob\n    return bob.demo_forward(model)",
+        "def demo_replay(model, ctrl, nstep=600):\n"
+        f"    open({str(tmp_path / 'notes.txt')!r}).read()\n"
+        "    return RIGHT['demo_replay'](model, ctrl, nstep)",
+    )
+    for name in ("gravity", "state", "forward"):
+        assert not found[name].judged
+        assert _one(found[name]).startswith("not graded: it reads ")
+    assert "solutions/step_loop.py, which was not handed in with it" in _one(found["gravity"])
+    for name in ("state", "forward"):
+        assert f"{(tmp_path / 'bob.py').as_posix()}, which" in _one(found[name])
+    assert found["replay"].passed
+    assert found["replay"].remarks[1:] == (
+        f"please look at this: it reads {(tmp_path / 'notes.txt').as_posix()}",
+    )
+
+
+def test_what_belongs_to_a_file_is_given_along(tmp_path: Path) -> None:
+    student = tmp_path / "student.py"
+    student.write_text("import helper\nfrom tools import more\nDATA = 'table.json'\n")
+    (tmp_path / "helper.py").write_text("import deeper\n")
+    for name in ("deeper.py", "table.json", "unnamed.py", ".hidden.py", "tools.txt"):
+        (tmp_path / name).write_text("")
+    (tmp_path / "tools").mkdir()
+    (tmp_path / "tools" / "__init__.py").write_text("from more import demo_gravity\n")
+    (tmp_path / "more.py").write_text("def demo_gravity(model): return bob\n")
+    assert set(own_files.named_by(student)) == {
+        "student.py", "helper.py", "deeper.py", "table.json", "tools/__init__.py", "tools.txt",
+    }  # fmt: skip
+    env = tmp_path / "env"
+    env.mkdir()
+    for name in ("pyvenv.cfg", "x.py"):
+        (env / name).write_text("")
+    whole = own_files.in_folder(tmp_path)
+    assert {"more.py", "unnamed.py", "tools/__init__.py"} < set(whole)
+    assert not {"env/x.py", ".hidden.py"} & set(whole)
+
+
 def test_a_judge_that_is_replaced_is_another_process_s(tmp_path: Path) -> None:
     found = _grade(
         tmp_path,
@@ -396,6 +501,9 @@ def test_it_reaches_neither_us_nor_the_files(
         ("x = 1 / 0\n", "line 1: ZeroDivisionError: division by zero (in `x = 1 / 0`)"),
         ("import not_there\n", "No module named 'not_there'"),
         ("x = '\\udc80'.encode()\n", "UnicodeEncodeError"),
+        ("# caf\xe9\n", "loaded: line 1: this is not UTF-8, and Python refuses the file. Save"),
+        ("import os\n\nx = '\xe9'\n", "the file cannot be loaded: line 3: this is not UTF-8"),
+        ("# -*- coding: latin-1 -*-\nx = '\xe9'\n", "the file has no function demo_gravity"),
         ("", "the file has no function demo_gravity"),
         ("demo_gravity = 4\n", "demo_gravity is no function: int"),
         ("def demo_gravity(): pass\n", "too many positional arguments"),
@@ -406,7 +514,7 @@ def test_a_file_that_cannot_be_called_is_told_in_a_line(
     content: str, message: str, tmp_path: Path, prepared: Prepare
 ) -> None:
     file = tmp_path / "student.py"
-    file.write_text(content)
+    file.write_text(content, encoding="latin-1")
     judge, there = judge_of("demo_gravity"), prepared("demo_gravity", "mujoco")
     worlds, rights = there
     answers = answers_of_file(file, "demo_gravity", worlds)

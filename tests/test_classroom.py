@@ -13,18 +13,22 @@ import pytest
 
 from statemachine.cli import main
 from statemachine.errors import BadInputError
-from statemachine.grading.class_table import as_csv
+from statemachine.grading import classroom
+from statemachine.grading.class_table import ClassEntry, as_csv, few_words, read, write
 from statemachine.grading.classroom import (
     Submission,
+    enrolled,
     is_one_students,
     judge_all,
     not_looked_at,
     submission_in,
     submissions,
 )
-from statemachine.grading.exercise import ExerciseJudge, Grade, Judgement
+from statemachine.grading.exercise import LOOK, ExerciseJudge, Grade, Judgement
 from statemachine.grading.judges import JUDGES
-from statemachine.page import Text
+from statemachine.grading.mutants import MUTANTS
+from statemachine.grading.mutants.run import Examination, Failure, MutantTrial
+from statemachine.page import Table, Text
 from statemachine.report import gradescope
 from statemachine.report.classroom import page
 
@@ -152,11 +156,160 @@ def test_what_is_not_looked_at_is_told(folder: Path, judged: list[str]) -> None:
     assert "IDA.PY" in [each.name for each in found]
     assert "__MACOSX" not in [each.name for each in found]
     ignored = not_looked_at([folder])
-    assert ignored == ["grades.txt", "gus.ipynb", "hal.zip"]
+    assert ignored == ["grades.txt"]
     texts = [
         b.text for b in page(judge_all(found, "mujoco"), ignored).blocks if isinstance(b, Text)
     ]
-    assert "No Python files, and not looked at: grades.txt, gus.ipynb, hal.zip." in texts
+    assert "No Python files, and not looked at: grades.txt." in texts
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_what_was_skipped_is_a_row_with_the_reason(folder: Path, judged: list[str]) -> None:
+    (folder / "gus.ipynb").write_text("{}")
+    (folder / "cy" / "mine.ipynb").write_text("{}")
+    (folder / "hal.zip").write_text("")
+    (folder / "ida.py").symlink_to("nowhere.py")
+    os.mkfifo(folder / "jo.py")
+    entries = judge_all(submissions([folder]), "mujoco")
+    rows = {row["file"]: row for row in csv.DictReader(io.StringIO(as_csv(entries)))}
+    for name, reason in (
+        ("gus.ipynb", "a notebook: save it as a Python file"),
+        ("cy", "has one of the functions. mine.ipynb is a notebook"),
+        ("hal.zip", "an archive: unpack it"),
+        ("ida.py", "a link to nothing"),
+        ("jo.py", "a pipe or a device, and no file"),
+        ("dee", "2 files in it have the functions: a.py, b.py"),
+    ):
+        assert reason in rows[name]["remarks"]
+        assert (rows[name]["right"], rows[name]["demo_state"]) == ("", "not judged")
+    table = next(block for block in page(entries).blocks if isinstance(block, Table))
+    assert ["gus.ipynb", "?", "a notebook: save it as a Python file, and hand in that"] in [
+        list(row[:3]) for row in table.rows
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            "servos off: you return 0.03268 at 4 s where 23.92 is expected: the servos were still "
+            "on in this run",
+            "servos off: the servos were still on in this run",
+        ),
+        ("ctrl was written ([0 0.5]): here it must stay as it was", "ctrl was written"),
+        (
+            "on a scene with a crate before the arm: reading 2, after forward: that belongs to the "
+            "course's own scene, not to the model that you got",
+            "that belongs to the course's own scene",
+        ),
+        (
+            "box: you return qvel[6:13] where qvel[6:12] is expected: a quaternion has four "
+            "numbers, a turning speed three: six in qvel, not seven",
+            "box: a quaternion has four numbers",
+        ),
+        (
+            "time after the reset to keyframe 0 should be 6 s, you return 0: that is a new Data, "
+            "or a reset without keyframe=0",
+            "that is a new Data",
+        ),
+        ("not graded: it reads /home/t/bob.py, which was not", "not graded: it reads bob.py"),
+        ("line 2: ZeroDivisionError: division by zero (in `x`)",
+         "line 2: ZeroDivisionError: division by zero"),
+    ],
+)  # fmt: skip
+def test_the_reason_is_told_in_a_few_words(text: str, words: str) -> None:
+    assert few_words(Judgement("demo_gravity", True, False, (text,))) == words
+
+
+def test_one_short_line_for_a_student_and_the_long_text_beside_it(tmp_path: Path) -> None:
+    texts = (
+        "right in 2 other cases",
+        "ctrl was written ([0 0]): here it must stay",
+        "x" * 500,
+        "TODO",
+    )
+    marks = tuple(
+        Judgement(name, text != "TODO", k == 0, (text, f"{LOOK}: it reads a.txt"))
+        for k, (name, text) in enumerate(zip(JUDGES, texts, strict=True))
+    )
+    entry = ClassEntry("ann.py", "1" * 64, marks, "", "mujoco")
+    (row,) = csv.DictReader(io.StringIO(as_csv([entry])))
+    assert row["remarks"] == (
+        "state: ctrl was written; forward: …; replay: not written; "
+        "please look at this: it reads a.txt"
+    )
+    for text in texts:
+        assert text in row["details"]
+    write(tmp_path / "t.csv", [entry])
+    assert read(tmp_path / "t.csv") == {(entry.sha256, "mujoco"): entry}
+    texts_shown = [block.text for block in page([entry]).blocks if isinstance(block, Text)]
+    assert "ann.py: please look at this: it reads a.txt" in texts_shown
+
+
+def test_a_roster_gives_every_student_a_row(
+    folder: Path, judged: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "Lee_Bo_41017_assignment.py").write_text("return 1\n")
+    (folder / "x_41018.py").write_text("return 1\n")
+    (folder / "x_again_41018.py").write_text("return 1\n")
+    roster = tmp_path / "roster.csv"
+    roster.write_text(
+        "name;number;file\nAnn Smith;1;ann\nBo Lee;41017\nCy;41018\n\nZoë;99;\n",
+        encoding="utf-8-sig",
+    )
+    table = tmp_path / "t.csv"
+    for _ in range(2):  # a row without a file is no verdict on another one
+        main(["check", str(folder), "--roster", str(roster), "--csv", str(table)])
+        rows = list(csv.DictReader(table.read_text(encoding="utf-8-sig").splitlines()))
+        found = {row["student"]: row for row in rows if row["student"]}
+        assert [row["student"] for row in rows[:4]] == ["Ann Smith", "Bo Lee", "Cy", "Zoë"]
+        assert found["Ann Smith"]["file"] == "ann"
+        assert found["Bo Lee"]["file"] == "Lee_Bo_41017_assignment.py"
+        assert found["Cy"]["remarks"] == "2 may be theirs: x_41018.py, x_again_41018.py"
+        assert found["Cy"]["right"] == ""
+        assert (found["Zoë"]["right"], found["Zoë"]["remarks"]) == ("0", "handed in nothing")
+        assert {row["file"] for row in rows[4:]} == {
+            "bob", "cy", "dee", "eve.py", "fay.py", "x_41018.py", "x_again_41018.py",
+        }  # fmt: skip
+    shown = capsys.readouterr().out
+    assert "Zoë" in shown
+    assert "Zoë could not be judged" not in shown
+    with pytest.raises(BadInputError, match=r"the roster nowhere\.csv cannot be read"):
+        enrolled([], tmp_path / "nowhere.csv")
+
+
+def test_tests_and_predictions_are_in_the_same_table(
+    folder: Path, judged: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ran: list[Path] = []
+
+    def examined(file: Path, backend: str) -> Examination:
+        ran.append(file)
+        caught = (Failure("test_x", "no"),)
+        trials = tuple(
+            MutantTrial(mutant, caught if k else ()) for k, mutant in enumerate(MUTANTS.values())
+        )
+        bad = caught if "bad" in file.read_text() else ()
+        return Examination(file.name, backend, "4", ("test_x",), bad, () if bad else trials)
+
+    monkeypatch.setattr(classroom, "examine", examined)
+    for name, text in (("ann", "good"), ("bob", "bad"), ("cy", "good")):
+        (folder / name / "test_arm.py").write_text(text)
+    answers = [{"lesson": "a", "question": str(k), "right": k > 0} for k in range(3)]
+    record = {"kind": "statemachine predictions", "score": 99, "answers": answers}
+    (folder / "ann" / "lesson.json").write_text(json.dumps(record))
+    (folder / "bob" / "lesson.json").write_text("{}")
+    table = tmp_path / "t.csv"
+    for _ in range(2):
+        main(["check", str(folder), "--csv", str(table), "--tests"])
+        rows = {r["file"]: r for r in csv.DictReader(table.read_text("utf-8-sig").splitlines())}
+        assert rows["ann"]["tests"] == "13 of 14; not xyzw"
+        assert rows["bob"]["tests"] == "test_x fails on the arm without a fault"
+        assert rows["cy"]["tests"] == "13 of 14; not xyzw"  # without the functions
+        assert rows["ann"]["predictions"] == "2 of 3"  # counted, whatever the score says
+        assert rows["bob"]["predictions"] == "lesson.json is no record of predictions"
+        assert rows["eve.py"]["tests"] == rows["eve.py"]["predictions"] == ""
+    assert [file.parent.name for file in ran].count("ann") == 1  # taken over from the table
 
 
 def test_two_folders_may_have_files_of_one_name(tmp_path: Path, judged: list[str]) -> None:
@@ -175,6 +328,39 @@ def test_the_same_code_is_told_and_unwritten_files_are_not(folder: Path, judged:
     assert {name: e.same_as for name, e in entries.items() if e.same_as} == {"fay.py": "ann"}
     assert entries["ann"].judged
     assert not entries["cy"].judged
+
+
+def test_functions_that_are_alike_are_told_whatever_is_named_how(
+    folder: Path, judged: list[str]
+) -> None:
+    text = SOLUTION.read_text()
+    for name, other in (("angles", "a"), ("slots", "s"), ("once", "f"), ("data", "d")):
+        text = text.replace(name, other)
+    (folder / "gus.py").write_text(text.replace("0.8", "0.80"))
+    (folder / "hal.py").write_text(
+        "def demo_state(model):\n    a, b = ([*x, n] for x, n in ((model.jnt_qposadr, model.nq),"
+        " (model.jnt_dofadr, model.nv)))\n    return dict(zip(a, b)), 6.0\n"
+    )
+    entries = {e.name: e for e in judge_all(submissions([folder]), "mujoco")}
+    assert entries["gus.py"].alike == "100% ann"
+    assert entries["gus.py"].same_as == ""
+    assert entries["ann"].alike.startswith("100% ")
+    assert entries["bob"].alike == ""  # it is not written yet
+    assert float(entries["hal.py"].alike.partition("%")[0]) < 50
+    (row,) = (row for row in csv.DictReader(io.StringIO(as_csv([entries["gus.py"]]))))
+    assert row["alike"] == "100% ann"
+
+
+def test_a_file_in_a_class_is_judged_alone(folder: Path) -> None:
+    (folder / "helper.py").write_text("ANSWER = 1\n")
+    text = SOLUTION.read_text().replace("import math", "import helper\nimport math")
+    for place in (folder / "gus.py", folder / "ann" / "my_solution.py"):
+        place.write_text(text)
+    found = [each for each in submissions([folder]) if each.name in ("ann", "gus.py")]
+    ann, gus = judge_all(found, "mujoco")
+    assert ann.right == 4
+    assert not gus.judged
+    assert "helper.py, which was not handed in with it" in gus.functions[0].remarks[0]
 
 
 def test_a_table_is_resumed(folder: Path, judged: list[str], tmp_path: Path) -> None:

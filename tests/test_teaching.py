@@ -103,11 +103,12 @@ def test_the_autograder_grades_a_submission(built: Path, tmp_path: Path) -> None
         assert words in json.dumps(results, ensure_ascii=False)
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="cp is a shell's command")
 def test_a_kit_is_not_made_of_files_that_were_worked_in(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "exercises").mkdir()
-    text = (ROOT / "exercises" / "step_loop.py").read_text()
+    text, said = (ROOT / "exercises" / "step_loop.py").read_text(), ""
     solved = text.replace("raise NotImplementedError(", "return (", 1)
     for content, fine in ((text, True), (solved, False)):
         (tmp_path / "exercises" / "step_loop.py").write_text(content)
@@ -116,8 +117,19 @@ def test_a_kit_is_not_made_of_files_that_were_worked_in(
         if fine:
             assert make_kits._template("step_loop.py") == text.encode()
         else:
-            with pytest.raises(SystemExit, match="restore it first"):
+            with pytest.raises(SystemExit, match="restore it first") as refused:
                 make_kits._template("step_loop.py")
+            said = str(refused.value)
+    git = ["git", "-c", "user.name=x", "-c", "user.email=x@x"]
+    (tmp_path / "exercises" / "step_loop.py").write_text(text)
+    for command in (["init", "-q"], ["add", "."], ["commit", "-qm", "x"]):
+        subprocess.run([*git, *command], cwd=tmp_path, check=True)
+    (tmp_path / "exercises" / "step_loop.py").write_text(solved)
+    subprocess.run([*git, "add", "."], cwd=tmp_path, check=True)
+    for command in re.findall(r"(?:tried|then): ([^;]+)", said):
+        subprocess.run(command.split(), cwd=tmp_path, check=True)
+    assert (tmp_path / "exercises" / "step_loop.py").read_text() == text
+    assert (tmp_path / "my_step_loop.py").read_text() == solved
 
 
 def _zip(folder: Path, built: Path) -> Path:

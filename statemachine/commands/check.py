@@ -36,7 +36,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         default=5.0,
         metavar="S",
         help="seconds that each function of FILE may compute (default 5); time in which the "
-        "machine is busy with others does not count, up to 120 s on the clock, or four times S",
+        "machine is busy with others does not count, up to 120 s on the clock, or 8 times S; "
+        "what only waits may do so for 10 s, or twice S",
     )
     parser.add_argument(
         "--csv",
@@ -52,6 +53,19 @@ def add(parser: argparse.ArgumentParser) -> None:
         default=None,
         metavar="N",
         help="of a class: how many files are judged at once (default: one for two processors)",
+    )
+    parser.add_argument(
+        "--roster",
+        type=Path,
+        default=None,
+        metavar="LIST",
+        help="of a class: a CSV file with a row for each student, whose cells (a name, a number) "
+        "are looked for in the names of files; who handed in nothing is a row of the table",
+    )
+    parser.add_argument(
+        "--tests",
+        action="store_true",
+        help="of a class: run the test_arm.py in each student's folder on arms with faults, too",
     )
     parser.add_argument(
         "--gradescope",
@@ -73,14 +87,16 @@ def run(options: argparse.Namespace) -> int:
     from ..traces.whole import check_place
 
     folder = any(Path(file).is_dir() for file in options.files)
-    table = options.csv or options.jobs is not None
+    table = options.csv or options.roster or options.tests or options.jobs is not None
     one = options.gradescope or (folder and not table and is_one_students(Path(options.files[0])))
     several = len(options.files) > 1 or (folder and not one)
     if (options.mutants is not None or several) and options.gradescope:
         options.parser.error("--gradescope goes with one FILE, or one FOLDER")
     there = all(Path(file).exists() for file in options.files)
     if not several and there and table:
-        options.parser.error("--csv and --jobs go with several files, or a folder")
+        options.parser.error(
+            "--csv, --jobs, --roster and --tests go with several files, or a folder"
+        )
     if options.mutants is not None:
         return _mutants.run(options)
     if options.only:
@@ -127,6 +143,8 @@ def _class(options: argparse.Namespace) -> int:
     from ..report.progress import progress
 
     found = classroom.submissions(options.files)
+    if options.roster:
+        found = classroom.enrolled(found, options.roster)
     try:
         with progress(f"{len(found)} files") as report:
             entries = classroom.judge_all(
@@ -135,6 +153,7 @@ def _class(options: argparse.Namespace) -> int:
                 time_limit=options.time_limit,
                 jobs=options.jobs,
                 table=options.csv,
+                tests=options.tests,
                 progress=report,
             )
     except KeyboardInterrupt:

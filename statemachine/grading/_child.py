@@ -34,8 +34,12 @@ class _Record:
         with open(self._path, "a", encoding="utf-8") as file:
             file.write(line + "\n")
 
+    def note(self, kind: str, text: str) -> None:
+        """Add what `Guard` tells, at once: it stays, whatever the student's code does next."""
+        self.say(kind, text=text)
 
-_TOO_MUCH = {"text": "it returns more than can be looked at", "written": True, "refused": []}
+
+_TOO_MUCH = {"text": "it returns more than can be looked at", "written": True}
 
 
 def main(job_file: str) -> None:
@@ -60,16 +64,15 @@ def main(job_file: str) -> None:
     # Both work where Python's own threads do not get their turn, and tell the line.
     trace = open(job["trace"], "w", encoding="utf-8")  # noqa: SIM115  (till the end)
     faulthandler.enable(trace)
-    guard = Guard(path)
+    Guard(path, Path(job["own"]), Path(job["answers"]).parent, record.note)
     sys.path.insert(0, str(path.parent))  # as when the file is run; engines are loaded by now
     record.say("running", cpu=time.process_time())
-    limit_cpu(job["cpu"], job["wall"], trace)
+    limit_cpu(job["cpu"], trace)
     for answer in answers_of_file(path, job["function"], worlds):
-        refused = list(dict.fromkeys(guard.refused))
         if isinstance(answer, FaultError):
-            record.say("fault", text=str(answer), written=answer.written, refused=refused)
+            record.say("fault", text=str(answer), written=answer.written)
         else:
-            record.say("answer", answer=encode(answer), refused=refused)
+            record.say("answer", answer=encode(answer))
     # Threads that the student's code left, and what it registered for the end, have no say.
     os._exit(0)
 

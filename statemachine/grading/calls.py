@@ -32,6 +32,11 @@ class Remark:
     holds: bool = False
 
 
+def reason(*rows: tuple[object, str]) -> str:
+    """The text of the first row that holds; "" if none does."""
+    return next((text for holds, text in rows if holds), "")
+
+
 class FaultError(Exception):
     """A fault after which there is nothing more to look at; the text is the remark.
 
@@ -55,6 +60,16 @@ def load_file(path: Path) -> dict[str, Any]:
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[_MODULE] = module  # dataclasses and pickle look it up there
+    content = path.read_bytes()
+    try:
+        importlib.util.decode_source(content)  # which compiling bytes does not ask of comments
+    except (UnicodeDecodeError, SyntaxError):
+        lines = enumerate(content.split(b"\n"), start=1)
+        line = next((k for k, text in lines if text.decode(errors="ignore").encode() != text), 1)
+        raise FaultError(
+            f"the file cannot be loaded: line {line}: this is not UTF-8, and Python refuses the "
+            "file. Save it as UTF-8"
+        ) from None
     try:
         spec.loader.exec_module(module)
     except BaseException as error:
@@ -112,26 +127,26 @@ def call(function: Function, world: ExerciseWorld) -> Answer:
 
 def said(error: BaseException, file: Path) -> str:
     """An error in one line, with the line that it came from, in the file or one beside it."""
-    place, line, text = _line(error, file)
+    place, line, code = _line(error, file)
     where = f"line {line}: " if line else ""
     if line and place != file:
         where = f"{place.name}, {where}"
-    source = f" (in `{text}`)" if text else ""
-    if isinstance(error, SyntaxError):
-        return f"{where}{error.msg}{source}"
-    if isinstance(error, SystemExit):
-        return (
-            f"{where}it ends the program (sys.exit with {error.code!r}) where it should return"
-            f"{source}"
-        )
-    if isinstance(error, MemoryError):
-        return f"{where}it asks for more memory than there is for it{source}"
-    if isinstance(error, RecursionError):
-        return f"{where}it calls itself without end{source}"
+    source = f" (in `{code}`)" if code else ""
     words = " ".join(str(error).split())
     if len(words) > _LONGEST:
         words = words[:_LONGEST] + " …"
-    return f"{where}{type(error).__name__}{': ' * bool(words)}{words}{source}"
+    known: dict[type[BaseException], str] = {
+        SystemExit: "it ends the program (sys.exit with "
+        f"{getattr(error, 'code', None)!r}) where it should return",
+        MemoryError: "it asks for more memory than there is for it",
+        RecursionError: "it calls itself without end",
+        EOFError: "EOFError: it asks for input, and nobody types here. A function gets what it "
+        'needs as arguments; the rest belongs below `if __name__ == "__main__":`',
+        SyntaxError: str(getattr(error, "msg", "")),
+    }
+    other = f"{type(error).__name__}{': ' * bool(words)}{words}"
+    text = next((text for kind, text in known.items() if isinstance(error, kind)), other)
+    return f"{where}{text}{source}"
 
 
 def _line(error: BaseException, file: Path) -> tuple[Path, int, str]:

@@ -4,16 +4,32 @@ from __future__ import annotations
 
 import csv
 import io
+import re
+import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import BadInputError
 from ..traces.whole import replace_text
-from .exercise import Judgement
+from .calls import reason
+from .exercise import LOOK, Judgement
 from .judges import JUDGES
 
-_HEAD = ("file", "right", "of", *JUDGES, "remarks", "same_as", "sha256", "made_with")
+_HEAD = (
+    "file", "right", "of", *JUDGES, "remarks", "tests", "predictions", "student", "same_as",
+    "alike", "details", "sha256", "made_with",
+)  # fmt: skip
+NOTHING = "handed in nothing"
+# What stands before the reason in a remark (where it was, and figures), and what after it.
+_BEFORE = re.compile(
+    r"^(?:(?:on a scene|with|reading \d,) .*?: )+"
+    r"|you return \S+( at \d+ s)? where .*? is expected: "
+    r"|time after the reset.*?, you return [^:]*: |is up to \S+ away from .*?: "
+    r"|nothing could be judged: |\S+/(?=\S+\.py)"
+)
+_AFTER = re.compile(r"^(.{16,}?)(?:[,;.?] | \().*")
+_FEW = 64  # characters
 _WORDS = {"right", "wrong", "not written", "not judged"}
 
 
@@ -28,7 +44,12 @@ class ClassEntry:
         functions: One after the other; empty where the file could not be judged.
         refusal: Why it could not.
         made_with: Backend, versions and limit that the verdict comes from.
+        tests: How many faults the student's tests catch, and which they do not.
+        predictions: How many were right.
+        student: Who handed it in, by the roster.
         same_as: The first submission whose code is the same, comments and layout aside.
+        alike: How much of the functions' syntax is that of another submission, names and
+            constants aside, and of which one the most.
     """
 
     name: str
@@ -37,6 +58,10 @@ class ClassEntry:
     refusal: str
     made_with: str
     same_as: str = ""
+    alike: str = ""
+    tests: str = ""
+    predictions: str = ""
+    student: str = ""
 
     @property
     def right(self) -> int:
@@ -45,12 +70,34 @@ class ClassEntry:
 
     @property
     def judged(self) -> bool:
-        """Whether there is a verdict on each function."""
-        return bool(self.functions) and all(each.judged for each in self.functions)
+        """Whether there is a verdict on each function, or nothing to judge."""
+        whole = bool(self.functions) and all(each.judged for each in self.functions)
+        return whole or self.refusal == NOTHING
+
+    @property
+    def looks(self) -> tuple[str, ...]:
+        """What somebody should look at, each once."""
+        remarks = (text for each in self.functions for text in each.remarks)
+        return tuple(dict.fromkeys(text for text in remarks if text.startswith(LOOK)))
+
+    @property
+    def reasons(self) -> str:
+        """What is not right, in a line with a few words for each function; "" if all is."""
+        words = {each.function: few_words(each) for each in self.functions if not each.passed}
+        if len(words) == len(JUDGES) and len(set(words.values())) == 1:
+            return next(iter(words.values()))  # of the file, and not of a function
+        texts = [f"{name.removeprefix('demo_')}: {text}" for name, text in words.items()]
+        return "; ".join([self.refusal] * bool(self.refusal) + texts)
+
+
+def few_words(judgement: Judgement) -> str:
+    """Why a function is not right, without figures and where it showed."""
+    text = _BEFORE.sub("", judgement.remarks[0]) if judgement.written else verdict_word(judgement)
+    return textwrap.shorten(_AFTER.sub(r"\1", text), _FEW, placeholder=" …")
 
 
 def as_csv(entries: Iterable[ClassEntry]) -> str:
-    """The table as text: a row a submission; remarks have a line each."""
+    """The table as text: a row a submission; details have a line for each remark."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(_HEAD)
@@ -63,9 +110,14 @@ def as_csv(entries: Iterable[ClassEntry]) -> str:
             entry.name,
             entry.right if entry.judged else "",
             len(JUDGES),
-            *(words.get(name, "not judged") for name in JUDGES),
-            "\n".join([entry.refusal] if entry.refusal else remarks),
+            *(words.get(name, "not written" if entry.judged else "not judged") for name in JUDGES),
+            "; ".join(filter(None, (entry.reasons, *entry.looks))),
+            entry.tests,
+            entry.predictions,
+            entry.student,
             entry.same_as,
+            entry.alike,
+            "\n".join([entry.refusal] if entry.refusal else remarks),
             entry.sha256,
             entry.made_with,
         )
@@ -80,11 +132,12 @@ def no_formula(cell: object) -> object:
 
 def verdict_word(judgement: Judgement) -> str:
     """A judgement in a word of the table."""
-    if not judgement.judged:
-        return "not judged"
-    if not judgement.written:
-        return "not written"
-    return "right" if judgement.passed else "wrong"
+    return reason(
+        (not judgement.judged, "not judged"),
+        (not judgement.written, "not written"),
+        (judgement.passed, "right"),
+        (True, "wrong"),
+    )
 
 
 def write(table: Path, entries: Iterable[ClassEntry]) -> None:
@@ -114,17 +167,18 @@ def read(table: Path) -> dict[tuple[str, str], ClassEntry]:
     found = {}
     for row in rows[1:]:
         cells = dict(zip(_HEAD, row, strict=False))
-        if len(row) != len(_HEAD) or any(cells[name] not in _WORDS for name in JUDGES):
+        whole = len(row) == len(_HEAD) and all(cells[name] in _WORDS for name in JUDGES)
+        if not whole or not cells["sha256"]:
             continue  # judged again
         entry = ClassEntry(cells["file"], cells["sha256"], _judgements(cells), "",
-                           cells["made_with"])  # fmt: skip
+                           cells["made_with"], tests=cells["tests"])  # fmt: skip
         found[entry.sha256, entry.made_with] = entry
     return found
 
 
 def _judgements(cells: Mapping[str, str]) -> tuple[Judgement, ...]:
     remarks: dict[str, list[str]] = {name: [] for name in JUDGES}
-    for cell in cells["remarks"].split("\n"):
+    for cell in cells["details"].split("\n"):
         line = cell.removeprefix("'")
         name, _, text = line.partition(": ")
         for each in [name] if name in remarks else remarks if line else ():

@@ -2,36 +2,60 @@
 
 from __future__ import annotations
 
-import ast
-import hashlib
+import csv
 import os
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 
-from ..errors import BadInputError
+from ..errors import BadInputError, StateMachineError
 from ..processes import checked_jobs
-from .class_table import ClassEntry, read, write
-from .exercise import LARGEST, TIME_LIMIT, ExerciseJudge, Grade
-from .judges import JUDGES
+from .calls import reason
+from .class_table import NOTHING, ClassEntry, read, write
+from .exercise import TIME_LIMIT, ExerciseJudge
+from .mutants.run import examine
+from .own_files import digest, has_functions, in_folder
 from .parallel import in_parallel
+from .predictions import score
+from .similarity import code_of, likeness, shape_of
 
 _NAMES = ("step_loop.py", "test_arm.py")  # of the exercise's own files
+_PREDICTIONS = "lesson.json"
+# What is handed in and cannot be judged as it is, by the end of its name.
+_UNREAD = {
+    ".ipynb": "a notebook: save it as a Python file, and hand in that",
+    **dict.fromkeys((".zip", ".gz", ".tar", ".7z", ".rar"), "an archive: unpack it"),
+}
+_HEADINGS = {"name", "student", "number", "id", "file"}  # of a roster
 
 
 @dataclass(frozen=True)
 class Submission:
     """A student's file: what it is called in the table, and where it is.
 
-    `path` is None where a student's folder has no file that could be judged, or several.
-    `folder` is that folder; what else is in it may be imported.
+    `path` is None where there is no file that could be judged, or several; `refusal` says why.
+    `folder` is a student's folder; what else is in it may be imported. `student` is who handed it
+    in, by a roster.
     """
 
     name: str
     path: Path | None
     refusal: str = ""
     folder: Path | None = None
+    student: str = ""
+
+    @property
+    def own(self) -> dict[str, Path]:
+        """The files that belong to it, by their names in its folder; alone in that of a class."""
+        if self.folder:
+            return in_folder(self.folder)
+        return {self.path.name: self.path} if self.path else {}
+
+    def named(self, name: str) -> Path | None:
+        """The first of its files that is called so."""
+        return next((file for file in self.own.values() if file.name == name), None)
 
 
 def submissions(paths: Sequence[str | os.PathLike[str]]) -> list[Submission]:
@@ -64,13 +88,13 @@ def submissions(paths: Sequence[str | os.PathLike[str]]) -> list[Submission]:
 
 
 def not_looked_at(paths: Sequence[str | os.PathLike[str]]) -> list[str]:
-    """Names of the files in class folders that are no Python files."""
+    """Names of the files in class folders that nobody hands in."""
     folders = [each for each in map(Path, paths) if each.is_dir() and not is_one_students(each)]
     return [
         entry.name
         for folder in folders
         for entry in sorted(folder.iterdir())
-        if entry.is_file() and not _skipped(entry) and entry.suffix.lower() != ".py"
+        if entry.is_file() and not _skipped(entry) and entry.suffix.lower() not in (".py", *_UNREAD)
     ]
 
 
@@ -82,7 +106,7 @@ def is_one_students(folder: Path) -> bool:
     if not any((folder / name).is_file() for name in _NAMES):
         return False
     return not any(
-        _has_a_function(file)
+        has_functions(file)
         for entry in folder.iterdir()
         if not _skipped(entry) and entry.name not in _NAMES
         for file in (entry.rglob("*.py") if entry.is_dir() else [entry])
@@ -109,32 +133,68 @@ def submission_in(folder: Path) -> Path:
 
 
 def _in_entry(entry: Path) -> list[Submission]:
-    if entry.is_file():
-        return [Submission(entry.name, entry)] if entry.suffix.lower() == ".py" else []
     if not entry.is_dir():
-        return []
-    files = [file for file in sorted(entry.rglob("*.py")) if _has_a_function(file)]
+        refusal = reason(
+            (entry.is_file(), _UNREAD.get(entry.suffix.lower(), "")),
+            (entry.is_symlink(), "a link to nothing"),
+            (True, "a pipe or a device, and no file"),
+        )
+        python = entry.is_file() and entry.suffix.lower() == ".py"
+        return [Submission(entry.name, entry if python else None, refusal)] * bool(
+            python or refusal
+        )
+    files = [file for file in sorted(entry.rglob("*.py")) if has_functions(file)]
     files = [file for file in files if file.name == _NAMES[0]] or files
     if len(files) == 1:
         return [Submission(entry.name, files[0], folder=entry)]
     text = "no Python file in it has one of the functions"
+    if notebooks := sorted(entry.rglob("*.ipynb")):
+        text += f". {notebooks[0].name} is {_UNREAD['.ipynb']}"
     if (tests := entry / _NAMES[1]).is_file():
         text += f". Did you mean statemachine check --mutants {tests.as_posix()}?"
     if files:
         names = ", ".join(file.relative_to(entry).as_posix() for file in files[:3])
         text = f"{len(files)} files in it have the functions: {names}"
-    return [Submission(entry.name, None, text)]
+    return [Submission(entry.name, None, text, entry)]
 
 
-def _has_a_function(file: Path) -> bool:
+def enrolled(found: Sequence[Submission], roster: Path) -> list[Submission]:
+    """The submissions of the students on a roster, and after them those of nobody on it.
+
+    Args:
+        found: All submissions. Each is the student's whose row has its name or the words of its
+            name (a name, a number) in any order.
+        roster: A CSV file with a row for each student, who is called what is in the first cell.
+
+    Raises:
+        BadInputError: The roster cannot be read.
+    """
     try:
-        if not file.is_file():  # a pipe would wait for somebody to write
-            return False
-        with file.open("rb") as content:
-            start = content.read(LARGEST)
-    except OSError:
-        return False
-    return any(f"def {name}".encode() in start for name in JUDGES)
+        text = roster.read_text(encoding="utf-8-sig")
+        most = max(",;\t", key=text.count)
+        rows = csv.reader(text.splitlines(), delimiter=most)
+        cells = [list(filter(None, map(str.strip, row))) for row in rows]
+    except (OSError, UnicodeError, csv.Error) as error:
+        raise BadInputError(f"the roster {roster.name} cannot be read: {error}") from None
+    left, done = list(found), []
+    for row in filter(None, cells):
+        if row is cells[0] and _HEADINGS & set(map(str.casefold, row)):
+            continue
+        theirs = [each for each in left if {each.name, Path(each.name).stem} & set(row)]
+        keys = [words for cell in row if len(cell) > 2 and (words := _words(cell))]
+        theirs = theirs or [each for each in left if any(key <= _words(each.name) for key in keys)]
+        if len(theirs) == 1:
+            left.remove(theirs[0])
+            done.append(replace(theirs[0], student=row[0]))
+        else:
+            names = ", ".join(each.name for each in theirs)
+            refusal = f"{len(theirs)} may be theirs: {names}" if theirs else NOTHING
+            done.append(Submission(row[0], None, refusal, student=row[0]))
+    return done + left
+
+
+def _words(name: str) -> frozenset[str]:
+    return frozenset(re.findall(r"[^\W_]+", name.casefold()))
 
 
 def judge_all(
@@ -144,6 +204,7 @@ def judge_all(
     time_limit: float = TIME_LIMIT,
     jobs: int | None = None,
     table: Path | None = None,
+    tests: bool = False,
     progress: Callable[[float], None] = lambda _: None,
 ) -> list[ClassEntry]:
     """Judge every submission, several at once.
@@ -156,6 +217,7 @@ def judge_all(
             for every two processors.
         table: A CSV file that is written anew after each file. What it says already of the same
             content, judged with the same versions and limit, is taken over and not judged again.
+        tests: Whether the tests in students' folders are run on arms with faults, too.
         progress: Told the fraction that is done.
 
     Raises:
@@ -165,23 +227,26 @@ def judge_all(
     jobs = checked_jobs(jobs, processors=2)
     before = read(table) if table is not None and table.exists() else {}
     entries: dict[str, ClassEntry] = {}
-    code_of = cache(_code)  # the table is written after each file, and asks for all of them
-    with ExerciseJudge(backend, time_limit) as judge:
+    compared = _Compared(found)
+    own = {each.path: each.own for each in found if each.path}
+    with ExerciseJudge(backend, time_limit, own=own) as judge:
         versions = " ".join(f"{name} {version}" for name, version in judge.versions.items())
         made_with = f"{backend}, {versions}, {time_limit:g} s"
         work: dict[str, Callable[[], ClassEntry]] = {}
         for each in found:
-            digest = _digest(each)
-            known = before.get((digest, made_with))
-            if known is not None and known.judged:
-                entries[each.name] = replace(known, name=each.name)
-            else:
-                work[each.name] = partial(_entry, judge, each, digest, made_with)
+            content = digest(each.own)
+            entry = ClassEntry(each.name, content, (), each.refusal, made_with)
+            known = before.get((content, made_with), entry)
+            if known.judged:
+                entry = entries[each.name] = replace(known, name=each.name)
+            file = each.named(_PREDICTIONS)
+            entry = replace(entry, student=each.student, predictions=score(file) if file else "")
+            work[each.name] = partial(_entry, judge, each, entry, tests)
 
         def ended(name: str, entry: ClassEntry) -> None:
             entries[name] = entry
             if table is not None:
-                write(table, _in_order(found, entries, code_of))
+                write(table, compared.in_order(entries))
 
         in_parallel(
             work,
@@ -190,80 +255,63 @@ def judge_all(
             stop=judge.stop.set,
             progress=lambda waiting: progress(1 - waiting / len(found)),
         )
-    done = _in_order(found, entries, code_of)
+    done = compared.in_order(entries)
     if table is not None:
         write(table, done)
     return done
 
 
-def _entry(judge: ExerciseJudge, submission: Submission, digest: str, made_with: str) -> ClassEntry:
-    if submission.path is None:
-        return ClassEntry(submission.name, digest, (), submission.refusal, made_with)
+def _entry(
+    judge: ExerciseJudge, submission: Submission, entry: ClassEntry, tests: bool
+) -> ClassEntry:
+    """The entry with what is not known yet."""
+    if submission.path is not None and not entry.judged:
+        try:
+            entry = replace(entry, functions=judge.judge(submission.path).functions)
+        except BadInputError as error:
+            entry = replace(entry, refusal=str(error))
+    file = submission.named(_NAMES[1])
+    if tests and file is not None and not entry.tests:
+        entry = replace(entry, tests=_caught(file, judge.backend))
+    return entry
+
+
+def _caught(file: Path, backend: str) -> str:
+    """How many faults a student's tests catch, and which they do not."""
     try:
-        grade: Grade = judge.judge(submission.path)
-    except BadInputError as error:
-        return ClassEntry(submission.name, digest, (), str(error), made_with)
-    return ClassEntry(submission.name, digest, grade.functions, "", made_with)
+        found = examine(file, backend)
+    except StateMachineError as error:
+        return str(error)
+    if found.failures:
+        return f"{found.failures[0].test} fails on the arm without a fault"
+    missed = ", ".join(mutant.name for mutant in found.survivors)
+    return f"{found.caught} of {len(found.trials)}" + f"; not {missed}" * bool(missed)
 
 
-def _in_order(
-    found: Sequence[Submission],
-    entries: Mapping[str, ClassEntry],
-    code_of: Callable[[Path | None], str],
-) -> list[ClassEntry]:
-    """The entries in the order of the submissions, each told which earlier one it equals."""
-    done = []
-    first: dict[str, str] = {}
-    for each in found:
-        if each.name not in entries:
-            continue
-        entry, same = entries[each.name], ""
-        if any(judgement.written for judgement in entry.functions):
-            code = code_of(each.path)
-            same = first.setdefault(code, each.name) if code else ""
-        done.append(replace(entry, same_as="" if same == each.name else same))
-    return done
+class _Compared:
+    """Submissions, each compared with all others; each pair once, though a table asks often."""
 
+    def __init__(self, found: Sequence[Submission]) -> None:
+        self._found = found
+        self._code, shape = cache(code_of), cache(shape_of)
+        self._likeness = cache(lambda left, right: likeness(shape(left), shape(right)))
 
-def _digest(submission: Submission) -> str:
-    """Of the file, and of what it may import out of the student's folder.
-
-    "" where there is none, or where it is too large to be judged.
-    """
-    if submission.path is None:
-        return ""
-    folder = submission.folder
-    try:
-        files = [submission.path] if folder is None else sorted(folder.rglob("*.py"))
-        whole = hashlib.sha256()
-        for file in files:
-            if not file.is_file() or file.stat().st_size > LARGEST:
-                if file == submission.path:
-                    return ""
+    def in_order(self, entries: Mapping[str, ClassEntry]) -> list[ClassEntry]:
+        """The entries in the order of the submissions, each with those that are like it."""
+        done = []
+        first: dict[str, str] = {}
+        for each in self._found:
+            if each.name not in entries:
                 continue
-            name = b"" if folder is None else os.fsencode(file.relative_to(folder))
-            content = file.read_bytes()
-            whole.update(b"%d %d " % (len(name), len(content)) + name + content)
-        return whole.hexdigest()
-    except OSError:
-        return ""
+            entry, same = entries[each.name], ""
+            if any(judgement.written for judgement in entry.functions):
+                code = self._code(each.path)
+                same = first.setdefault(code, each.name) if code else ""
+            others = ((self._alike(each, other), other.name) for other in self._found)
+            part, name = max(others, key=lambda other: other[0])
+            alike = f"{part:.0%} {name}" if part else ""
+            done.append(replace(entry, same_as="" if same == each.name else same, alike=alike))
+        return done
 
-
-def _code(path: Path | None) -> str:
-    """A digest of what a file does, without its comments, docstrings and layout; or ""."""
-    try:
-        tree = ast.parse(path.read_bytes()) if path is not None else None
-        if tree is None:
-            return ""
-        for node in ast.walk(tree):
-            body = getattr(node, "body", None)
-            if (
-                isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef))
-                and body
-                and isinstance(body[0], ast.Expr)
-                and isinstance(body[0].value, ast.Constant)
-            ):
-                node.body = body[1:] or [ast.Pass()]
-        return hashlib.sha256(ast.dump(tree).encode(errors="replace")).hexdigest()
-    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):
-        return ""
+    def _alike(self, left: Submission, right: Submission) -> float:
+        return 0.0 if left is right else self._likeness(left.path, right.path)

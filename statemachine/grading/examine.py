@@ -68,7 +68,7 @@ def judged(
 
     None if there are fewer answers than worlds, and no fault.
     """
-    passed: list[str] = []
+    passed: list[str] = []  # one text a world
     for world, right, answer in zip(worlds, rights, answers, strict=False):
         try:
             if isinstance(answer, FaultError):
@@ -83,8 +83,8 @@ def judged(
         if faults:
             where = f"{world.where}: " if world.where else ""
             return FunctionVerdict(tuple(Remark(where + fault.text) for fault in faults))
-        passed.append(world.where or "".join(remark.text for remark in remarks))
+        passed += [remark.text for remark in remarks]
     if len(passed) < len(worlds):
         return None
-    also = f"; right also {', and '.join(passed[1:])}" if passed[1:] else ""
+    also = f"; right in {len(worlds) - 1} other case{'s' * (len(worlds) > 2)}"
     return FunctionVerdict((Remark(passed[0] + also, True),))

@@ -8,17 +8,16 @@ the answers and the runs that are asked for. They must be right, so he has to wo
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 import shutil
 import sys
 import tempfile
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,16 +26,18 @@ from ..backends import backend_engine
 from ..errors import BadInputError, EngineError, StateMachineError
 from ..installed import DEFAULT, engine_version
 from . import sandbox
+from .calls import reason
 from .examine import judged
 from .judges import JUDGES, judge_of
+from .own_files import LARGEST, digest, has_solutions, named_by
 from .recording import START, FunctionRecording, Limits, record
 from .unwinding import unwinding
 from .worlds import ExerciseWorld, Scenes
 
+LOOK = "please look at this"
 TIME_LIMIT = 5.0  # [s] of computing for a function, from when its worlds are ready
-WALL_LIMIT = 120.0  # [s] on the clock for it, which a busy machine may need too
-_TIMES = 4  # a busy machine needs longer on the clock: so many times what may be computed, at least
-LARGEST = 1_000_000  # bytes of a student's file
+WALL_LIMIT = 10.0  # [s] on the clock for it, those apart in which others have the processor
+_TIMES = 2  # so many times what may be computed, at least
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,7 @@ class Grade:
         file: Its name; sha256: the digest of its content.
         backend: The backend that it ran on; versions: of what it ran with.
         functions: One after the other, in the exercise's order.
-        cpu_limit: What each function might compute [s], and wall_limit, what it might take on
-            the clock [s].
+        cpu_limit: What each function might compute [s], and wall_limit, what it might wait [s].
     """
 
     file: str
@@ -104,8 +104,8 @@ def run(
         time_limit: What each function may compute, after everything it needs is ready [s];
             this does not pass while the machine is busy with others.
         progress: Told the fraction that is done.
-        wall_limit: What each may take on the clock, from the same moment [s]; at least four
-            times `time_limit`.
+        wall_limit: What each may take on the clock, from the same moment [s], where it waits for
+            something else than a processor; at least twice `time_limit`.
 
     Raises:
         BadInputError: There is no such file, or it is no Python file.
@@ -127,9 +127,17 @@ class ExerciseJudge:
     """
 
     def __init__(
-        self, backend: str, time_limit: float = TIME_LIMIT, wall_limit: float = WALL_LIMIT
+        self,
+        backend: str,
+        time_limit: float = TIME_LIMIT,
+        wall_limit: float = WALL_LIMIT,
+        own: Mapping[Path, Mapping[str, Path]] | None = None,
     ) -> None:
-        """Arguments as `run` has them."""
+        """Arguments as `run` has them.
+
+        `own` has for a submission all files that belong to it, by their names in its folder; for
+        others these are what they name beside them.
+        """
         if not 0 < time_limit <= 3600:
             raise BadInputError(
                 f"the time limit must be above 0 s, and at most 3600; got {time_limit:g}"
@@ -141,6 +149,7 @@ class ExerciseJudge:
             self.versions[engine] = engine_version(engine)
         self.limits = Limits(time_limit, max(wall_limit, _TIMES * time_limit))
         self.stop = threading.Event()
+        self._own = own or {}
         self._cleanup = ExitStack()
         self._lock = threading.Lock()
         self._key: dict[str, tuple[list[ExerciseWorld], list[Any]]] = {}
@@ -170,24 +179,30 @@ class ExerciseJudge:
             BadInputError: There is no such file, or it is no Python file.
         """
         path = _python_file(Path(file))
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        own = self._own.get(Path(file)) or named_by(path)
         folder = Path(tempfile.mkdtemp(dir=self._folder))
-        judgements = self._all(path, folder, progress)
+        judgements = self._all(_copied(path, own, folder / "own"), folder, progress)
         shutil.rmtree(folder, ignore_errors=True)
         limits = self.limits
         return Grade(
-            path.name, digest, self.backend, self.versions, judgements, limits.cpu, limits.wall
+            path.name,
+            digest({path.name: path}),
+            self.backend,
+            self.versions,
+            judgements,
+            limits.cpu,
+            limits.wall,
         )
 
     def _all(
-        self, path: Path, folder: Path, progress: Callable[[float], None]
+        self, copy: _Copy, folder: Path, progress: Callable[[float], None]
     ) -> tuple[Judgement, ...]:
         """All functions at once, so that the slowest decides how long it takes."""
         backend, limits, stop = self.backend, self.limits, threading.Event()
         with ThreadPoolExecutor(len(JUDGES)) as pool:
             try:
                 futures = {
-                    name: pool.submit(_recorded, path, name, backend, limits, folder / name, stop)
+                    name: pool.submit(_recorded, copy, name, backend, limits, folder / name, stop)
                     for name in JUDGES
                 }
                 # Meanwhile what is right is worked out here, where no code of the student's runs.
@@ -199,7 +214,7 @@ class ExerciseJudge:
                     waiting = wait(waiting, timeout=0.1).not_done
                     progress(1 - len(waiting) / len(futures))
                 return tuple(
-                    _judgement(path, name, limits, *key[name], future.result())
+                    _judgement(copy, name, limits, *key[name], future.result())
                     for name, future in futures.items()
                 )
             finally:
@@ -243,18 +258,48 @@ def _python_file(path: Path) -> Path:
     return path
 
 
+@dataclass(frozen=True)
+class _Copy:
+    """A student's file alone with what belongs to it: `path` in `folder`; it was in `before`."""
+
+    path: Path
+    folder: Path
+    before: Path
+
+    def others(self, reads: Iterable[str]) -> dict[str, bool]:
+        """Files that are not its own, by name; whether it may not be judged for that."""
+        others = {}
+        for each in map(Path, reads):
+            beside = each.is_relative_to(self.folder)
+            file = self.before / each.relative_to(self.folder) if beside else each
+            if file.exists():
+                here = file.relative_to(Path.cwd()) if file.is_relative_to(Path.cwd()) else file
+                others[here.as_posix()] = beside or has_solutions(file)
+        return others
+
+
+def _copied(path: Path, own: Mapping[str, Path], folder: Path) -> _Copy:
+    for name, file in own.items():
+        target = folder / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(file, target)
+    (name,) = (name for name, file in own.items() if file.resolve() == path)
+    folder = folder.resolve()
+    return _Copy(folder / name, folder, path.parents[name.count("/")])
+
+
 def _recorded(
-    path: Path, name: str, backend: str, limits: Limits, folder: Path, stop: threading.Event
+    copy: _Copy, name: str, backend: str, limits: Limits, folder: Path, stop: threading.Event
 ) -> FunctionRecording:
     """A recording; if the process did not get ready, a second one."""
-    recording = record(path, name, backend, limits, folder / "1", stop)
+    recording = record(copy.path, copy.folder, name, backend, limits, folder / "1", stop)
     if recording.began or recording.refusal or recording.broken or stop.is_set():
         return recording
-    return record(path, name, backend, limits, folder / "2", stop)
+    return record(copy.path, copy.folder, name, backend, limits, folder / "2", stop)
 
 
 def _judgement(
-    path: Path,
+    copy: _Copy,
     name: str,
     limits: Limits,
     worlds: list[ExerciseWorld],
@@ -267,6 +312,26 @@ def _judgement(
         if isinstance(known, type) and issubclass(known, StateMachineError):
             raise known(text)
         raise EngineError(text)
+    others = copy.others(recording.reads)
+    if borrowed := ", ".join(other for other, matters in others.items() if matters):
+        text = (
+            f"not graded: it reads {borrowed}, which was not handed in with it. Is that your own? "
+            "Put it into this file"
+        )
+        return Judgement(name, True, False, (text,), judged=False)
+    looks = tuple(f"{LOOK}: it reads {other}" for other in others)
+    judgement = _verdict(copy.path, name, limits, worlds, rights, recording)
+    return replace(judgement, remarks=judgement.remarks + looks)
+
+
+def _verdict(
+    path: Path,
+    name: str,
+    limits: Limits,
+    worlds: list[ExerciseWorld],
+    rights: list[Any],
+    recording: FunctionRecording,
+) -> Judgement:
     if recording.forbidden:
         return Judgement(name, True, False, tuple(recording.forbidden))
     try:
@@ -293,14 +358,15 @@ def _unfinished(path: Path, name: str, limits: Limits, recording: FunctionRecord
     last = trace.rpartition("Timeout (")[2]
     lines = re.findall(rf'File "{re.escape(str(path))}", line (\d+)', last)
     where = f"line {lines[0]}: " if lines else ""
-    by_itself = os.name == "posix" and trace.startswith("Timeout")
-    if not outcome.timed_out and (outcome.out_of_cpu or not by_itself):
+    if not outcome.timed_out:
         return Judgement(name, True, False, (where + _how_it_ended(limits, outcome),))
     computed = max(0.0, outcome.cpu - recording.cpu)
+    busy, clock = "is this machine busy?", outcome.wall
+    if outcome.asleep > limits.wall:
+        busy, clock = "does it wait for something (sleep, a lock)?", limits.wall
     text = (
-        f"{where}nothing could be judged: not at its end after {limits.wall:g} s on the clock, "
-        f"of which it computed for {computed:.1f} s. Does it wait for something, or is this "
-        "machine busy?"
+        f"{where}nothing could be judged: not at its end after {clock:.3g} s on the clock, "
+        f"of which it computed for {computed:.1f} s: {busy}"
     )
     return Judgement(name, True, False, (text,), judged=False)
 
@@ -320,12 +386,17 @@ def _not_ready(outcome: sandbox.ProcessOutcome) -> str:
 
 def _how_it_ended(limits: Limits, outcome: sandbox.ProcessOutcome) -> str:
     """What became of a process that gave no verdict."""
-    if outcome.out_of_cpu:
-        return f"still running after {limits.cpu:g} s of computing: a loop that does not end?"
-    if outcome.flooded:
-        return "it prints without end: a loop that does not end?"
-    if outcome.out_of_memory:
-        return "it asks for more memory than there is for it"
-    if outcome.signal is not None:
-        return f"it crashed the process ({sandbox.signal_name(outcome.signal)})"
-    return f"it ended the process, with code {outcome.returncode}: a function must return"
+    name = sandbox.signal_name(outcome.signal or 0)
+    return reason(
+        (
+            outcome.out_of_cpu,
+            f"still running after {limits.cpu:g} s of computing: a loop that does not end?",
+        ),
+        (
+            outcome.flooded,
+            "it prints more than 256 MB, and was ended there: a loop that does not end?",
+        ),
+        (outcome.out_of_memory, "it asks for more memory than there is for it"),
+        (outcome.signal is not None, f"it crashed the process ({name})"),
+        (True, f"it ended the process, with code {outcome.returncode}: a function must return"),
+    )

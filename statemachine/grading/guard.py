@@ -1,10 +1,17 @@
-"""What a student's code may not do: start processes, or use the network."""
+"""What a student's code may not do: processes, the network; and what it reads, which is told."""
 
 from __future__ import annotations
 
+import os
+import site
 import sys
+import sysconfig
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
+
+from ..models import models_dir
 
 # What no exercise needs, by the name of the audit event, and in words.
 _REFUSED = {
@@ -23,27 +30,71 @@ _REFUSED = {
     "socket.sendto": "it wants to use the network",
     "socket.getaddrinfo": "it wants to use the network",
 }
+_READS = ("open", "os.link", "os.rename")  # with the name of a file first
+_SYSTEM: tuple[str, ...] = ()
+if sys.platform != "win32":
+    _SYSTEM = ("/usr", "/etc", "/proc", "/sys", "/dev", "/lib", "/System", "/Library")
 
 
 class Guard:
-    """Refuses processes and the network, and remembers what was refused."""
+    """Refuses processes and the network, and tells of files that are not the student's."""
 
-    def __init__(self, file: Path) -> None:
-        self._file = file
-        self.refused: list[str] = []
+    def __init__(self, file: Path, own: Path, here: Path, tell: Callable[[str, str], None]) -> None:
+        """Begin.
+
+        Args:
+            file: The student's; its lines are named.
+            own: The folder of all files that belong to it.
+            here: The folder in which this process may read and write.
+            tell: Gets "forbidden" and what was refused; or "reads" and the name of a file that
+                is neither here, nor own, nor Python's or the package's; or of one that would
+                be own and is not there. Each once.
+        """
+        places = (
+            own, here, Path(__file__).parents[1], models_dir(), sys.base_prefix, *_SYSTEM,
+            *sysconfig.get_paths().values(), *site.getsitepackages(), site.getusersitepackages(),
+            os.environ.get("SYSTEMROOT", own),
+        )  # fmt: skip
+        self._open = tuple(os.path.realpath(place) + os.sep for place in places)
+        self._file, self._own, self._tell = file, os.path.realpath(own) + os.sep, tell
+        self._told: set[tuple[str, str]] = set()
         sys.addaudithook(self._hear)
 
-    def _hear(self, event: str, _arguments: tuple[Any, ...]) -> None:
+    def _hear(self, event: str, arguments: tuple[Any, ...]) -> None:
         if event in _REFUSED:
             where = _line_in(sys._getframe(), self._file)
-            self.refused.append(f"{where}{_REFUSED[event]} ({event}), which no exercise needs")
+            if where is not None:
+                text = f"{where}{_REFUSED[event]} ({event}), which no exercise needs"
+                self._once("forbidden", text)
             raise PermissionError(f"{_REFUSED[event]}: not here")
+        if event in _READS:
+            self._look_at(arguments[0])
+        elif event == "import" and arguments[0] not in sys.stdlib_module_names:
+            self._look_at(f"{self._own}{arguments[0]}.py")
+
+    def _look_at(self, name: Any) -> None:
+        with suppress(TypeError, ValueError):  # the number of an open file; no name at all
+            path = os.path.realpath(os.fsdecode(name))
+            inside = path + os.sep
+            missing = inside.startswith(self._own) and "__pycache__" not in path
+            if os.path.exists(path) != missing and (missing or not inside.startswith(self._open)):
+                self._once("reads", path)
+
+    def _once(self, kind: str, text: str) -> None:
+        if (kind, text) not in self._told:
+            self._told.add((kind, text))
+            self._tell(kind, text)
 
 
-def _line_in(frame: Any, path: Path) -> str:
-    """'line 12: ', the innermost line of the student's file; nothing if there is none."""
+def _line_in(frame: Any, path: Path) -> str | None:
+    """'line 12: ', the innermost line of the student's file; nothing if there is none.
+
+    None where a package wants it, which does without: of matplotlib, a program that lists fonts.
+    """
     while frame is not None:
         if frame.f_code.co_filename == str(path):
             return f"line {frame.f_lineno}: "
+        if "site-packages" in frame.f_code.co_filename:
+            return None
         frame = frame.f_back
     return ""

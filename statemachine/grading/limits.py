@@ -15,14 +15,13 @@ from typing import IO
 WATCHED = sys.platform == "win32"
 
 
-def limit_cpu(seconds: float, wall: float, trace: IO[str]) -> None:
-    """End this process after so much more computing, or time on the clock; the line is told.
+def limit_cpu(seconds: float, trace: IO[str]) -> None:
+    """End this process after so much more computing; that, or `sandbox.run`, has its line told.
 
     Where it cannot, the line is noted each second, and `sandbox.run` ends the process.
 
     Args:
         seconds: Of computing, on all processors together.
-        wall: Seconds on the clock.
         trace: Where the fault handler writes; it works while Python itself is not reached.
     """
     if sys.platform == "win32":
@@ -30,7 +29,6 @@ def limit_cpu(seconds: float, wall: float, trace: IO[str]) -> None:
         return
     import resource
 
-    faulthandler.dump_traceback_later(wall, exit=True, file=trace)
     faulthandler.register(signal.SIGPROF, file=trace, chain=True)
     signal.setitimer(signal.ITIMER_PROF, seconds)
     last = math.ceil(time.process_time() + seconds) + 1  # where the signal was refused

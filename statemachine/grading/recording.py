@@ -18,7 +18,8 @@ from .calls import FaultError
 from .transcript import decode
 
 START = 60.0  # [s] on the clock for Python, the engine and the worlds to get ready
-_MARGIN = 5.0  # [s] that the process has to end itself, and tell the line
+_CLOCK = 120.0  # [s] that it may take where others have the processor, or nobody can tell
+_TIMES = 4  # and so many times what it may take without them, at least
 _MEMORY_MOST = 2 * sandbox.GB
 _RECORD_MOST = 40_000_000  # bytes
 _TEXT_MOST = 2000  # characters
@@ -36,7 +37,7 @@ _KEPT = (
 
 @dataclass(frozen=True)
 class Limits:
-    """What a function may compute, and what it may take on the clock [s]."""
+    """What a function may compute, and what it may wait for anything but a processor [s]."""
 
     cpu: float
     wall: float
@@ -52,6 +53,7 @@ class FunctionRecording:
         refusal: The kind of an error, and what it said, where there is no engine.
         answers: What came of the function, world after world, as far as it came.
         forbidden: What the student's code tried and may not do.
+        reads: Names of the files that it opened and that are not its own; see `guard.Guard`.
         trace: What its fault handler wrote.
         broken: Why the record is none, if it is none.
     """
@@ -63,16 +65,24 @@ class FunctionRecording:
     refusal: tuple[str, str] | None = None
     answers: list[Answer | FaultError] = field(default_factory=list)
     forbidden: list[str] = field(default_factory=list)
+    reads: list[str] = field(default_factory=list)
     broken: str = ""
 
 
 def record(
-    path: Path, name: str, backend: str, limits: Limits, folder: Path, stop: threading.Event
+    path: Path,
+    own: Path,
+    name: str,
+    backend: str,
+    limits: Limits,
+    folder: Path,
+    stop: threading.Event,
 ) -> FunctionRecording:
     """Run a function of a file on its worlds.
 
     Args:
         path: The file.
+        own: The folder of all files that belong to it.
         name: Of the function.
         backend: Of the backend.
         limits: From when the worlds are ready.
@@ -85,10 +95,10 @@ def record(
     job = folder / "job"
     facts = {
         "file": str(path),
+        "own": str(own),
         "function": name,
         "backend": backend,
         "cpu": limits.cpu,
-        "wall": limits.wall,
         "answers": str(answers),
         "trace": str(trace),
         "nonce": nonce,
@@ -97,7 +107,8 @@ def record(
     outcome = sandbox.run(
         [sys.executable, "-P", "-c", _CHILD, str(job), str(_PACKAGES)],
         cpu=limits.cpu,
-        wall=limits.wall + _MARGIN,
+        wall=max(_CLOCK, _TIMES * limits.wall),
+        asleep=limits.wall,
         started=lambda: bool(content(answers, 1)),
         start=START,
         start_cpu=START,
@@ -134,11 +145,11 @@ def _add(recording: FunctionRecording, line: bytes, nonce: str) -> None:
             recording.refusal = _text(found["kind"]), _text(found["text"])
         case "running" if not recording.began:
             recording.began, recording.cpu = True, float(found["cpu"])
+        case "forbidden" | "reads" as kind if recording.began:
+            getattr(recording, kind).append(_text(found["text"]))
         case "answer" if recording.began:
-            recording.forbidden = [_text(text) for text in found["refused"]]
             recording.answers.append(decode(found["answer"]))
         case "fault" if recording.began:
-            recording.forbidden = [_text(text) for text in found["refused"]]
             written = found["written"] is True
             recording.answers.append(FaultError(_text(found["text"]), written))
         case _:

@@ -36,6 +36,7 @@ _FLOOD = GB // 4  # bytes of output that only a loop without end writes
 _TOKEN = "STATEMACHINE_SANDBOX"
 _PATIENCE = 2.0  # seconds to end what a command left behind
 _CHUNK = 65536
+_LOOK = 0.1  # seconds between two looks at what it does
 _LAUNCHER = str(Path(__file__).with_name("_launcher.py"))
 
 
@@ -47,7 +48,7 @@ class ProcessOutcome:
         returncode: Its exit code; None if a signal or a limit of time ended it.
         signal: The number of the signal that ended it, unless that was ours.
         started: Whether it got as far as `started` told, or was to.
-        timed_out: Whether time on the clock ended it.
+        timed_out: Whether time on the clock ended it, or time asleep.
         out_of_cpu: Whether computing time ended it.
         flooded: Whether it was ended since it wrote without end.
         out_of_memory: Whether what it wrote last speaks of memory that it did not get.
@@ -56,6 +57,8 @@ class ProcessOutcome:
         wall: How long it ran on the clock [s].
         cpu: How long it computed [s]; 0 where the system does not tell.
         left_behind: Processes of its own that were still there at its end, and were ended.
+        asleep: How long it neither computed nor waited for a processor or a disk [s]; 0 where
+            the system does not tell.
     """
 
     returncode: int | None
@@ -71,6 +74,7 @@ class ProcessOutcome:
     wall: float
     cpu: float
     left_behind: int
+    asleep: float
 
 
 def run(
@@ -78,6 +82,7 @@ def run(
     *,
     cpu: float,
     wall: float,
+    asleep: float = math.inf,
     started: Callable[[], bool] | None = None,
     start: float = 60.0,
     start_cpu: float = 0.0,
@@ -93,7 +98,10 @@ def run(
     Args:
         command: Program and arguments.
         cpu: Seconds that it may compute, on all processors together.
-        wall: Seconds on the clock that it may take.
+        wall: Seconds on the clock that it may take; at their end, on POSIX, it gets SIGPROF, so
+            that a handler may tell where it is.
+        asleep: Seconds of these in which it may do nothing and want nothing of the machine,
+            where the system tells.
         started: Tells when it is ready, and `wall` begins; None for at once.
         start: Seconds on the clock that it may take until then.
         start_cpu: Seconds of computing until then that are not counted: for a command that
@@ -122,24 +130,27 @@ def run(
         start_new_session=True,  # without effect on Windows
     )
     readers = [_Reader(pipe, output_most) for pipe in (process.stdout, process.stderr)]
-    waiting = _Waiting(process, readers, cpu, wall, stop or threading.Event())
+    waiting = _Waiting(process, readers, cpu, wall, asleep, token, stop or threading.Event())
     try:
         ready = started is None or waiting.until(started, began + start)
         if ready:
             waiting.to_the_end()
+        timed_out = not (waiting.ended or waiting.out_of_cpu or waiting.flooded)
         took = time.monotonic() - began
+        if timed_out and ready:
+            waiting.ask_where()
     finally:  # an interrupt too
         left = _end_all(process, token)
         used = _reap(process)
     out, err = (reader.finish() for reader in readers)
-    code = process.returncode if waiting.ended else None
+    code = None if timed_out or not waiting.ended else process.returncode
     number = -code if code is not None and code < 0 else None
     out_of_cpu = waiting.out_of_cpu or ended_by_cpu(number, used, cpu)
     return ProcessOutcome(
         returncode=code if code is not None and code >= 0 else None,
         signal=None if out_of_cpu else number,
         started=ready or (started is not None and started()),
-        timed_out=not (waiting.ended or out_of_cpu or waiting.flooded),
+        timed_out=timed_out and not out_of_cpu,
         out_of_cpu=out_of_cpu,
         flooded=waiting.flooded,
         out_of_memory=waiting.ended and code != 0 and _speaks_of_memory(err),
@@ -149,6 +160,7 @@ def run(
         wall=took,
         cpu=used,
         left_behind=left,
+        asleep=waiting.asleep,
     )
 
 
@@ -191,6 +203,7 @@ class _Waiting:
         ended: Whether it ended by itself.
         out_of_cpu: Whether it computed for too long, as seen from outside.
         flooded: Whether it wrote too much.
+        asleep: How long it did nothing [s].
     """
 
     def __init__(
@@ -199,6 +212,8 @@ class _Waiting:
         readers: Sequence[_Reader],
         cpu: float,
         wall: float,
+        asleep_most: float,
+        token: str,
         stop: threading.Event,
     ) -> None:
         self.ended = False
@@ -206,6 +221,10 @@ class _Waiting:
         self.flooded = False
         self._process, self._readers = process, readers
         self._cpu, self._wall, self._stop = cpu, wall, stop
+        self._asleep_most, self._token = asleep_most, token
+        self.asleep = 0.0
+        self._looked = time.monotonic()
+        self._inside: list[Path] = []  # in /proc, without those that only launched it
 
     def until(self, ready: Callable[[], bool], deadline: float) -> bool:
         """Whether `ready` said so before the end, and before the deadline."""
@@ -218,9 +237,33 @@ class _Waiting:
         def exhausted() -> bool:
             self.out_of_cpu = WATCHED and cpu_of(self._process) - before > self._cpu
             self.flooded = any(reader.total > _FLOOD for reader in self._readers)
-            return self.out_of_cpu or self.flooded
+            self._look()
+            return self.out_of_cpu or self.flooded or self.asleep > self._asleep_most
 
         self._wait(time.monotonic() + self._wall, exhausted)
+
+    def _look(self) -> None:
+        """Add to the time asleep, if no thread of it computes or waits for the machine."""
+        if self._asleep_most == math.inf or (now := time.monotonic()) < self._looked + _LOOK:
+            return
+        self._looked = now  # if we were late ourselves, most of that is not known
+        with suppress(OSError):
+            self._inside = self._inside or [
+                entry
+                for entry in _relatives(self._process.pid, self._token)
+                if _LAUNCHER.encode() not in (entry / "cmdline").read_bytes()
+            ]
+        fields = [_fields(task) for entry in self._inside for task in entry.glob("task/*")]
+        self.asleep += _LOOK * (bool(fields) and not any(each[0] in b"RD" for each in fields))
+
+    def ask_where(self) -> None:
+        """Let it write down where it is, if it has a handler for that, and end."""
+        if sys.platform == "win32":
+            return
+        for pid in [int(entry.name) for entry in self._inside] or [self._process.pid]:
+            with suppress(OSError):
+                os.kill(pid, signal.SIGPROF)
+        self._wait(time.monotonic() + _PATIENCE / 2, lambda: False)
 
     def _wait(self, deadline: float, enough: Callable[[], bool]) -> bool:
         pause = 0.001
@@ -257,39 +300,43 @@ def _end_all(process: subprocess.Popen[bytes], token: str) -> int:
         process.kill()
         return 0
     deadline = time.monotonic() + _PATIENCE
-    seen: set[int] = set()
+    seen: set[Path] = set()
     first = True
     while True:
-        found = _relatives(process.pid, token)
+        found = {each for each in _relatives(process.pid, token) if int(each.name) != process.pid}
         seen |= found
         if process.returncode is None:
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(process.pid, signal.SIGKILL)
-        for pid in found:
+        for entry in found:
             with suppress(ProcessLookupError, PermissionError):
-                os.kill(pid, signal.SIGKILL)
+                os.kill(int(entry.name), signal.SIGKILL)
         if time.monotonic() > deadline or not (found or first):
             return len(seen)
         first = False  # what was being forked meanwhile shows in the next round
         time.sleep(0.002)
 
 
-def _relatives(leader: int, token: str) -> set[int]:
-    """Living processes of the session, or that carry the token; without /proc, none."""
+def _relatives(leader: int, token: str) -> set[Path]:
+    """Living processes of the session, or that carry the token, in /proc; without it, none."""
     mark = f"{_TOKEN}={token}".encode()
     found = set()
     for entry in Path("/proc").glob("[0-9]*"):
-        try:
-            # After the name in brackets, which may hold anything: state, parent, group, session.
-            fields = (entry / "stat").read_bytes().rpartition(b")")[2].split()
-            if fields[0] in b"ZX":
-                continue
-            ours = int(fields[3]) == leader or mark in (entry / "environ").read_bytes()
-        except (OSError, IndexError, ValueError):  # it ended meanwhile, or is another user's
-            continue
-        if ours and int(entry.name) != leader:
-            found.add(int(entry.name))
+        state, _parent, _group, session = _fields(entry)
+        with suppress(OSError):  # it ended meanwhile, or is another user's
+            if state not in b"ZX" and (
+                int(session) == leader or mark in (entry / "environ").read_bytes()
+            ):
+                found.add(entry)
     return found
+
+
+def _fields(entry: Path) -> list[bytes]:
+    """State, parent, group and session of a process or thread in /proc; it may have ended."""
+    with suppress(OSError):
+        # After the name in brackets, which may hold anything.
+        return (entry / "stat").read_bytes().rpartition(b")")[2].split()[:4]
+    return [b"X", b"0", b"0", b"0"]
 
 
 def _speaks_of_memory(stderr: str) -> bool:

@@ -5,15 +5,12 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import Any
 
 from .. import __version__
-from ..errors import BadInputError
+from ..grading.predictions import KIND, answers_in
 from ..page import Question
 from ..traces.whole import replace_text
 from .quiz import Reader
-
-_KIND = "statemachine predictions"
 
 
 class RecordedReader(Reader):
@@ -34,7 +31,7 @@ class RecordedReader(Reader):
         """
         super().__init__(lesson)
         self._file = file
-        self._answers = _read(file) if file.exists() else {}
+        self._answers = answers_in(file) if file.exists() else {}
         self._write()
 
     def ask(self, question: Question) -> int | None:
@@ -67,7 +64,7 @@ class RecordedReader(Reader):
     def _write(self) -> None:
         answers = list(self._answers.values())
         record = {
-            "kind": _KIND,
+            "kind": KIND,
             "statemachine": __version__,
             "python": sys.version.split()[0],
             "score": sum(bool(answer["right"]) for answer in answers),
@@ -76,18 +73,3 @@ class RecordedReader(Reader):
         }
         text = json.dumps(record, indent=1, ensure_ascii=False) + "\n"
         replace_text(self._file, text)
-
-
-def _read(file: Path) -> dict[str, dict[str, Any]]:
-    try:
-        record = json.loads(file.read_text(encoding="utf-8"))
-        if record["kind"] != _KIND:
-            raise ValueError("another kind of file")
-        answers = {f"{each['lesson']}: {each['question']}": each for each in record["answers"]}
-        if not all(isinstance(each["right"], bool) for each in answers.values()):
-            raise ValueError("an answer is neither right nor wrong")
-    except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
-        raise BadInputError(
-            f"{file.name} is there and is no record of predictions ({error}): name another file"
-        ) from None
-    return answers

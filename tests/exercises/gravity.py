@@ -201,6 +201,13 @@ def speed_for_position(model, seconds=4):
     return fall(model), fall(_limp(model))
 
 
+@wrong("gravity", "are they its speed, qvel, or another joint? shoulder_lift is at qpos[")
+def nothing_read_from_the_runs(model, seconds=4):
+    for each in (model, _limp(model)):
+        _fall(each, seconds)
+    return [0.0] * (seconds + 1), [0.0] * (seconds + 1)
+
+
 @wrong("gravity", "you took 1 step for a second, and at 5 ms a step a second has 200")
 def one_step_a_second(model, seconds=4):
     return _fall(model, seconds, each=1), _fall(_limp(model), seconds, each=1)

@@ -206,6 +206,38 @@ def second_twice(model, ctrl, nstep=600):
     return np.array_equal(first, second), second, second.copy()
 
 
+@wrong("replay", "the command was written into qpos, and the arm was there at once")
+def command_for_position(model, ctrl, nstep=600):
+    def once():
+        data = sm.make_data(model)
+        sm.reset(model, data, keyframe=0)
+        data.time = 0.0
+        data.qpos[[model.jnt_qposadr[model.joint_id(name)] for name in model.actuator_names]] = ctrl
+        sm.step(model, data, nstep)
+        return data.qpos.copy()
+
+    return _compared(once(), once())
+
+
+@wrong("replay", ": += adds to the keyframe's own ctrl; data.ctrl[:] = ctrl sets it")
+def command_added(model, ctrl, nstep=600):
+    def once():
+        data = sm.make_data(model)
+        sm.reset(model, data, keyframe=0)
+        data.time = 0.0
+        data.ctrl[:] += ctrl
+        sm.step(model, data, nstep)
+        return data.qpos.copy()
+
+    return _compared(once(), once())
+
+
+@wrong("replay", "there was only one run: one run compared with itself is always equal. Run twice")
+def one_run_under_two_names(model, ctrl, nstep=600):
+    first = second = _once(model, ctrl, nstep)
+    return _compared(first, second)
+
+
 @right("replay")
 def one_data_reset_between_step_by_step(model, ctrl, nstep=600):
     data = sm.make_data(model)

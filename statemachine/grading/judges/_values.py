@@ -29,7 +29,7 @@ def parts(value: Any, number: int, what: str) -> list[Any]:
     several = isinstance(value, (tuple, list)) or (isinstance(value, np.ndarray) and value.shape)
     found = list(value) if several else []
     if not several or len(found) != number:
-        raise FaultError(f"it returns {kind(value)}, where {what} is asked for")
+        raise FaultError(f"it returns {kind(value)}, where {what} should be")
     return found
 
 

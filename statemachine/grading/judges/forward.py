@@ -11,10 +11,21 @@ import numpy as np
 from ...comparison.text import rounded, vector
 from ...interface import Array, Data, Model, forward, make_data
 from ..answers import Answer
-from ..calls import Remark
+from ..calls import Remark, reason
 from ..watch import Inputs
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
-from ._values import LIFT, TIP, address, grain, near, numbers, owner, parts, short_float, told_apart
+from ._values import (
+    LIFT,
+    TIP,
+    address,
+    grain,
+    near,
+    numbers,
+    owner,
+    parts,
+    short_float,
+    told_apart,
+)
 
 SCENE = "so101/scene"
 ANGLE = 0.8  # [rad], what is written
@@ -101,9 +112,7 @@ def judge(answer: Answer, world: ExerciseWorld, right: Tips) -> list[Remark]:
     moved = float(np.linalg.norm(right.readings[3] - right.readings[2]))
     return [
         Remark(
-            "readings 2 and 3 are equal: the write changed nothing that is derived; the second "
-            f"forward found the fingertip {rounded(moved, 'm')} away, and no time passed",
-            True,
+            f"a write changed nothing derived; forward moved the tip by {rounded(moved, 'm')}", True
         )
     ]
 
@@ -114,21 +123,26 @@ def _all_at_once(given: Array, answer: Answer, tips: Tips, tolerance: float) -> 
         return []
     last = f"all four readings are the last one, {vector(given[3])} m: "
     copies = "Keep copies: data.site_xpos[…].copy()"
-    if near(given, np.tile(given[3], (4, 1)), 0):
-        if answer.memory[3] == 0 or all(answer.live):
-            text = "what you read is the simulator's own memory, which changes. "
-            return [Remark(last + text + copies)]
-        if near(given[3], tips.readings[3], tolerance):
-            text = "read only at the end, or from the simulator's own memory, which changes. "
-            return [Remark(last + text + copies)]
-    if near(given / 1000, tips.readings, TOLERANCE):
-        return [Remark("the readings are in millimetres: positions are in metres here")]
-    if answer.forwards:  # without any, all are at the origin
-        names = [n for n, places in tips.others.items() if near(given, places, tolerance)]
-        if names:
-            of = " and ".join(names[:3])
-            return [Remark(f"that is the place of {of}; site {TIP!r} is asked for")]
-    return []
+    same = near(given, np.tile(given[3], (4, 1)), 0)
+    places = tips.others.items() if answer.forwards else ()  # without any, all are at the origin
+    names = [name for name, readings in places if near(given, readings, tolerance)]
+    text = reason(
+        (
+            same and (answer.memory[3] == 0 or all(answer.live)),
+            f"{last}what you read is the simulator's own memory, which changes. {copies}",
+        ),
+        (
+            same and near(given[3], tips.readings[3], tolerance),
+            f"{last}read only at the end, or from the simulator's own memory, which changes. "
+            f"{copies}",
+        ),
+        (
+            near(given / 1000, tips.readings, TOLERANCE),
+            "the readings are in millimetres: positions are in metres here",
+        ),
+        (names, f"that is the place of {' and '.join(names[:3])}; site {TIP!r} is asked for"),
+    )
+    return [Remark(text)] if text else []
 
 
 def _why(k: int, given: Array, world: ExerciseWorld, tips: Tips, answer: Answer) -> str:
@@ -137,30 +151,46 @@ def _why(k: int, given: Array, world: ExerciseWorld, tips: Tips, answer: Answer)
     away = f"{rounded(float(np.linalg.norm(found - right)), 'm')} away"
     fresh, old, new = tips.readings[0], tips.readings[1], tips.readings[3]
     slack = TOLERANCE + grain(found)
-    if not np.isfinite(found).all():
-        return f"you return {vector(found)} m"
-    if world.where and near(found, tips.course[k], slack):
-        return "that belongs to the course's own scene, not to the model that you got"
-    if grain(found) and near(found, right, slack):
-        return f"it was rounded, {away}: return what you read as it is"
-    if k and near(found, fresh, TOLERANCE):
-        never = "" if answer.forwards else ", which was never called"
-        return f"derived values were read before any forward{never}: still at the origin, {away}"
-    for name, places in tips.others.items() if k else ():
-        if near(found, places[k], slack):
-            return f"that is the place of {name}, {away}; {TIP!r} is asked for"
+    never = "" if answer.forwards else ", which was never called"
     place = address(world.model)
-    early = bool(answer.forwards) and answer.forwards[0].qpos[place] == ANGLE
-    if k < 3 and near(found, new, TOLERANCE):
-        if early:
-            return f"qpos was written before the first forward: that is the new pose, {away}"
-        return f"forward was called before it was read: that is the new pose already, {away}"
-    if k == 0 and near(found, old, TOLERANCE):
-        return f"forward was called before it: a new Data has nothing derived yet; you are {away}"
-    if k == 3 and (text := next(_poses(found, world.model, answer, away), "")):
-        return text
+    early = any(ANGLE in each.qpos[place : place + 1] for each in answer.forwards[:1])
     apart = told_apart(found, right, lambda place, digits: f"{vector(place, digits)} m")
-    return f"you return {apart} is expected, {away}"
+    return reason(
+        (not np.isfinite(found).all(), f"you return {vector(found)} m"),
+        (
+            world.where and near(found, tips.course[k], slack),
+            "that belongs to the course's own scene, not to the model that you got",
+        ),
+        (
+            grain(found) and near(found, right, slack),
+            f"it was rounded, {away}: return what you read as it is",
+        ),
+        (
+            k and near(found, fresh, TOLERANCE),
+            f"derived values were read before any forward{never}: still at the origin, {away}",
+        ),
+        *(
+            (
+                k and near(found, places[k], slack),
+                f"that is the place of {name}, {away}; {TIP!r} is asked for",
+            )
+            for name, places in tips.others.items()
+        ),
+        (
+            k < 3 and near(found, new, TOLERANCE) and early,
+            f"qpos was written before the first forward: that is the new pose, {away}",
+        ),
+        (
+            k < 3 and near(found, new, TOLERANCE),
+            f"forward was called before it was read: that is the new pose already, {away}",
+        ),
+        (
+            k == 0 and near(found, old, TOLERANCE),
+            f"forward was called before it: a new Data has nothing derived yet; you are {away}",
+        ),
+        (text := next(_poses(found, world.model, answer, away), "") if k == 3 else "", text),
+        (True, f"you return {apart} is expected, {away}"),
+    )
 
 
 def _poses(found: Array, model: Model, answer: Answer, away: str) -> Iterator[str]:
@@ -194,22 +224,33 @@ def _unmoved(start: Inputs, answer: Answer, model: Model, away: str) -> str:
     place = address(model)
     old = f"that is the old pose, {away}"
     states = [each for each in (*answer.forwards, *answer.ends) if each.qpos.shape == (model.nq,)]
-    if any(each.qpos[place] == ANGLE for each in answer.forwards):
-        return f"it was read before the second forward: {old}"
-    if any(each.qpos[place] != start.qpos[place] for each in states):
-        return f"derived values were read before forward: {old}"
-    for name in ("qpos", "ctrl", "qvel"):
-        for each in states:
-            if written := _written(start, each)[name]:
-                what = {
-                    "qpos": f"which is {owner(model, written[0])!r}" if name == "qpos" else "",
-                    "ctrl": "a command, on which the arm would act with time",
-                    "qvel": "a speed",
-                }[name]
-                return f"you wrote {name}[{written[0]}], {what}: {old}; {LIFT} is at qpos[{place}]"
-    return (
-        f"nothing was written into qpos of a Data (into a copy of it?): {old}; "
-        f"data.qpos[…] = {ANGLE} writes"
+    written = [
+        (name, entry)
+        for name in ("qpos", "ctrl", "qvel")
+        for each in states
+        for entry in _written(start, each)[name]
+    ]
+    name, entry = [*written, ("qpos", place)][0]
+    what = {
+        "qpos": f"which is {owner(model, entry)!r}" if name == "qpos" else "",
+        "ctrl": "a command, on which the arm would act with time",
+        "qvel": "a speed",
+    }[name]
+    return reason(
+        (
+            any(each.qpos[place] == ANGLE for each in answer.forwards),
+            f"it was read before the second forward: {old}",
+        ),
+        (
+            any(each.qpos[place] != start.qpos[place] for each in states),
+            f"derived values were read before forward: {old}",
+        ),
+        (written, f"you wrote {name}[{entry}], {what}: {old}; {LIFT} is at qpos[{place}]"),
+        (
+            True,
+            f"nothing was written into qpos of a Data (into a copy of it?): {old}; "
+            f"data.qpos[…] = {ANGLE} writes",
+        ),
     )
 
 

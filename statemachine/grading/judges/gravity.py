@@ -7,17 +7,31 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...interface import Array, Ints, make_data, step
+from ...interface import Array, Ints, Model, make_data, step
 from ..answers import Answer
-from ..calls import Remark
+from ..calls import Remark, reason
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
-from ._values import LIFT, address, count, grain, listed, near, numbers, owner, parts, told_apart
+from ._values import (
+    LIFT,
+    address,
+    count,
+    grain,
+    listed,
+    near,
+    numbers,
+    owner,
+    parts,
+    told_apart,
+)
 
 SCENE = "so101/scene"
 TOLERANCE = 0.006  # [degrees]: two decimals will do
 _MOON = (0.0, 0.0, -1.62)
 _SAME = 1e-6  # [degrees]: the same figure, come by another way
+_STILL = 1e-4  # [rad]
 _NAMES = ("servos on", "servos off")
+_UNITS = np.degrees, np.asarray
+_SPEED = "that is its speed, qvel; its position is in qpos"
 _NO_STEP = "no step was taken with the model that you got"
 
 
@@ -52,6 +66,10 @@ class Fall:
     def degrees(self, limp: bool, place: int) -> Array:
         """(seconds + 1,) an entry of qpos at whole seconds, as degrees."""
         return np.degrees(self.trace(limp).qpos[self.marks, place])
+
+    def speed(self, limp: bool, model: Model) -> Array:
+        """(seconds + 1,) that of the joint at whole seconds [rad/s]."""
+        return self.trace(limp).qvel[self.marks, int(model.jnt_dofadr[model.joint_id(LIFT)])]
 
 
 def worlds(scenes: Scenes) -> list[ExerciseWorld]:
@@ -88,7 +106,7 @@ def _fall(world: ExerciseWorld, course: Array | None = None) -> Fall:
 
 
 def judge(answer: Answer, world: ExerciseWorld, right: Fall) -> list[Remark]:
-    """Both traces in degrees; ctrl untouched; the Model as it was."""
+    """Both traces in degrees; ctrl as a new Data has it; the Model as it was."""
     remarks = _left(answer)
     pair = parts(answer.result, 2, "(on, off), two lists of degrees,")
     size = len(right.marks)
@@ -121,8 +139,8 @@ def judge(answer: Answer, world: ExerciseWorld, right: Fall) -> list[Remark]:
         return remarks
     return [
         Remark(
-            f"after {size - 1} s {LIFT} is at {falls[0][-1]:.3f}° with its servos on and at "
-            f"{falls[1][-1]:.2f}° with them off; ctrl untouched, the model given back as it was",
+            f"{LIFT} after {size - 1} s: {falls[0][-1]:.3f}° with servos, {falls[1][-1]:.2f}° "
+            "without",
             True,
         )
     ]
@@ -136,16 +154,32 @@ def _why(given: list[Array], limp: bool, world: ExerciseWorld, fall: Fall, answe
     k = int(np.argmax(np.nan_to_num(abs(mine - right), nan=np.inf)))
     figures = told_apart(mine[k], right[k], lambda value, digits: f"{value + 0.0:.{digits}g}")
     figures = f"you return {figures.replace(' where', f' at {k} s where')} is expected"
-    if text := _goes_on(mine, other, world, answer):
-        return f"{figures}: {text}"
-    for mistaken, text in _mistakes(limp, world, fall, answer):
-        if _is(mine, mistaken, right):
-            return f"{figures}: {text}"
-    if not any(run.own for run in answer.runs):
-        return f"{figures}: {_NO_STEP}"
-    if float(abs(mine).max()) <= TOLERANCE < float(abs(right).max()):
-        return f"{figures}: nothing moves in this run, as where there is no gravity"
-    return figures + _late(mine, limp, world, fall, answer)
+    own = [run for run in answer.runs if run.own]
+    speed = fall.speed(limp, world.model)
+    nothing = float(abs(mine).max()) <= TOLERANCE < float(abs(right).max())
+    mistakes = (
+        (_is(mine, mistaken, right), text)
+        for mistaken, text in _mistakes(limp, world, fall, answer)
+    )
+    why = reason(
+        (text := _goes_on(mine, other, world, answer), text),
+        *mistakes,
+        (not own, _NO_STEP),
+        (
+            nothing and any(near(run.end, run.qpos, _STILL) for run in own),
+            "nothing moves in this run, as where there is no gravity",
+        ),
+        (
+            nothing and mine.any() and any(near(mine, unit(speed), 1e-14) for unit in _UNITS),
+            _SPEED,
+        ),
+        (
+            nothing,
+            "the arm moves in this run, and these are zeros, or nearly: are they its speed, qvel, "
+            f"or another joint? {LIFT} is at qpos[model.jnt_qposadr[model.joint_id(…)]]",
+        ),
+    )
+    return f"{figures}: {why}" if why else figures + _late(mine, limp, world, fall, answer)
 
 
 def _is(given: Array, mistaken: Array, right: Array) -> bool:
@@ -159,8 +193,7 @@ def _mistakes(
     limp: bool, world: ExerciseWorld, fall: Fall, answer: Answer
 ) -> Iterator[tuple[Array, str]]:
     """What typical mistakes give, and what to say of them."""
-    model, trace = world.model, fall.trace(limp)
-    place, dof = address(model), int(model.jnt_dofadr[model.joint_id(LIFT)])
+    model, trace, place = world.model, fall.trace(limp), address(world.model)
     right, marks = fall.degrees(limp, place), fall.marks
     yield np.radians(right), "that is radians; np.degrees(…) makes degrees of them"
     yield np.degrees(right), "degrees were made of it twice"
@@ -170,8 +203,8 @@ def _mistakes(
             f"that is qpos[{entry}], of {owner(model, entry)!r}; {LIFT} is at "
             "model.jnt_qposadr[model.joint_id(…)]",
         )
-    for unit in (np.degrees, np.asarray):
-        yield unit(trace.qvel[marks, dof]), "that is its speed, qvel; its position is in qpos"
+    for unit in _UNITS:
+        yield unit(fall.speed(limp, model)), _SPEED
     if fall.course is not None:
         loaded = "" if all(run.own for run in answer.runs) else " (it steps a model of its own)"
         yield (
@@ -242,23 +275,26 @@ def _by_the_clock(given: Array, limp: bool, world: ExerciseWorld, fall: Fall) ->
 
 
 def _command(answer: Answer) -> list[Remark]:
-    """Whether ctrl was written."""
-    for run in answer.runs:
-        if run.ctrl.any() or run.ctrl_changed is not None:
-            command = listed(answer.ends[run.data].ctrl)
-            return [Remark(f"ctrl was written ({command}): here it must stay as a new Data has it")]
-    return []
+    """Whether ctrl was written, to anything but what a new Data has."""
+    return [
+        Remark(
+            f"ctrl was written ({listed(answer.ends[run.data].ctrl)}): here it must stay as a new "
+            "Data has it"
+        )
+        for run in answer.runs
+        if run.ctrl.any() or run.ctrl_changed is not None
+    ][:1]
 
 
 def _left(answer: Answer) -> list[Remark]:
     """Whether the Model was given back as it was."""
-    if "opt.disableflags" in answer.changed:
-        before, after = (int(flags[0]) for flags in answer.changed["opt.disableflags"])
+    flags = [int(values[0]) for values in answer.changed.get("opt.disableflags", ())]
+    if flags:
         return [
             Remark(
                 "the model was given back with its servos off (model.raw.opt.disableflags is "
-                f"{after}, it was {before}): switch "
-                "the bit back, or use model.replace(actuation=False)"
+                f"{flags[1]}, it was {flags[0]}): switch the bit back, or use "
+                "model.replace(actuation=False)"
             )
         ]
     return [

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...interface import Array, Model, make_data, reset
 from ..answers import Answer, kind
-from ..calls import Remark
+from ..calls import Remark, reason
 from ..watch import EngineRun, Nudge
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from ._values import (
@@ -83,15 +83,14 @@ def judge(answer: Answer, world: ExerciseWorld, right: Start) -> list[Remark]:
     if not isinstance(same, bool):
         return [Remark(f"same: True or False is asked for; got {kind(same)}")]
     remarks = _memory(answer)
-    for name, each in zip(_COUNT, copies, strict=True):
-        if short := short_float(each):
-            remarks.append(
-                Remark(
-                    f"{name} is {short}, which forgets digits: qpos is float64, and every bit "
-                    "counts here. Leave the conversion out"
-                )
-            )
-            break
+    shorts = [(name, short_float(each)) for name, each in zip(_COUNT, copies, strict=True)]
+    remarks += [
+        Remark(
+            f"{name} is {short}, which forgets digits: qpos is float64, and every bit counts "
+            "here. Leave the conversion out"
+        )
+        for name, short in [pair for pair in shorts if pair[1]][:1]
+    ]
     ends = [
         numbers(each, (world.model.nq,), f"{name}, qpos at the end")
         for name, each in zip(_COUNT, copies, strict=True)
@@ -108,140 +107,157 @@ def judge(answer: Answer, world: ExerciseWorld, right: Start) -> list[Remark]:
                 "of the first was left over. sm.reset clears all, or use a new Data"
             )
         ]
-    remarks = _ends(ends, (one, two))
     if bool(same) != same_bits(one.end, two.end):
-        if same:
-            text = (
-                f"the two runs ended {apart:.1e} apart and you call them equal: nearly is not "
-                "equal. np.array_equal compares every bit; np.allclose, round, or a comparison "
-                "of a run with itself do not"
-            )
-        else:
-            text = "both runs ended in the same bits and you call them different"
-        return [Remark(text)]
-    if remarks:
-        return remarks
-    return [
-        Remark(
-            f"two runs of {nstep} steps from keyframe 0 and time 0, ctrl fixed, end in the same "
-            "bits, and you say so",
-            True,
+        unlike = (
+            f"the two runs ended {apart:.1e} apart and you call them equal: nearly is not "
+            "equal. np.array_equal compares every bit; np.allclose, round, or a comparison "
+            "of a run with itself do not"
         )
-    ]
+        alike = "both runs ended in the same bits and you call them different"
+        return [Remark(unlike if same else alike)]
+    if remarks := _ends(ends, (one, two)):
+        return remarks
+    return [Remark(f"two runs of {nstep} steps end in the same bits", True)]
 
 
 def _memory(answer: Answer) -> list[Remark]:
-    """Whether what was returned is the simulator's own memory."""
-    if answer.memory[2] == 1:
-        return [
-            Remark(
-                "first and second are one array: both show the last run. Keep a copy of each, "
-                "data.qpos.copy()"
-            )
-        ]
-    for name, live in zip(_COUNT, answer.live[1:], strict=True):
-        if live:
-            return [
-                Remark(
-                    f"{name} is data.{live} itself, which changes with the next step or reset: "
-                    f"return a copy, data.{live}.copy()"
-                )
-            ]
-    return []
+    """Whether what was returned is the simulator's own memory, or one array twice."""
+    first, second = answer.live[1:]
+    name, live = ("first", first) if first else ("second", second)
+    text = reason(
+        (
+            answer.memory[2] == 1 and live,
+            "first and second are one array: both show the last run. Keep a copy of each, "
+            "data.qpos.copy()",
+        ),
+        (
+            answer.memory[2] == 1 and len(answer.runs) > 1,
+            "first and second are one array: return the end of each run",
+        ),
+        (
+            live,
+            f"{name} is data.{live} itself, which changes with the next step or reset: "
+            f"return a copy, data.{live}.copy()",
+        ),
+    )
+    return [Remark(text)] if text else []
 
 
 def _runs(runs: tuple[EngineRun, ...], world: ExerciseWorld, start: Start) -> list[Remark]:
     """Whether there were two runs, each as it was asked for; the first fault of each kind."""
     _, nstep = world.arguments
-    if not runs:
-        return [Remark(f"no step was taken: two runs of {nstep} steps are asked for")]
-    if not any(run.own for run in runs):
-        return [Remark("no step was taken with the model that you got, but with another")]
-    if len(runs) == 1 and runs[0].nstep >= 2 * nstep:
-        return [
-            Remark(
-                f"one run of {runs[0].nstep} steps: the second did not begin at keyframe 0 but "
-                "went on where the first had ended. Reset before each"
-            )
-        ]
-    if len(runs) == 1:
-        return [
-            Remark(
-                "there was only one run: one run compared with itself is always equal. Run twice"
-            )
-        ]
-    if len(runs) > 2:
-        return [
-            Remark(
-                f"there were {len(runs)} runs, of {', '.join(str(run.nstep) for run in runs[:6])}"
-                f"{', …' * (len(runs) > 6)} steps: two are asked for, and nothing may be written "
-                "into qpos, qvel or time between their steps"
-            )
-        ]
+    text = reason(
+        (not runs, f"no step was taken: two runs of {nstep} steps are asked for"),
+        (
+            not any(run.own for run in runs),
+            "no step was taken with the model that you got, but with another",
+        ),
+        (
+            len(runs) == 1 and runs[0].nstep >= 2 * nstep,
+            f"one run of {sum(run.nstep for run in runs)} steps: the second did not begin at "
+            "keyframe 0 but went on where the first had ended. Reset before each",
+        ),
+        (
+            len(runs) == 1,
+            "there was only one run: one run compared with itself is always equal. Run twice",
+        ),
+        (
+            len(runs) > 2,
+            f"there were {len(runs)} runs, of {', '.join(str(run.nstep) for run in runs[:6])}"
+            f"{', …' * (len(runs) > 6)} steps: two are asked for, and nothing may be written "
+            "into qpos, qvel or time between their steps",
+        ),
+    )
+    if text:
+        return [Remark(text)]
     found: dict[str, str] = {}
     for name, run in zip(_COUNT, runs, strict=True):
         for concept, text in _faults(run, world, start).items():
-            found.setdefault(concept, f"{name} run: {text}")
+            if text:
+                found.setdefault(concept, f"{name} run: {text}")
     return [Remark(text) for text in found.values()]
 
 
 def _faults(run: EngineRun, world: ExerciseWorld, start: Start) -> dict[str, str]:
+    """What is wrong with a run, by what it concerns; "" for nothing."""
     ctrl, nstep = world.arguments
-    faults = {}
-    if not (near(run.qpos, start.qpos, _START) and near(run.qvel, start.qvel, _START)):
-        gaps = {
-            name: float(abs(was - should).max())
-            for name, was, should in (
-                ("qpos", run.qpos, start.qpos),
-                ("qvel", run.qvel, start.qvel),
+    gaps = {
+        "qpos": float(abs(run.qpos - start.qpos).max()),
+        "qvel": float(abs(run.qvel - start.qvel).max()),
+    }
+    name = max(gaps, key=lambda each: gaps[each])
+    moved = run.qpos[abs(run.qpos - start.qpos) > _START]
+    elsewhere = not (gaps["qpos"] <= _START and gaps["qvel"] <= _START)
+    misplaced = bool(elsewhere and moved.size and np.isin(moved, ctrl).all())
+    of = ", the keyframe's time" if run.time == start.time else ""
+    return {
+        "start": reason(
+            (
+                misplaced,
+                "the command was written into qpos, and the arm was there at once: write it into "
+                "ctrl, and the servos take it there",
+            ),
+            (
+                elsewhere,
+                f"it did not begin at keyframe 0: {name} was up to {gaps[name]:.2g} away. "
+                "sm.reset(model, data, keyframe=0)",
+            ),
+            (run.time, f"it began at {run.time:g} s{of}: set data.time to zero"),
+        ),
+        "ctrl": reason(
+            (not (misplaced or same_bits(run.ctrl, ctrl)), _command(run, ctrl, start)),
+            (
+                run.ctrl_changed is not None,
+                f"ctrl was changed after step {run.ctrl_changed}: it must stay fixed",
+            ),
+        ),
+        "steps": reason(
+            (
+                run.nstep != nstep,
+                f"it took {count(run.nstep, 'step')} where {nstep} are asked for",
             )
-        }
-        name = max(gaps, key=lambda each: gaps[each])
-        faults["start"] = (
-            f"it did not begin at keyframe 0: {name} was up to {gaps[name]:.2g} away. "
-            "sm.reset(model, data, keyframe=0)"
-        )
-    elif run.time:
-        of = ", the keyframe's time" if run.time == start.time else ""
-        faults["time"] = f"it began at {run.time:g} s{of}: set data.time to zero"
-    if not same_bits(run.ctrl, ctrl):
-        own = same_bits(run.ctrl, start.ctrl)
-        had = "the keyframe's own" if own else listed(run.ctrl)
-        text = f"at its first step ctrl was {had}"
-        if run.ctrl_changed is not None:
-            text += f", and was written only after {count(run.ctrl_changed, 'step')}"
-        text += f"; {listed(ctrl)} is asked for"
-        if own and run.ctrl_changed is None:
-            text += " (a reset overwrites ctrl: write it after)"
-        for unit, convert in (("degrees", np.degrees), ("radians", np.radians)):
-            if near(run.ctrl, convert(ctrl), 1e-9):
-                text += f": {unit} were made of it; ctrl is in radians as it is"
-        faults["ctrl"] = text
-    elif run.ctrl_changed is not None:
-        faults["ctrl"] = f"ctrl was changed after step {run.ctrl_changed}: it must stay fixed"
-    if run.nstep != nstep:
-        faults["steps"] = f"it took {count(run.nstep, 'step')} where {nstep} are asked for"
-    return faults
+        ),
+    }
+
+
+def _command(run: EngineRun, ctrl: Array, start: Start) -> str:
+    """What ctrl was in a run where it was not what is asked for, and why it may have been."""
+    own, late = same_bits(run.ctrl, start.ctrl), run.ctrl_changed is not None
+    had = "the keyframe's own" if own else listed(run.ctrl)
+    after = f", and was written only after {count(run.ctrl_changed or 0, 'step')}" if late else ""
+    why = reason(
+        (own and not late, " (a reset overwrites ctrl: write it after)"),
+        (
+            near(run.ctrl, start.ctrl + ctrl, 1e-9),
+            ": += adds to the keyframe's own ctrl; data.ctrl[:] = ctrl sets it",
+        ),
+        *(
+            (
+                near(run.ctrl, convert(ctrl), 1e-9),
+                f": {unit} were made of it; ctrl is in radians as it is",
+            )
+            for unit, convert in (("degrees", np.degrees), ("radians", np.radians))
+        ),
+    )
+    return f"at its first step ctrl was {had}{after}; {listed(ctrl)} is asked for{why}"
 
 
 def _ends(ends: list[Array], runs: tuple[EngineRun, ...]) -> list[Remark]:
-    """Whether what was returned is what the runs ended in."""
+    """Whether what was returned is what the runs ended in; the first that is not."""
     for name, given, run in zip(_COUNT, ends, runs, strict=True):
-        if same_bits(given, run.end):
-            continue
-        away = float(abs(given - run.end).max())
-        rounding = grain(given)
-        if same_bits(given, run.qpos):
-            why = "that is qpos at the start"
-        elif same_bits(given, runs[0].end):
-            why = "the first run was returned twice"
-        elif same_bits(given, runs[1].end):
-            why = "that is the end of the second run"
-        elif rounding and away <= rounding * 1.001:
-            why = "was it rounded? Every bit counts here"
-        elif away < 1e-3:
-            why = "was it rounded, or read before the last step?"
-        else:
-            why = "return data.qpos.copy() after the last step"
-        return [Remark(f"{name} is up to {away:.1e} away from qpos at the end of its run: {why}")]
+        away, rounding = float(abs(given - run.end).max()), grain(given)
+        why = reason(
+            (same_bits(given, run.qpos), "that is qpos at the start"),
+            (same_bits(given, runs[0].end), "the first run was returned twice"),
+            (same_bits(given, runs[1].end), "that is the end of the second run"),
+            (
+                rounding and away <= rounding * 1.001,
+                "was it rounded? Every bit counts here",
+            ),
+            (away < 1e-3, "was it rounded, or read before the last step?"),
+            (True, "return data.qpos.copy() after the last step"),
+        )
+        if not same_bits(given, run.end):
+            text = f"{name} is up to {away:.1e} away from qpos at the end of its run: {why}"
+            return [Remark(text)]
     return []

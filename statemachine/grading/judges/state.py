@@ -10,7 +10,7 @@ from typing import Any
 
 from ...interface import JointType, Model, make_data, reset
 from ..answers import Answer, kind
-from ..calls import FaultError, Remark
+from ..calls import FaultError, Remark, reason
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from ._values import count, parts
 
@@ -70,8 +70,7 @@ def judge(answer: Answer, world: ExerciseWorld, right: ExpectedState) -> list[Re
     frees = [name for name, (one, two) in right.slots.items() if one[1] - one[0] != two[1] - two[0]]
     return [
         Remark(
-            f"the slots of all {len(right.slots)} joints, {', '.join(frees)} with 7 numbers in "
-            f"qpos and 6 in qvel; {right.time:g} s at keyframe 0",
+            f"all {len(right.slots)} joints, {', '.join(frees)} with 7 and 6 numbers",
             True,
         )
     ]
@@ -85,16 +84,15 @@ def _names(slots: Any, layout: ExpectedState) -> list[Remark]:
         )
     missing = [name for name in layout.slots if name not in slots]
     unknown = [name for name in slots if name not in layout.slots]
-    if missing:
-        return [
-            Remark(
-                f"slots: {len(missing)} of {len(layout.slots)} joints are missing: "
-                f"{', '.join(missing)}; the keys are model.joint_names"
-            )
-        ]
-    if unknown:
-        return [Remark(f"slots: no joint is called {unknown[0]!r}; see model.joint_names")]
-    return []
+    text = reason(
+        (
+            missing,
+            f"slots: {len(missing)} of {len(layout.slots)} joints are missing: "
+            f"{', '.join(missing)}; the keys are model.joint_names",
+        ),
+        (unknown, f"slots: no joint is called {[*unknown, ''][0]!r}; see model.joint_names"),
+    )
+    return [Remark(text)] if text else []
 
 
 def _first_wrong(slots: dict[str, Any], layout: ExpectedState, model: Model) -> list[Remark]:
@@ -134,27 +132,36 @@ def _why(name: str, given: list[Slot], which: int, layout: ExpectedState, model:
     free = int(model.jnt_type[number]) == int(JointType.FREE)
     (start, stop), (begins, ends) = given[which], right[which]
     table = ("model.jnt_qposadr", "model.jnt_dofadr")[which]
-    if start == begins:
-        if free and stop - start == 1:
-            return "a free joint owns more than one number: three and a quaternion, in qvel six"
-        if free and which and stop - start == 7:
-            return "a quaternion has four numbers, a turning speed three: six in qvel, not seven"
-        if free and not which and stop - start == 6:
-            return "a place has three numbers and a quaternion four: seven in qpos, not six"
-        if stop == ends - 1:
-            return "a slice ends one after the last number"
-        return (
-            f"it begins at the right place and has {count(stop - start, 'number')}, "
-            f"not {ends - begins}"
-        )
-    if start == right[1 - which][0]:
-        return f"that is where it begins in {('qvel', 'qpos')[which]}; see {table}"
-    if start == number:
-        return (
+    size, here = stop - start, start == begins
+    return reason(
+        (
+            here and free and size == 1,
+            "a free joint owns more than one number: three and a quaternion, in qvel six",
+        ),
+        (
+            here and free and which and size == 7,
+            "a quaternion has four numbers, a turning speed three: six in qvel, not seven",
+        ),
+        (
+            here and free and not which and size == 6,
+            "a place has three numbers and a quaternion four: seven in qpos, not six",
+        ),
+        (here and stop == ends - 1, "a slice ends one after the last number"),
+        (
+            here,
+            f"it begins at the right place and has {count(size, 'number')}, not {ends - begins}",
+        ),
+        (
+            start == right[1 - which][0],
+            f"that is where it begins in {('qvel', 'qpos')[which]}; see {table}",
+        ),
+        (
+            start == number,
             f"it begins at the joint's number, {number}; a joint before it owns several numbers: "
-            f"see {table}"
-        )
-    return f"it begins elsewhere: see {table}, no arithmetic"
+            f"see {table}",
+        ),
+        (True, f"it begins elsewhere: see {table}, no arithmetic"),
+    )
 
 
 def _clock(time: Any, layout: ExpectedState, model: Model, stepped: bool) -> list[Remark]:
@@ -163,14 +170,15 @@ def _clock(time: Any, layout: ExpectedState, model: Model, stepped: bool) -> lis
         return [Remark(f"time: a number of seconds is asked for; got {kind(time)}")]
     if float(time) == right:
         return []
+    others = [k for k, frame in enumerate(model.keyframes) if k and frame.time == time]
+    why = reason(
+        (time == 0, ": that is a new Data, or a reset without keyframe=0"),
+        (others, f": that is keyframe {[*others, 0][0]}"),
+        (
+            time == layout.course_time,
+            ": that is the course's own scene; ask the model that you got",
+        ),
+        (stepped, ": read it right after the reset, before any step"),
+    )
     text = f"time after the reset to keyframe 0 should be {right:g} s, you return {float(time):g}"
-    others = {k: frame.time for k, frame in enumerate(model.keyframes) if k}
-    if time == 0:
-        text += ": that is a new Data, or a reset without keyframe=0"
-    elif time in others.values():
-        text += f": that is keyframe {next(k for k, each in others.items() if each == time)}"
-    elif time == layout.course_time:
-        text += ": that is the course's own scene; ask the model that you got"
-    elif stepped:
-        text += ": read it right after the reset, before any step"
-    return [Remark(text)]
+    return [Remark(text + why)]

@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from statemachine import Data, Model
 
 SCENE = "so101/scene_box"
-_GUARD = pytest.StashKey[Guard]()
 _LONGEST = 300  # characters of what an error says
 
 
@@ -56,7 +55,8 @@ def pytest_configure(config: pytest.Config) -> None:
         sm.load(
             SCENE, backend=str(config.getoption("engine"))
         )  # engines start processes of their own
-        config.stash[_GUARD] = Guard(Path(str(config.args[0]).partition("::")[0]))
+        tests = Path(str(config.args[0]).partition("::")[0])
+        Guard(tests, tests.parent, Path(path).parent, lambda _kind, _text: None)
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,6 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
-import signal
 import sys
 import tempfile
 import threading
@@ -24,6 +23,7 @@ from ...engines import rooms_with
 from ...errors import BadInputError, EngineError, MissingEngineError, ModelFileError, unknown_name
 from ...installed import DEFAULT, engine_version, require
 from .. import sandbox
+from ..calls import reason
 from ..recording import content
 from ..unwinding import unwinding
 from . import FAULT, MUTANTS, Mutant
@@ -333,15 +333,15 @@ def _last(outcome: sandbox.ProcessOutcome) -> str:
 
 
 def _ended(outcome: sandbox.ProcessOutcome, seconds: float, clock: float) -> str:
-    if outcome.out_of_cpu:
-        return f"took longer than {seconds:.0f} s of computing"
-    if outcome.flooded:
-        return "wrote without end"
-    if outcome.timed_out:
-        return f"took longer than {clock:.0f} s on the clock, and computed for {outcome.cpu:.0f} s"
-    if outcome.out_of_memory:
-        return "took more memory than it may"
-    if outcome.signal is not None:
-        name = next((each.name for each in signal.Signals if each == outcome.signal), "unknown")
-        return f"ended the process by signal {outcome.signal} ({name})"
-    return f"ended the process with code {outcome.returncode}"
+    number = outcome.signal or 0
+    return reason(
+        (outcome.out_of_cpu, f"took longer than {seconds:.0f} s of computing"),
+        (outcome.flooded, "wrote without end"),
+        (
+            outcome.timed_out,
+            f"took longer than {clock:.0f} s on the clock, and computed for {outcome.cpu:.0f} s",
+        ),
+        (outcome.out_of_memory, "took more memory than it may"),
+        (number, f"ended the process by signal {number} ({sandbox.signal_name(number)})"),
+        (True, f"ended the process with code {outcome.returncode}"),
+    )

@@ -1,0 +1,79 @@
+"""The files that belong to a student's submission, and those that hold somebody's functions."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from .judges import JUDGES
+from .recording import content
+
+LARGEST = 1_000_000  # bytes of a student's file
+_MOST = 1000  # files of a student's folder
+_NAMES = "|".join(JUDGES).encode()
+_DEFINES = re.compile(rb"\bdef\s+(?:%s)\s*\(" % _NAMES)
+_COMPILED = re.compile(rb"\b(?:%s)\b" % _NAMES)
+
+
+def has_functions(file: Path) -> bool:
+    """Whether a file defines a function of the exercise, or is compiled from one that does."""
+    pattern = _COMPILED if file.suffix == ".pyc" else _DEFINES
+    return pattern.search(_start(file)) is not None
+
+
+def has_solutions(file: Path) -> bool:
+    """Whether any of the functions in a file may be written."""
+    return has_functions(file) and _start(file).count(b"NotImplementedError(") < len(JUDGES)
+
+
+def _start(file: Path) -> bytes:
+    """As much of a file as is looked at; a pipe would wait for somebody to write."""
+    return content(Path(os.path.realpath(file)), LARGEST + 1)
+
+
+def in_folder(folder: Path) -> dict[str, Path]:
+    """All that one student handed in, by name within the folder; not what tools left there."""
+    return {each.relative_to(folder).as_posix(): each for each in sorted(_plain(folder))[:_MOST]}
+
+
+def _plain(folder: Path) -> Iterator[Path]:
+    for place, folders, names in os.walk(folder):
+        environment = "pyvenv.cfg" in names
+        folders[:] = [
+            name for name in folders if not (environment or name.startswith((".", "__pycache__")))
+        ]
+        for name in () if environment else names:
+            file = Path(place, name)
+            if not name.startswith(".") and file.is_file() and file.stat().st_size <= LARGEST:
+                yield file
+
+
+def named_by(file: Path) -> dict[str, Path]:
+    """A file and what it names beside it, but for files that hold somebody's functions."""
+    own, waiting = {file.name: file}, [file]
+    beside = [each for each in file.parent.iterdir() if not each.name.startswith(".")]
+    while waiting:
+        words = set(re.findall(r"\w+", _start(waiting.pop()).decode("utf-8", "replace")))
+        for each in (each for each in beside if each.stem in words):
+            package = in_folder(each) if (each / "__init__.py").is_file() else {}
+            files = {f"{each.name}/{name}": inside for name, inside in package.items()}
+            for name, other in (files or {each.name: each}).items():
+                fits = other.is_file() and other.stat().st_size <= LARGEST
+                if name not in own and fits and not has_solutions(other):
+                    own[name] = other
+                    waiting.append(other)
+    return own
+
+
+def digest(files: Mapping[str, Path]) -> str:
+    """Of names and contents; "" where there is none, or one is too large to be judged."""
+    whole = hashlib.sha256()
+    for name, file in files.items():
+        text, start = os.fsencode(name), _start(file)
+        if len(start) > LARGEST:
+            return ""
+        whole.update(b"%d %d " % (len(text), len(start)) + text + start)
+    return whole.hexdigest() if files else ""
