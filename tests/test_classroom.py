@@ -432,6 +432,17 @@ def test_jobs_must_be_some(folder: Path) -> None:
         judge_all(submissions([folder]), "mujoco", jobs=0)
 
 
+def test_all_of_a_students_folder_belongs_to_the_file(tmp_path: Path) -> None:
+    (tmp_path / "step_loop.py").write_text("from mine import *\n")
+    (tmp_path / "mine.py").write_text(SOLUTION.read_text())
+    assert main(["check", str(tmp_path), "--gradescope", str(tmp_path / "r.json")]) == 0
+    hidden = tmp_path / "class" / "ann" / ".old"
+    hidden.mkdir(parents=True)
+    (hidden / "a.py").write_text("def demo_gravity(:\n")
+    (entry,) = judge_all(submissions([tmp_path / "class"]), "mujoco")
+    assert entry.judged
+
+
 def test_what_gradescope_reads(judged: list[str]) -> None:
     marks = (
         Judgement("demo_gravity", True, True, ("good",)),

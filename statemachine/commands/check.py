@@ -115,11 +115,12 @@ def _one(options: argparse.Namespace) -> int:
     from ..report.progress import progress
 
     (file,) = options.files
+    folder = Path(file) if Path(file).is_dir() else None
     try:
-        if Path(file).is_dir():
-            file = classroom.submission_in(Path(file))
+        if folder:
+            file = classroom.submission_in(folder)
         with progress("check") as report:
-            grade = exercise.run(file, options.backend, options.time_limit, report)
+            grade = exercise.run(file, options.backend, options.time_limit, report, folder=folder)
     except BadInputError as error:
         if options.gradescope:  # the student sees why
             _gradescope(options.gradescope, None, str(error))

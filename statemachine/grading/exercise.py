@@ -29,7 +29,7 @@ from . import sandbox
 from .calls import reason
 from .examine import judged
 from .judges import JUDGES, judge_of
-from .own_files import LARGEST, digest, has_solutions, named_by
+from .own_files import LARGEST, digest, has_solutions, in_folder, named_by
 from .recording import START, FunctionRecording, Limits, record
 from .unwinding import unwinding
 from .worlds import ExerciseWorld, Scenes
@@ -95,6 +95,7 @@ def run(
     time_limit: float = TIME_LIMIT,
     progress: Callable[[float], None] = lambda _: None,
     wall_limit: float = WALL_LIMIT,
+    folder: Path | None = None,
 ) -> Grade:
     """Judge each function of a student's file.
 
@@ -107,13 +108,16 @@ def run(
         wall_limit: What each may take on the clock, from the same moment [s], where it waits for
             something else than a processor; at least twice `time_limit`.
 
+        folder: One of which everything belongs to the file; without, what it names beside it.
+
     Raises:
         BadInputError: There is no such file, or it is no Python file.
         UnknownNameError: There is no such backend.
         MissingEngineError: Its engine is not installed here.
     """
     path = _python_file(Path(file))
-    with ExerciseJudge(backend, time_limit, wall_limit) as judge:
+    own = {} if folder is None else {path: in_folder(folder)}
+    with ExerciseJudge(backend, time_limit, wall_limit, own) as judge:
         return judge.judge(path, progress)
 
 
@@ -279,11 +283,13 @@ class _Copy:
 
 
 def _copied(path: Path, own: Mapping[str, Path], folder: Path) -> _Copy:
+    if path not in map(Path.resolve, own.values()):  # a hidden file, or one of very many
+        own = {path.name: path}
     for name, file in own.items():
         target = folder / name
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(file, target)
-    (name,) = (name for name, file in own.items() if file.resolve() == path)
+    name = next(name for name, file in own.items() if file.resolve() == path)
     folder = folder.resolve()
     return _Copy(folder / name, folder, path.parents[name.count("/")])
 
