@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ._tally import Tally, command, run_bounded
 
-TRIES = 150
+TRIES = 100
 # Well; the result says no; bad input; an engine is missing; nowhere to write.
 _CODES = (0, 1, 2, 3, 74)
 _NUMBERS = [

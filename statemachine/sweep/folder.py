@@ -38,21 +38,23 @@ def locked(folder: Path) -> Iterator[None]:
     try:
         if not _taken(handle):
             raise BadInputError(f"another sweep runs in {folder}: one at a time")
-        shutil.rmtree(folder / SCRATCH, ignore_errors=True)
-        if os.name != "nt":
-            _remove_semaphores(os.pread(handle, 20, 0).decode(errors="replace"))
-            os.ftruncate(handle, 0)
-            os.pwrite(handle, str(os.getpid()).encode(), 0)
+        _remove_left(folder, handle)
         yield
     finally:
         os.close(handle)
 
 
-def _remove_semaphores(driver: str) -> None:
-    """Remove those of a driver, by its number, that was killed with all of its processes."""
+def _remove_left(folder: Path, handle: int) -> None:
+    """Remove what joblib keeps for a driver, of one that was killed with all of its processes."""
+    shutil.rmtree(folder / SCRATCH, ignore_errors=True)
+    if os.name == "nt":
+        return
+    driver = os.pread(handle, 20, 0).decode(errors="replace")
     if driver.isdecimal() and not Path("/proc", driver).exists():
         for path in Path("/dev/shm").glob(f"sem.loky-{driver}-*"):
             path.unlink(missing_ok=True)
+    os.ftruncate(handle, 0)
+    os.pwrite(handle, str(os.getpid()).encode(), 0)
 
 
 def _taken(handle: int) -> bool:
