@@ -28,10 +28,9 @@ from .checks import (
     check_writable,
     whole_number,
 )
-from .data import alone
 from .model import Model
 from .records import FORCES, INPUTS, POSES, Array, Ints, State, read_only
-from .turns import Turn
+from .turns import Turn, alone
 
 if TYPE_CHECKING:
     from .data import _Input
@@ -123,9 +122,9 @@ class Worlds(ABC):
             _process=os.getpid(),
             # What `alone` asks of what it guards, as of a Data.
             _home=model,
-            _turn=Turn(model),
             _trouble="",
         )
+        self._turn = Turn(self)
 
     @property
     def diverged(self) -> Mapping[int, Exception]:
@@ -153,6 +152,8 @@ class Worlds(ABC):
     def _shut(self) -> None:
         # Copies: a view would keep the memory of the engine alive, or outlive it.
         own = vars(self)
+        if self._trouble == "closed":  # by another thread, just now
+            return
         own["_trouble"] = "closed"
         for name in self.derived:
             own.pop(name, None)
