@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from numpy.typing import ArrayLike
@@ -60,9 +61,8 @@ class Data(ABC):
         qpos: (nq,) positions [rad or m]; quaternions wxyz.
         qvel: (nv,) velocities [rad/s or m/s]; of a free joint, linear in world axes,
             then angular in body axes.
-        ctrl: (nu,) commands [unit of the actuator]. A step clamps each to its range,
-            an infinite one too, and leaves the array as it is; `forward` and `get_state`
-            refuse what is not finite.
+        ctrl: (nu,) commands [unit of the actuator]. What acts is each clamped to its range,
+            an infinite one too; the array and a State keep what was written.
         time: Simulated time [s].
     """
 
@@ -200,12 +200,10 @@ class Data(ABC):
 
         The last qpos, qvel and ctrl stay readable; every other use is an error.
         """
-        if self._trouble != "closed":
+        with suppress(ClosedDataError):
             alone(self, self._shut, even_troubled=True)
 
     def _shut(self) -> None:
-        if self._trouble == "closed":  # by another thread, just now
-            return
         self._give_up("closed")
         for name in INPUTS:
             # The last values stay readable, apart from the engine's memory, which a view

@@ -19,7 +19,7 @@ import sys
 import weakref
 from collections.abc import Callable
 from types import CodeType
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from ..errors import BusyDataError
 from .checks import kind_of
@@ -38,27 +38,13 @@ class Turn:
 
     __slots__ = ("free",)
 
-    free: object
-
-    def __init__(self, data: Guarded) -> None:
-        self.free = data._home
+    def __init__(self, data: Any) -> None:
+        self.free: object = data._home
         _ALL.add(data)
 
 
-class Guarded(Protocol):
-    """What one thread at a time may use: a Data, or Worlds."""
-
-    _home: Any
-    _turn: Turn
-    _trouble: str
-
-    def _refuse_if_troubled(self) -> None: ...
-
-    def _failed(self, error: Exception) -> None: ...
-
-
 def alone(
-    data: Guarded,
+    data: Any,
     call: Callable[..., T],
     *args: Any,
     even_troubled: bool = False,
@@ -66,7 +52,7 @@ def alone(
     """Call something while no other thread uses `data`.
 
     Args:
-        data: What `call` uses.
+        data: What `call` uses: a Data, or Worlds.
         call: A function.
         *args: Its arguments.
         even_troubled: Whether to do so while `data` refuses, too.
@@ -82,7 +68,7 @@ def alone(
             del turn.free; held = True  # fmt: skip  # noqa: E702
         except AttributeError:  # nothing is there
             refuse_unless_held(data)
-        if data._trouble and not even_troubled:
+        if data._trouble and (not even_troubled or data._trouble == "closed"):
             data._refuse_if_troubled()
         called = True
         result = call(*args)
@@ -99,30 +85,32 @@ def alone(
         raise
 
 
-def refuse_unless_held(data: Guarded) -> None:
+def refuse_unless_held(data: Any) -> None:
     """Raise BusyDataError unless a function that called this one holds `data`."""
+    if not _held_here(data):
+        kind = kind_of(data).removeprefix("a ")
+        raise BusyDataError(
+            f"another thread is using this {kind}: a {kind} belongs to one thread at a "
+            "time. Make one for each thread (a Model can be shared), or take a lock "
+            "around every use"
+        )
+
+
+def _held_here(data: Any) -> bool:
     frame: Any = sys._getframe()
-    while frame is not None:
-        if frame.f_code in HOLDERS and frame.f_locals["data"] is data and frame.f_locals["held"]:
-            return
+    while frame and not (
+        frame.f_code in HOLDERS and frame.f_locals["data"] is data and frame.f_locals["held"]
+    ):
         frame = frame.f_back
-    kind = kind_of(data).removeprefix("a ")
-    raise BusyDataError(
-        f"another thread is using this {kind}: a {kind} belongs to one thread at a "
-        "time. Make one for each thread (a Model can be shared), or take a lock "
-        "around every use"
-    )
+    return frame is not None
 
 
 def _free_in_child() -> None:
     """Free, in the child of a fork, what threads hold that are not there."""
     for data in _ALL:
-        if not hasattr(data._turn, "free"):
-            try:
-                refuse_unless_held(data)
-            except BusyDataError:
-                data._trouble = data._trouble or "another thread was using it at the fork"
-                data._turn.free = data._trouble
+        if not (hasattr(data._turn, "free") or _held_here(data)):
+            data._trouble = data._trouble or "another thread was using it at the fork"
+            data._turn.free = data._trouble
 
 
 if hasattr(os, "register_at_fork"):

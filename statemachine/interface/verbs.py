@@ -49,8 +49,8 @@ def step(model: Model, data: Data, nstep: int = 1) -> None:
         BadInputError: `nstep` is no whole number, or an input is not a number. In
             the second case the Data may have moved: it then refuses all but
             `reset` and `set_state`. A ctrl that is infinite, written in place, is
-            clamped to its range like any other that lies beyond it; where it has no
-            range, it is refused.
+            clamped to its range like any other that lies beyond it, by every verb;
+            where it has no range, it is refused.
         DivergedError: A coordinate stopped being finite, now or earlier.
         EngineError: The engine gave up.
         ClosedDataError: `data` is closed.
@@ -176,8 +176,6 @@ def set_state(model: Model, data: Data, state: State) -> None:
 
 def _overwrite(data: Data, verb: str, change: Callable[[Any], None], to: Any) -> None:
     """Change the whole state: between the beginning and the end, the Data refuses."""
-    if data._trouble == "closed":
-        data._refuse_if_troubled()
     data._check_writable()
     before = data._trouble
     data._give_up(f"{verb} was interrupted")
@@ -190,9 +188,9 @@ def _overwrite(data: Data, verb: str, change: Callable[[Any], None], to: Any) ->
 
 
 def _check_inputs(model: Model, data: Data) -> None:
-    """Raise BadInputError for the first entry that is no finite number."""
+    """Raise BadInputError for the first entry that acts and is no finite number."""
     for name in INPUTS:
-        check_entries(getattr(data, name), name, model._coordinate_name)
+        check_entries(model._acting(name, getattr(data, name)), name, model._coordinate_name)
 
 
 def _admit(model: Model, data: Data) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from contextlib import suppress
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -146,14 +147,12 @@ class Worlds(ABC):
 
         The last qpos, qvel, ctrl and time stay readable; every other use is an error.
         """
-        if self._trouble != "closed":
+        with suppress(ClosedDataError):
             alone(self, self._shut, even_troubled=True)
 
     def _shut(self) -> None:
         # Copies: a view would keep the memory of the engine alive, or outlive it.
         own = vars(self)
-        if self._trouble == "closed":  # by another thread, just now
-            return
         own["_trouble"] = "closed"
         for name in self.derived:
             own.pop(name, None)
@@ -244,7 +243,7 @@ class Worlds(ABC):
     def _check_inputs(self, ids: Ints) -> None:
         """Raise BadInputError for the first entry of these worlds that is no finite number."""
         for name in INPUTS:
-            rows = getattr(self, name)[ids]
+            rows = self.model._acting(name, getattr(self, name)[ids])
             if not np.abs(rows).max(initial=0.0) <= HUGE:  # NaN fails it, too
                 row = int(np.flatnonzero(~(np.abs(rows) <= HUGE).all(axis=1))[0])
                 try:
