@@ -117,7 +117,7 @@ class Law:
         driven = np.isin(raw.actuator_trnid[:, 0], joints) & (not off["actuation"])
         driven &= in_force(raw)
         ids = np.flatnonzero(driven)
-        self.ids = raw.actuator_ctrladr[ids]  # another actuator may take several numbers of ctrl
+        self._ids = raw.actuator_ctrladr[ids]  # another actuator may take several numbers of ctrl
         self._gear = np.zeros((len(joints), len(ids)))
         for column, a in enumerate(ids):
             row = int(np.flatnonzero(joints == raw.actuator_trnid[a, 0])[0])
@@ -129,8 +129,6 @@ class Law:
         later = 0.0 if raw.opt.integrator in _EXPLICIT else self.timestep
         self._slope = -later * self._gear**2 * bias[:, 2]
         self._unsaturated = self._with_slope(np.ones(len(ids)))
-        clamped = raw.actuator_ctrllimited[self.ids].astype(bool) & (not off["clamp"])
-        self._ctrl_low, self._ctrl_high = _range(raw.actuator_ctrlrange[self.ids], clamped)
         limited = raw.actuator_forcelimited[ids].astype(bool)
         self._low_force, self._high_force = _range(raw.actuator_forcerange[ids], limited)
         fenced = raw.jnt_actfrclimited[joints].astype(bool)
@@ -145,8 +143,8 @@ class Law:
         return found
 
     def aim(self, ctrl: Array) -> Array:
-        """What a command (nu,) of the whole model adds to the force of each actuator."""
-        return self._gain * np.minimum(np.maximum(ctrl[self.ids], self._ctrl_low), self._ctrl_high)
+        """What a command (nu,) of the whole model, within range, adds to each actuator's force."""
+        return self._gain * ctrl[self._ids]
 
     def solve(
         self,
@@ -304,7 +302,6 @@ _FLAGS = {
     "limit": _OFF.mjDSBL_LIMIT,
     "constraint": _OFF.mjDSBL_CONSTRAINT,
     "actuation": _OFF.mjDSBL_ACTUATION,
-    "clamp": _OFF.mjDSBL_CLAMPCTRL,
     "refsafe": _OFF.mjDSBL_REFSAFE,
     "eulerdamp": _OFF.mjDSBL_EULERDAMP,
 }
