@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 from statemachine.lessons.in_turns import Ratio, in_turns
 
-_NULL = "the baseline again (null)"
+NULL = "the baseline again (null)"
 
 
 def interleaved(
@@ -26,7 +26,7 @@ def interleaved(
     Returns:
         The null first, then each contestant.
     """
-    everyone = {"": baseline, _NULL: baseline, **contestants}
+    everyone = {"": baseline, NULL: baseline, **contestants}
     for call in everyone.values():
         call()
     times = in_turns(everyone, rounds, seed=seed)

@@ -83,11 +83,14 @@ class BusyDataError(StateMachineError, RuntimeError):
 
 
 class DivergedError(StateMachineError, ArithmeticError):
-    """A coordinate stopped being finite while the engine stepped."""
+    """A coordinate stopped being finite while the engine stepped.
+
+    `index` is None where the engine did not tell which entry was the first.
+    """
 
     time: float
     quantity: str
-    index: int
+    index: int | None
 
 
 class TimedOutError(StateMachineError, TimeoutError):

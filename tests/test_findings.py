@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine import worlds
 from statemachine.backends import compiled, mujoco_backend
 from statemachine.errors import BadInputError, DivergedError
 from statemachine.interface import Data
@@ -169,8 +171,9 @@ def test_an_infinite_ctrl_is_clamped_alike(
     with sm.make_data(model) as data, sm.make_data(model) as at_end:
         data.ctrl[0] = huge
         if not limited:
-            with pytest.raises(BadInputError, match=r"ctrl\[0\]"):
-                sm.step(model, data, 20)
+            for verb in (sm.forward, sm.get_state, sm.step):
+                with pytest.raises(BadInputError, match=r"ctrl\[0\]"):
+                    verb(model, data)
             return
         at_end.ctrl[0] = 2.0 if huge > 0 else -1.0
         for _ in range(2):
@@ -179,6 +182,15 @@ def test_an_infinite_ctrl_is_clamped_alike(
         assert np.array_equal(data.qpos, at_end.qpos)
         assert np.array_equal(data.qacc, at_end.qacc)
         assert data.ctrl[0] == huge
+        with sm.make_data(model) as again:
+            sm.set_state(model, again, sm.get_state(model, data))
+            assert again.ctrl[0] == huge
+            for each in (data, at_end, again):
+                sm.forward(model, each)
+            assert np.array_equal(data.qacc, at_end.qacc)
+            sm.step(model, again, 20)
+            sm.step(model, at_end, 20)
+            assert np.array_equal(again.qpos, at_end.qpos)
     for text in (sm.step.__doc__, Data.__doc__):
         assert text
         assert "infinite" in text
@@ -191,5 +203,33 @@ def test_pybullet_as_it_comes_refuses_an_infinite_ctrl() -> None:
     assert "infinite ctrl is refused" in note
     with sm.make_data(model) as data:
         data.ctrl[1] = np.inf
-        with pytest.raises(BadInputError, match="ctrl"):
-            sm.step(model, data)
+        for verb in (sm.forward, sm.get_state, sm.step):
+            with pytest.raises(BadInputError, match="ctrl"):
+                verb(model, data)
+
+
+@pytest.mark.parametrize("latency", [0.0, 0.01])
+def test_an_infinite_ctrl_is_clamped_on_its_way_and_in_many_worlds(
+    backend: str, latency: float
+) -> None:
+    model = sm.load("so101", backend=backend).replace(latency=latency)
+    with (
+        sm.make_data(model) as data,
+        sm.make_data(model) as at_end,
+        worlds.make_worlds(model, 2) as two,
+    ):
+        data.ctrl[1] = two.ctrl[1, 1] = np.inf
+        at_end.ctrl[1] = model.actuator_ctrlrange[1, 1]
+        for each in (data, at_end):
+            sm.step(model, each, 3)
+        worlds.forward(two)
+        worlds.step(two, 3)
+        sm.step(model, at_end, 20)
+        for state in (sm.get_state(model, data), worlds.get_state(two, 1)):
+            with sm.make_data(model) as again:
+                sm.set_state(model, again, state)
+                sm.step(model, again, 20)
+                assert np.array_equal(again.qpos, at_end.qpos)
+        bad = np.where(np.isinf(state.vector), np.nan, state.vector)
+        with pytest.raises(BadInputError, match=r"state\['\w+'\].*not a finite number"):
+            sm.set_state(model, data, replace(state, blob=bad.tobytes()))

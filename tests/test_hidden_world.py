@@ -103,7 +103,6 @@ def test_a_coordinate_that_diverges_is_named(
         return qpos, qvel
 
     if all_at_the_end:
-        monkeypatch.setattr(ExampleWorld, "looks_at_all", False)
         monkeypatch.setattr(ExampleWorld, "diverging", lambda _: False)
     with held(model) as data:
         before, start = [array.copy() for array in (data.qpos, data.qvel)], data.time

@@ -230,7 +230,12 @@ def test_a_data_that_raw_drove_to_nan_says_so_at_the_next_step() -> None:
         sm.step(model, data)
 
 
-def test_the_first_entry_inside_a_bulk_step_is_told_of_one_that_grows(tmp_path: Path) -> None:
+@pytest.mark.parametrize("foreign", [False, True])
+@pytest.mark.parametrize(("nstep", "alone"), [(530, True), (2000, False)])
+def test_the_first_entry_inside_a_bulk_step_is_named_where_it_is_known(
+    foreign: bool, nstep: int, alone: bool, tmp_path: Path
+) -> None:
+    """The one that grows faster is bad first; with its text, or as the only one, it is known."""
     file = tmp_path / "two.xml"
     file.write_text(
         "<mujoco><option gravity='0 0 0'/><worldbody>"
@@ -240,8 +245,16 @@ def test_the_first_entry_inside_a_bulk_step_is_told_of_one_that_grows(tmp_path: 
     )
     model = sm.load(file)
     with sm.make_data(model) as data:
+        if foreign:
+            mujoco.set_mju_user_warning(lambda text: None)
         data.qvel[:] = 9e9, 9.5e9
         with pytest.raises(DivergedError) as caught:
-            sm.step(model, data, 2000)
-    assert (caught.value.quantity, caught.value.index) == ("qpos", 1)
-    assert caught.value.time == pytest.approx(1e10 / 9.5e9, abs=0.003)
+            sm.step(model, data, nstep)
+        known = alone or not foreign
+        assert (caught.value.quantity, caught.value.index) == ("qpos", 1 if known else None)
+        assert ("qpos[1] (b)" in str(caught.value)) == known
+        assert ("an entry of qpos (MuJoCo did not tell which)" in str(caught.value)) != known
+        assert caught.value.time == pytest.approx(1e10 / 9.5e9, abs=0.003)
+        with pytest.raises(DivergedError, match=r"qpos\[1\]|an entry of qpos"):
+            sm.step(model, data)
+    mujoco.set_mju_user_warning(None)

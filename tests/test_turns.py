@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import linecache
 import os
-import subprocess
 import sys
 import threading
 from collections.abc import Callable
@@ -24,7 +23,7 @@ from statemachine.errors import (
     ReadOnlyError,
 )
 
-from .conftest import ROOT, registered
+from .conftest import ROOT, in_its_own_python, registered
 
 Use = Callable[[sm.Model, sm.Data], Any]
 USES: dict[str, Use] = {
@@ -180,9 +179,7 @@ threads = [threading.Thread(target=loop, args=(USES[n],)) for n in ("bulk", {use
 [thread.join() for thread in threads]
 print(set(ended) <= {{"BusyDataError", "ClosedDataError"}}, ended)
 """
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
-    )
+    done = in_its_own_python(code, ROOT)
     assert done.returncode == 0, done.stderr[-300:]
     assert done.stdout.startswith("True"), done.stdout
 
@@ -311,35 +308,48 @@ def test_a_closed_data_says_so_in_every_thread() -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
-@pytest.mark.parametrize("held", ["the Data", "the lock"])
-def test_what_another_thread_holds_at_a_fork_is_free_in_the_child(held: str) -> None:
-    """It has no such thread; what was half done there is overwritten."""
-    code = f"""
+def test_what_another_thread_holds_at_a_fork_is_free_in_the_child() -> None:
+    """It has no such thread; what was half done there is overwritten first.
+
+    What the thread holds that forks, in a callback, stays its own.
+    """
+    code = """
 import os, threading
 import statemachine as sm
-from statemachine.interface.turns import Turn
 
 model = sm.load("so101/scene_box")
-data, other = sm.make_data(model), sm.make_data(model)
+data, other, mine = (sm.make_data(model) for _ in range(3))
 advance, begun, ended = data._advance, threading.Event(), threading.Event()
 
 def wait(*args):
     begun.set()
     ended.wait(20)
 
-def hold():
-    with Turn.lock:
-        wait()
+def refused(call, *args):
+    try:
+        call(*args)
+    except sm.errors.StateMachineError as error:
+        return type(error).__name__, "at the fork" in str(error)
 
-data._advance = wait
-use = {{"the Data": lambda: sm.step(model, data), "the lock": hold}}[{held!r}]
-thread = threading.Thread(target=use)
+def fork(*args):
+    global child
+    child = os.fork()
+    sm.get_state(model, mine)
+    found = []
+    thread = threading.Thread(target=lambda: found.append(refused(sm.get_state, model, mine)))
+    thread.start()
+    thread.join()
+    assert found == [("BusyDataError", False)], found
+
+data._advance, mine._advance = wait, fork
+thread = threading.Thread(target=sm.step, args=(model, data))
 thread.start()
 begun.wait(10)
-child = os.fork()
+sm.step(model, mine)
 if not child:
     data._advance = advance
-    del other._turn.free  # as where a verb was interrupted: the lock is needed
+    for use in (sm.step, sm.forward, sm.get_state):
+        assert refused(use, model, data) == ("DivergedError", True)
     for each in (data, other):
         sm.reset(model, each, 0)
         sm.step(model, each, 5)
@@ -349,12 +359,21 @@ ended.set()
 thread.join()
 raise SystemExit(status)
 """
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        check=False,
-        timeout=60,
-    )
+    done = in_its_own_python(code, ROOT)
     assert done.returncode == 0, done.stderr[-300:]
+
+
+def test_a_data_closed_by_a_signal_handler_in_a_step_says_so() -> None:
+    """What a callback does to its own Data holds when the step around it has ended."""
+    model = sm.load("so101")
+    data = sm.make_data(model)
+    advance = data._advance
+
+    def closing(*args: object) -> None:
+        advance(*args)
+        data.close()
+
+    object.__setattr__(data, "_advance", closing)
+    sm.step(model, data)
+    with pytest.raises(ClosedDataError):
+        sm.step(model, data)

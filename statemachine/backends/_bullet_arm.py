@@ -90,10 +90,6 @@ class Arm:
         """Take a new command (nu,) of the whole model."""
         self._aim = self.law.aim(ctrl)
 
-    def clamp(self, ctrl: Array) -> None:
-        """Bring its entries of a command (nu,) within their ranges, in place."""
-        ctrl[self.law.ids] = self.law.within(ctrl)
-
     def drive(self, afresh: bool = False) -> None:
         """Give the engine the torque of the next step."""
         contact = self.contact
@@ -150,9 +146,6 @@ class Motors:
             physicsClientId=self._world.client,
         )
         return {"qfrc_bias": np.array(bias), "qfrc_actuator": self.torque}
-
-    def clamp(self, ctrl: Array) -> None:
-        """Nothing: a motor aims at whatever it is told."""
 
     def command(self, ctrl: Array) -> None:
         """Take a new command (nu,) of the whole model."""

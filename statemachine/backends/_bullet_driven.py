@@ -38,7 +38,6 @@ class DrivenWorld(HiddenWorld):
         self.raw = world = World(shared.plan, shared.kind)
         trees = [tree for tree in world.trees if tree.joints]
         self._free = [tree for tree in world.trees if tree.free]
-        self.looks_at_all = not self._free
         self._arms: list[Any]
         if shared.kind == "engine":
             self._arms = [Motors(world, tree, raw) for tree in trees]
@@ -46,6 +45,8 @@ class DrivenWorld(HiddenWorld):
         else:
             self._arms = [Arm(world, tree, shared.ghost, Law(raw, tree)) for tree in trees]
             self.memory_layout = (("contact", raw.nv), ("friction", raw.nv))
+        # Whether the arrays of one arm, in their order, are those of the whole model.
+        self._alone = not self._free and [type(tree.qpos) for tree in trees] == [slice]
         self._blank = [(arm.nothing, arm.nothing) for arm in self._arms]
         self._driven = False
 
@@ -58,11 +59,6 @@ class DrivenWorld(HiddenWorld):
         place(qpos, qvel)
         for arm, known in zip(self._arms, memory, strict=True):
             arm.place(qpos, qvel, *known)
-
-    def clamp(self, ctrl: Array) -> None:
-        """By the ranges of the servos."""
-        for arm in self._arms:
-            arm.clamp(ctrl)
 
     def command(self, ctrl: Array) -> None:
         """To every arm."""
@@ -87,6 +83,8 @@ class DrivenWorld(HiddenWorld):
 
     def read(self) -> tuple[Array, Array]:
         """As the base says."""
+        if self._alone:
+            return self._arms[0].angles, self._arms[0].speed
         qpos, qvel = np.empty(self._nq), np.empty(self._nv)
         for arm in self._arms:
             qpos[arm.tree.qpos], qvel[arm.tree.qvel] = arm.angles, arm.speed

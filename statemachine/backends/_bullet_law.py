@@ -24,6 +24,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
+from operator import ge, le
 from typing import Any
 
 import mujoco
@@ -103,8 +105,7 @@ class Law:
         # A limit acts from its margin on, and as if it were there.
         margin = raw.jnt_margin[joints][:, None] * [1.0, -1.0]
         low, high = _range(raw.jnt_range[joints] + margin, limited)
-        self._ranges: list[tuple[float, float]]
-        self._ranges = list(zip(low.tolist(), high.tolist(), strict=True))
+        self._ranges: tuple[list[float], list[float]] = low.tolist(), high.tolist()
         solref, solimp = raw.jnt_solref[joints], raw.jnt_solimp[joints]
         damping, stiffness = _spring(solref, solimp, floor)
         # Of each joint: the curve of its impedance, and b, k and the weight of its limit.
@@ -116,7 +117,7 @@ class Law:
         driven = np.isin(raw.actuator_trnid[:, 0], joints) & (not off["actuation"])
         driven &= in_force(raw)
         ids = np.flatnonzero(driven)
-        self.ids = raw.actuator_ctrladr[ids]  # another actuator may take several numbers of ctrl
+        self._ids = raw.actuator_ctrladr[ids]  # another actuator may take several numbers of ctrl
         self._gear = np.zeros((len(joints), len(ids)))
         for column, a in enumerate(ids):
             row = int(np.flatnonzero(joints == raw.actuator_trnid[a, 0])[0])
@@ -128,8 +129,6 @@ class Law:
         later = 0.0 if raw.opt.integrator in _EXPLICIT else self.timestep
         self._slope = -later * self._gear**2 * bias[:, 2]
         self._unsaturated = self._with_slope(np.ones(len(ids)))
-        clamped = raw.actuator_ctrllimited[self.ids].astype(bool) & (not off["clamp"])
-        self._ctrl_low, self._ctrl_high = _range(raw.actuator_ctrlrange[self.ids], clamped)
         limited = raw.actuator_forcelimited[ids].astype(bool)
         self._low_force, self._high_force = _range(raw.actuator_forcerange[ids], limited)
         fenced = raw.jnt_actfrclimited[joints].astype(bool)
@@ -144,12 +143,8 @@ class Law:
         return found
 
     def aim(self, ctrl: Array) -> Array:
-        """What a command (nu,) of the whole model adds to the force of each actuator."""
-        return self._gain * self.within(ctrl)
-
-    def within(self, ctrl: Array) -> Array:
-        """What the actuators take for a command (nu,) of the whole model: it within its range."""
-        return np.minimum(np.maximum(ctrl[self.ids], self._ctrl_low), self._ctrl_high)
+        """What a command (nu,) of the whole model, within range, adds to each actuator's force."""
+        return self._gain * ctrl[self._ids]
 
     def solve(
         self,
@@ -175,9 +170,11 @@ class Law:
             afresh: Solve for friction whole, not from the last step's.
         """
         body, client = ghost
-        mass = np.array(pb.calculateMassMatrix(body, q, 0, client))
-        bias = np.array(pb.calculateInverseDynamics(body, q, v, self._zeros, 0, client))
         n = len(q)
+        rows = pb.calculateMassMatrix(body, q, 0, client)
+        # Faster than np.array, as several lines here are than what is shorter.
+        mass = np.fromiter(chain.from_iterable(rows), np.float64, n * n).reshape(n, n)
+        bias = np.array(pb.calculateInverseDynamics(body, q, v, self._zeros, 0, client))
         speed = x[n:-1]
         linear = dense.times(self._linear, x)
         passive, damped, wanted = linear[:n], linear[n : 2 * n], linear[2 * n :] + aim
@@ -198,8 +195,9 @@ class Law:
         dense.factored(implicit)
         others = actuator + passive - bias + contact
         limit = self._nothing
-        places = enumerate(zip(q, self._ranges, strict=True))
-        hit = [i for i, (place, (low, high)) in places if not low <= place <= high]
+        low, high = self._ranges
+        within = all(map(le, low, q)) and all(map(ge, high, q))
+        hit = [] if within else [i for i in range(n) if not low[i] <= q[i] <= high[i]]
         solve = afresh or bool(hit)
         if not solve and len(self._rubs):
             # One sweep from the last step's friction, of all joints at once: enough where
@@ -241,7 +239,7 @@ class Law:
         sign, soft, goal, least, most = rows
         matrix = dense.inverse_rows(factor, at)[:, at] * sign[:, None] * sign
         matrix.flat[:: len(at) + 1] += soft
-        right = goal - sign * dense.solved(factor, others)[at]
+        right = goal - sign * dense.solved(factor, others.copy())[at]
         force = np.zeros(len(at))
         force[:rubbing] = friction[rubs]
         force = _pivoted(matrix, right, least, most, force)
@@ -251,8 +249,8 @@ class Law:
 
     def _stop(self, joint: int, place: float, speed: float) -> tuple[float, ...]:
         """The row of the limit that a joint is beyond: sign, softness, reference, bounds."""
-        low, high = self._ranges[joint]
-        above, below = place - low, high - place
+        low, high = self._ranges
+        above, below = place - low[joint], high[joint] - place
         side, gap = (1.0, above) if above < below else (-1.0, below)
         curve, (damping, stiffness, weight) = self._stops[joint]
         impedance = _impedance(curve, gap)
@@ -271,7 +269,7 @@ def _pivoted(matrix: Array, right: Array, least: Array, most: Array, start: Arra
     free = (force > least) & (force < most) | (least == 0) & (most > 0)
     for _ in range(_PIVOTS):
         if free.all():
-            force = dense.solved(dense.factored(matrix.copy()), right)
+            force = dense.solved(dense.factored(matrix.copy()), right.copy())
             if ((least <= force) & (force <= most)).all():
                 return force
         else:
@@ -304,7 +302,6 @@ _FLAGS = {
     "limit": _OFF.mjDSBL_LIMIT,
     "constraint": _OFF.mjDSBL_CONSTRAINT,
     "actuation": _OFF.mjDSBL_ACTUATION,
-    "clamp": _OFF.mjDSBL_CLAMPCTRL,
     "refsafe": _OFF.mjDSBL_REFSAFE,
     "eulerdamp": _OFF.mjDSBL_EULERDAMP,
 }

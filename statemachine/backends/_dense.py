@@ -42,16 +42,15 @@ def factored(matrix: Array) -> Array:
 
 
 def solved(factor: Array, right: Array) -> Array:
-    """The solution (n,) for a right-hand side (n,)."""
-    found = np.empty(len(right))
-    mujoco.mju_cholSolve(found, factor, right)
-    return found
+    """The solution (n,) for a right-hand side (n,), which it takes the place of."""
+    mujoco.mju_cholSolve(right, factor, right)
+    return right
 
 
 def inverse_rows(factor: Array, rows: NDArray[np.intp]) -> Array:
     """Rows (k,) of the inverse, (k, n), of the matrix that was factored."""
     found = np.zeros((len(rows), len(factor)))
     found[np.arange(len(rows)), rows] = 1.0
-    for row in found:  # its own right-hand side
-        mujoco.mju_cholSolve(row, factor, row)
+    for row in found:
+        solved(factor, row)
     return found

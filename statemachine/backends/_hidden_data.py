@@ -126,7 +126,7 @@ class Machine:
 
     def _pass_on(self, given: Array) -> None:
         """Tell the world the command that acts in its next step."""
-        self._acting = acting(self._ctrl, given, self._late)
+        self._acting = self._model._acting("ctrl", acting(self._ctrl, given, self._late))
         self.world.command(self._acting)
 
     def run(self, _model: None, _data: None, nstep: int = 1) -> None:
@@ -138,9 +138,8 @@ class Machine:
         check_writable(self.qvel, "qvel")
         world = self.world
         if self.ctrl.tobytes() != self._commanded:
-            reached = self.ctrl.copy()  # by the actuators: what is infinite may end at a limit
-            world.clamp(reached)
-            check_entries(reached, "ctrl", self._model._coordinate_name)
+            acting = self._model._acting("ctrl", self.ctrl)
+            check_entries(acting, "ctrl", self._model._coordinate_name)
             self._command()
         if self._written:
             check_entries(self.qpos, "qpos", self._model._coordinate_name)
@@ -152,13 +151,17 @@ class Machine:
         self._used, start = True, world.memory
         kept = self.moment, self.derived
         try:
-            time, given = self._several(steps - 1, self.time, self.given)
-            before = world.read() if steps > 1 else self._left[:2]
-            memory = start if steps == 1 else world.memory
-            time, given = self._several(1, time, given)
+            time, given, before, memory = self.time, self.given, self._left[:2], start
+            if steps > 1:
+                for _ in range(steps - 1):
+                    time, given = self._once(time, given)
+                    if world.diverging():
+                        self._diverge(time)
+                before, memory = world.read(), world.memory
+            time, given = self._once(time, given)
             moment = Moment(*before, self._acting, memory)
             qpos, qvel = world.read()
-            if not world.looks_at_all and not bounded(qpos, qvel, self._fastest):
+            if not bounded(qpos, qvel, self._fastest):
                 self._diverge(time)
             left = qpos, qvel, qpos.tobytes(), qvel.tobytes()
             self.moment, self._lives, self.derived = moment, True, {}
@@ -176,18 +179,13 @@ class Machine:
             self.moment, self.derived = kept
             raise
 
-    def _several(self, steps: int, time: float, given: Array) -> tuple[float, Array]:
-        """Take engine steps; returns the time after them, and the commands until then."""
-        world = self.world
-        for _ in range(steps):
-            if self._longest:
-                self._pass_on(given)
-                given = np.concatenate([given[1:], self._ctrl[None]])
-            world.step()
-            time += world.timestep
-            if world.diverging():
-                self._diverge(time)
-        return time, given
+    def _once(self, time: float, given: Array) -> tuple[float, Array]:
+        """Take an engine step; returns the time after it, and the commands until then."""
+        if self._longest:
+            self._pass_on(given)
+            given = np.concatenate([given[1:], self._ctrl[None]])
+        self.world.step()
+        return time + self.world.timestep, given
 
     def _diverge(self, time: float) -> None:
         """Raise DivergedError for the first coordinate that is not finite, or beyond its bound."""
@@ -218,7 +216,7 @@ class Machine:
             memory = self.world.blank
         else:
             memory = self._memory if self._astray else self.world.memory
-        ctrl = acting(self.ctrl, self.given, self._late)
+        ctrl = self._model._acting("ctrl", acting(self.ctrl, self.given, self._late))
         return Moment(self.qpos.copy(), self.qvel.copy(), ctrl, memory)
 
     def forward(self) -> None:
@@ -324,7 +322,7 @@ class HiddenData(Data):
 
     def _set_state(self, state: State) -> None:
         for name in INPUTS:
-            check_entries(state[name], name, self._home._coordinate_name)
+            check_entries(self._home._acting(name, state[name]), name, self._home._coordinate_name)
         self._home._check_quaternions(state["qpos"])
         world = self._machine.world
         memory = world.unpacked([state[name] for name, _ in world.memory_layout])

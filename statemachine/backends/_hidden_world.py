@@ -50,8 +50,6 @@ class HiddenWorld(ABC):
         qpos0: (nq,) positions of the default state.
         raw: The engine's own object, which `Data.raw` gives.
         fastest: The smallest `max_qvel` of the Model [rad/s or m/s]; the Data sets it.
-        looks_at_all: Whether `diverging` looks at every coordinate; else all are looked at
-            at the end of a call.
     """
 
     engine: str
@@ -62,7 +60,6 @@ class HiddenWorld(ABC):
     qpos0: Array
     raw: Any
     fastest: float = HUGE
-    looks_at_all: bool = True
     # Held while a world that several Data share is used. One for all Models.
     lock = threading.RLock()
 
@@ -83,6 +80,7 @@ class HiddenWorld(ABC):
         """Take a command (nu,) [unit of the actuator] that is in force until the next one.
 
         A latency (`Model.actuator_delay`) has passed already: the Data keeps what is on its way.
+        It is within its range, where the Model says that the engine clamps it.
         """
 
     @abstractmethod
@@ -128,17 +126,12 @@ class HiddenWorld(ABC):
         return {}
 
     def diverging(self) -> bool:
-        """A quick look after each engine step: may a coordinate be NaN or beyond its bound?
+        """A quick look between the engine steps of a call: is a coordinate NaN or beyond its bound?
 
-        If so, all are read, and the first that is raises DivergedError.
+        If so, all are read, and the first that is raises DivergedError. All are looked at at
+        the end of a call, so that this may look at some.
         """
         return not bounded(*self.read(), self.fastest)
-
-    def clamp(self, ctrl: Array) -> None:  # noqa: B027  (optional hook)
-        """Bring a command (nu,) within its ranges, in place.
-
-        What is then not finite is refused, so without this every infinite command is.
-        """
 
     def renewed(self) -> HiddenWorld:
         """The world in which the state is overwritten: another, where `place` leaves traces.

@@ -14,7 +14,6 @@ import warnings
 import weakref
 from collections import deque
 from collections.abc import Callable
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -95,17 +94,24 @@ def pass_on(texts: list[str], stacklevel: int) -> None:
 
 
 class AlarmError(Exception):
-    """MuJoCo found an entry that is no number: which was the first, and when [s]."""
+    """MuJoCo found an entry that is no number: the first, if that is known, and when [s]."""
 
-    def __init__(self, quantity: str, index: int, time: float) -> None:
+    def __init__(self, quantity: str, index: int | None, time: float) -> None:
         super().__init__(quantity, index, time)
         self.quantity, self.index, self.time = quantity, index, time
+
+    def entry(self, model: Model) -> str:
+        """'qpos[2] (elbow_flex)'."""
+        if self.index is None:
+            return f"an entry of {self.quantity} (MuJoCo did not tell which)"
+        name = model._coordinate_name(self.quantity, self.index)
+        return f"{self.quantity}[{self.index}]{name}"
 
 
 def ended(model: Model, alarm: AlarmError, who: str) -> BadInputError | DivergedError:
     """The error for what is useless from now on: a Data or a world, as `who` names it."""
     quantity, index, time = alarm.quantity, alarm.index, alarm.time
-    entry = f"{quantity}[{index}]{model._coordinate_name(quantity, index)}"
+    entry = alarm.entry(model)
     now = f"{who} now takes only reset and set_state"
     if quantity == "ctrl":
         return BadInputError(
@@ -180,7 +186,9 @@ class Alarms:
         quantity = next(name for name in fatal if resets or fatal[name] == steps)
         # Without the last digits, which are those of a long sum.
         time = float(raw.time) if resets else round(raw.time - steps * self._model.opt.timestep, 9)
-        index = int(self._now[FATAL[quantity], 0])
+        index: int | None = int(self._now[FATAL[quantity], 0])
+        # Where it is not reset, what is bad stays bad.
+        bad = np.flatnonzero(~(np.abs(getattr(raw, quantity)) <= HUGE)).tolist()
         if trusted and (resets or steps > 1):
             for text in reversed(list(_TEXTS)):
                 match = _BAD.search(text)
@@ -188,11 +196,11 @@ class Alarms:
                     continue
                 if resets:
                     return AlarmError(quantity, int(match[2]), float(match[3]))
-                if abs(float(match[3]) - time) < 1e-4 and self._is_bad(quantity, int(match[2])):
+                # A text of the same moment may be another thread's.
+                if abs(float(match[3]) - time) < 1e-4 and int(match[2]) in bad:
                     return AlarmError(quantity, int(match[2]), time)
+        # A counter knows the entry of its last warning. It was that of the first, too, where no
+        # other entry is bad by now; the command is the same in all steps.
+        if fatal[quantity] > 1 and quantity != "ctrl" and (resets or bad != [index]):
+            index = None
         return AlarmError(quantity, index, time)
-
-    def _is_bad(self, quantity: str, index: int) -> bool:
-        """Whether an entry is bad here; a text of the same moment may be another thread's."""
-        array: Any = getattr(self._raw, quantity)
-        return index < len(array) and not abs(array[index]) <= HUGE

@@ -17,7 +17,7 @@ from mujoco.batch import Batch, SimulationError
 
 from ..errors import BadInputError, UnsupportedError
 from ..interface import Array, Ints, Model, State
-from ..interface.checks import check_finite
+from ..interface.checks import check_vector
 from ..interface.worlds import WRITABLE, Worlds, check_memory
 from ._delays import hold, places_of, with_room_of
 from ._mujoco_alarms import (
@@ -234,7 +234,7 @@ class MujocoWorlds(Worlds):
     def _get_state(self, world: int) -> State:
         fingerprint, layout = self._state_layout(world)
         row = self._batch.state[world][self._places(world)]
-        check_finite(row, "state")
+        check_vector(row, layout, self.model)
         return State("mujoco", mujoco.__version__, fingerprint, layout, row.tobytes())
 
     def _set_state(self, world: int, state: State) -> None:

@@ -275,6 +275,7 @@ def facts(m: mujoco.MjModel) -> dict[str, Any]:
         "jnt_range": m.jnt_range,
         "actuator_jntid": np.where(on_joint, m.actuator_trnid[owner, 0], -1).astype(np.int64),
         "actuator_ctrlrange": _ranges(m.actuator_ctrlrange, m.actuator_ctrllimited),
+        "_clamps": not m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL),
         "actuator_forcerange": _ranges(
             m.actuator_forcerange[owner], m.actuator_forcelimited[owner]
         ),

@@ -26,7 +26,7 @@ from ..interface import (
     Model,
     State,
 )
-from ..interface.checks import TINY, check_finite
+from ..interface.checks import TINY, check_vector
 from ._delays import hold, saved
 from ._edits import CONSTANTS_FOLLOW, varied
 from ._mujoco_alarms import AlarmError, Alarms, ended, gave_up, pass_on
@@ -272,7 +272,7 @@ class MujocoData(Data):
         mujoco.mj_getState(
             self._home.raw, self.raw, vector, int(mujoco.mjtState.mjSTATE_INTEGRATION)
         )
-        check_finite(vector, "state")
+        check_vector(vector, layout, self._home)
         return State("mujoco", mujoco.__version__, fingerprint, layout, vector.tobytes())
 
     def _set_state(self, state: State) -> None:
@@ -304,12 +304,10 @@ class MujocoData(Data):
             self._give_up(str(fatal))
             raise fatal from error
         if isinstance(error, AlarmError):
-            entry = f"{error.quantity}[{error.index}]"
-            entry += self._home._coordinate_name(error.quantity, error.index)
-            if error.quantity == "ctrl":
-                self._give_up(f"it was stepped with a bad {entry}")
-            else:
-                self._give_up(f"{entry} was not finite at time {error.time:g} s")
+            entry = error.entry(self._home)
+            command = error.quantity == "ctrl"
+            diverged = f"{entry} was not finite at time {error.time:g} s"
+            self._give_up(f"it was stepped with a bad {entry}" if command else diverged)
             raise ended(self._home, error, "This Data") from None
 
 

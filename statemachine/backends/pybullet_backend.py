@@ -220,7 +220,7 @@ class PybulletModel(HiddenModel):
             max_qvel=bound,
             timestep=float(raw.opt.timestep) * substeps,
             substeps=substeps,
-            **facts(raw),
+            **{**facts(raw), **({"_clamps": False} if as_it_comes else {})},
             plan=plan,
             defaults=defaults,
             _shared=shared,

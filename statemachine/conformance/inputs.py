@@ -137,19 +137,24 @@ def check_not_finite_in_place_is_caught(lab: Lab) -> None:
 
 
 def check_infinite_ctrl_is_refused_or_clamped(lab: Lab) -> None:
-    """An infinite ctrl in place: an error, or the end of its range; forward refuses it."""
+    """An infinite ctrl in place is the end of its range to every verb, or an error of each."""
     model = lab.arm
-    at_end, data = lab.data(model), lab.data(model)
+    at_end, data, again = (lab.data(model) for _ in range(3))
     at_end.ctrl[1] = model.actuator_ctrlrange[1, 1]
     data.ctrl[1] = np.inf
-    require_raises(BadInputError, lambda: forward(model, data))
-    require_raises(BadInputError, lambda: get_state(model, data))
-    step(model, at_end, 50)
     try:
-        step(model, data, 50)
+        forward(model, data)
     except BadInputError:
+        require_raises(BadInputError, lambda: get_state(model, data))
+        require_raises(BadInputError, lambda: step(model, data, 50))
         return
+    forward(model, at_end)
+    require_equal(data.qacc, at_end.qacc, "qacc under an infinite ctrl")
+    set_state(model, again, get_state(model, data))
+    for each in (data, at_end, again):
+        step(model, each, 50)
     require_equal(data.qpos, at_end.qpos, "qpos under an infinite ctrl")
+    require_equal(again.qpos, data.qpos, "qpos from the State of an infinite ctrl")
     require(np.isposinf(data.ctrl[1]), "the array does not keep what was written")
 
 

@@ -18,6 +18,8 @@ HUGE = 1e10
 # Below this norm MuJoCo takes a quaternion for the identity without a word (mjMINVAL).
 TINY = 1e-15
 
+_LATE = ("given", "history")  # parts of a State with the commands that are on their way
+
 
 def as_count(value: Any, name: str) -> int:
     """`value` as a whole number of at least 1, or BadInputError."""
@@ -95,13 +97,6 @@ def check_entries(array: Array, name: str, label: Callable[[str, int], str] | No
     raise BadInputError(f"{where} = {value} {problem}", quantity=name, index=index)
 
 
-def check_finite(array: Array, name: str) -> None:
-    """Raise BadInputError for the first entry that is NaN or infinite."""
-    if not np.isfinite(array).all():
-        index = int(np.flatnonzero(~np.isfinite(array))[0])
-        raise BadInputError(f"{name}[{index}] = {array[index]} is not a finite number")
-
-
 def check_writable(array: Array, name: str, owner: str = "data") -> None:
     """Raise ReadOnlyError if the caller took the flag of an input away with `setflags`."""
     if not array.flags.writeable:
@@ -138,7 +133,21 @@ def check_state(
         raise ForeignStateError(
             f"this State has another layout than {model!r}: it was made by another model"
         )
-    check_finite(state.vector, "state")
+    check_vector(state.vector, layout, model)
+
+
+def check_vector(vector: Array, layout: tuple[tuple[str, int], ...], model: Any) -> None:
+    """Raise BadInputError for the first number of a State of `model` that is not finite.
+
+    A command that is infinite may be there: what acts of it is within its range.
+    """
+    start = 0
+    for name, size in () if np.isfinite(vector).all() else layout:
+        part = model._acting(name, vector[start : start + size])
+        bad = np.isnan(part) if name in _LATE else ~np.isfinite(part)
+        for index in np.flatnonzero(bad)[:1].tolist():
+            raise BadInputError(f"state[{name!r}][{index}] = {part[index]} is not a finite number")
+        start += size
 
 
 def index_of(kind: str, name: str, names: Sequence[str]) -> int:

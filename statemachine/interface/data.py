@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from numpy.typing import ArrayLike
 
@@ -18,12 +18,11 @@ from ..errors import ClosedDataError, DivergedError, ReadOnlyError
 from .checks import as_scalar, as_vector, check_writable
 from .model import Model
 from .records import INPUTS, Array, Contacts, State, read_only
-from .turns import HOLDERS, Turn, in_use_here
+from .turns import Turn, alone, refuse_unless_held
 
-T = TypeVar("T")
 # By name, so that type checkers take the inputs for the descriptors below.
 _ENGINE = ("_advance", "_raw_model", "_raw", "_warned", "_told")
-_SLOTS = ("_home", "_turn", "_trouble", *_ENGINE, *INPUTS)
+_SLOTS = ("__weakref__", "_home", "_turn", "_trouble", *_ENGINE, *INPUTS)
 
 if TYPE_CHECKING:
 
@@ -62,9 +61,8 @@ class Data(ABC):
         qpos: (nq,) positions [rad or m]; quaternions wxyz.
         qvel: (nv,) velocities [rad/s or m/s]; of a free joint, linear in world axes,
             then angular in body axes.
-        ctrl: (nu,) commands [unit of the actuator]. A step clamps each to its range,
-            an infinite one too, and leaves the array as it is; `forward` and `get_state`
-            refuse what is not finite.
+        ctrl: (nu,) commands [unit of the actuator]. What acts is each clamped to its range,
+            an infinite one too; the array and a State keep what was written.
         time: Simulated time [s].
     """
 
@@ -109,7 +107,8 @@ class Data(ABC):
                 calls `_attend`.
             engine: The engine's model and data, or whatever `advance` takes first.
         """
-        self._home, self._advance, self._turn = model, advance, Turn(model)
+        self._home, self._advance = model, advance
+        self._turn = Turn(self)
         self._raw_model, self._raw = engine
         self._warned, self._told = warnings
         for name in INPUTS:
@@ -201,7 +200,7 @@ class Data(ABC):
 
         The last qpos, qvel and ctrl stay readable; every other use is an error.
         """
-        if self._trouble != "closed":
+        with suppress(ClosedDataError):
             alone(self, self._shut, even_troubled=True)
 
     def _shut(self) -> None:
@@ -256,8 +255,8 @@ class Data(ABC):
     def _refuse_if_troubled(self) -> None:
         if self._trouble == "closed":
             raise ClosedDataError("this Data is closed: make another with make_data")
-        if self._trouble:
-            in_use_here(self)  # or another thread is in the middle of a reset
+        if self._trouble and not hasattr(self._turn, "free"):
+            refuse_unless_held(self)  # or another thread is in the middle of a reset
         if why := self._trouble:
             raise DivergedError(f"this Data is not usable any more ({why}): reset it, or set_state")
 
@@ -308,66 +307,3 @@ class Data(ABC):
 
     @abstractmethod
     def _close(self) -> None: ...
-
-
-class Guarded(Protocol):
-    """What one thread at a time may use: a Data, or Worlds."""
-
-    _home: Model
-    _turn: Turn
-    _trouble: str
-
-    def _refuse_if_troubled(self) -> None: ...
-
-    def _failed(self, error: Exception) -> None: ...
-
-
-def alone(
-    data: Guarded,
-    call: Callable[..., T],
-    *args: Any,
-    even_troubled: bool = False,
-) -> T:
-    """Call something while no other thread uses `data`.
-
-    Args:
-        data: What `call` uses.
-        call: A function.
-        *args: Its arguments.
-        even_troubled: Whether to do so while `data` refuses, too.
-
-    Raises:
-        BusyDataError: Another thread uses `data`.
-        DivergedError: `data` refuses.
-        ClosedDataError: `data` is closed.
-    """
-    turn, held = data._turn, False
-    key = (even_troubled and data._trouble) or data._home
-    try:
-        try:
-            if turn.free is key:
-                del turn.free
-                held = True
-        except AttributeError:  # nothing is there
-            pass
-        if not held:
-            if not even_troubled:
-                data._refuse_if_troubled()
-            with Turn.lock:
-                if not in_use_here(data):
-                    if not even_troubled:  # once more: another thread may have ended just now
-                        data._refuse_if_troubled()
-                    with suppress(AttributeError):
-                        del turn.free
-                    held = True
-        return call(*args)
-    except Exception as error:
-        if held:
-            data._failed(error)
-        raise
-    finally:
-        if held:
-            turn.free = data._trouble or data._home
-
-
-HOLDERS.add(alone.__code__)

@@ -100,6 +100,7 @@ class Model(ABC):
     site_quat: Array
     keyframes: tuple[Keyframe, ...]
 
+    _clamps = False  # whether what acts of ctrl is always within its range
     if TYPE_CHECKING:
         _quaternions: list[tuple[int, int]]  # (joint id, address in qpos) of each
 
@@ -238,6 +239,13 @@ class Model(ABC):
             starts = self.jnt_qposadr if array == "qpos" else self.jnt_dofadr
             label = self.joint_names[int(np.searchsorted(starts, index, side="right")) - 1]
         return f" ({label})" if label else ""
+
+    def _acting(self, name: str, array: Array) -> Array:
+        """What acts of an input: of ctrl (…, nu) each number within its range, if infinite too."""
+        if name != "ctrl" or not self._clamps:
+            return array
+        low, high = self.actuator_ctrlrange.T
+        return np.minimum(np.maximum(array, low), high)
 
     def _with_fingerprint(
         self, layout: tuple[tuple[str, int], ...]

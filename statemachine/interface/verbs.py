@@ -12,10 +12,10 @@ from typing import Any
 
 from ..errors import BadInputError, ForeignDataError
 from .checks import as_count, check_entries, check_state, kind_of
-from .data import Data, alone
+from .data import Data
 from .model import Model
 from .records import INPUTS, State
-from .turns import HOLDERS
+from .turns import HOLDERS, alone
 
 _ONE = 1
 
@@ -49,8 +49,8 @@ def step(model: Model, data: Data, nstep: int = 1) -> None:
         BadInputError: `nstep` is no whole number, or an input is not a number. In
             the second case the Data may have moved: it then refuses all but
             `reset` and `set_state`. A ctrl that is infinite, written in place, is
-            clamped to its range like any other that lies beyond it; where it has no
-            range, it is refused.
+            clamped to its range like any other that lies beyond it, by every verb;
+            where it has no range, it is refused.
         DivergedError: A coordinate stopped being finite, now or earlier.
         EngineError: The engine gave up.
         ClosedDataError: `data` is closed.
@@ -58,9 +58,8 @@ def step(model: Model, data: Data, nstep: int = 1) -> None:
     held = False
     try:  # as `alone`, but in line, which is faster
         turn = data._turn
-        if turn.free is model:
-            del turn.free
-            held = True
+        if turn.free is model: del turn.free; held = True  # fmt: skip  # noqa: E701, E702
+        if held:
             if nstep is _ONE:  # by identity, which True and 1.0 do not pass
                 data._advance(data._raw_model, data._raw)
             else:
@@ -68,7 +67,7 @@ def step(model: Model, data: Data, nstep: int = 1) -> None:
                 data._advance(data._raw_model, data._raw, nstep)
             if data._warned != data._told:
                 data._attend()
-            turn.free = model
+            held = False; turn.free = data._trouble or model  # fmt: skip  # noqa: E702
             return
     except BaseException as error:
         if held:
@@ -130,7 +129,7 @@ def reset(model: Model, data: Data, keyframe: int | str | None = None) -> None:
         UnknownNameError: There is no such keyframe; nothing is changed then.
         ClosedDataError: `data` is closed.
     """
-    _admit(model, data, even_troubled=True)
+    _admit(model, data)
     key = None if keyframe is None else model.key_id(keyframe)
     alone(data, _overwrite, data, "reset", data._reset, key, even_troubled=True)
 
@@ -170,7 +169,7 @@ def set_state(model: Model, data: Data, state: State) -> None:
         BadInputError: The State holds a number that is not finite.
         ClosedDataError: `data` is closed.
     """
-    _admit(model, data, even_troubled=True)
+    _admit(model, data)
     check_state(state, model, *data._state_layout())
     alone(data, _overwrite, data, "set_state", data._set_state, state, even_troubled=True)
 
@@ -189,13 +188,13 @@ def _overwrite(data: Data, verb: str, change: Callable[[Any], None], to: Any) ->
 
 
 def _check_inputs(model: Model, data: Data) -> None:
-    """Raise BadInputError for the first entry that is no finite number."""
+    """Raise BadInputError for the first entry that acts and is no finite number."""
     for name in INPUTS:
-        check_entries(getattr(data, name), name, model._coordinate_name)
+        check_entries(model._acting(name, getattr(data, name)), name, model._coordinate_name)
 
 
-def _admit(model: Model, data: Data, even_troubled: bool = False) -> None:
-    """Raise unless `data` is a usable Data of `model`."""
+def _admit(model: Model, data: Data) -> None:
+    """Raise unless `data` is a Data of `model`."""
     if not isinstance(model, Model) or not isinstance(data, Data):
         raise TypeError(
             "the first two arguments are a Model and a Data; "
@@ -206,5 +205,3 @@ def _admit(model: Model, data: Data, even_troubled: bool = False) -> None:
             f"this Data was made by another Model ({data._home!r}): a Data belongs to the "
             "Model that made it; a State moves between them"
         )
-    if not even_troubled or data._trouble == "closed":
-        data._refuse_if_troubled()

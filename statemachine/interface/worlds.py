@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from contextlib import suppress
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -28,10 +29,9 @@ from .checks import (
     check_writable,
     whole_number,
 )
-from .data import alone
 from .model import Model
 from .records import FORCES, INPUTS, POSES, Array, Ints, State, read_only
-from .turns import Turn
+from .turns import Turn, alone
 
 if TYPE_CHECKING:
     from .data import _Input
@@ -123,9 +123,9 @@ class Worlds(ABC):
             _process=os.getpid(),
             # What `alone` asks of what it guards, as of a Data.
             _home=model,
-            _turn=Turn(model),
             _trouble="",
         )
+        self._turn = Turn(self)
 
     @property
     def diverged(self) -> Mapping[int, Exception]:
@@ -147,7 +147,7 @@ class Worlds(ABC):
 
         The last qpos, qvel, ctrl and time stay readable; every other use is an error.
         """
-        if self._trouble != "closed":
+        with suppress(ClosedDataError):
             alone(self, self._shut, even_troubled=True)
 
     def _shut(self) -> None:
@@ -243,7 +243,7 @@ class Worlds(ABC):
     def _check_inputs(self, ids: Ints) -> None:
         """Raise BadInputError for the first entry of these worlds that is no finite number."""
         for name in INPUTS:
-            rows = getattr(self, name)[ids]
+            rows = self.model._acting(name, getattr(self, name)[ids])
             if not np.abs(rows).max(initial=0.0) <= HUGE:  # NaN fails it, too
                 row = int(np.flatnonzero(~(np.abs(rows) <= HUGE).all(axis=1))[0])
                 try:

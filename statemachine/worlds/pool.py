@@ -21,7 +21,7 @@ import numpy as np
 from .. import backends
 from ..errors import BusyDataError, EngineError, StateMachineError, UnsupportedError
 from ..interface import Array, Ints, Model, State
-from ..interface.data import alone
+from ..interface.turns import alone
 from ..interface.worlds import Worlds, check_memory
 from ._process import WorldsProcess, end_all, lost_worlds
 from ._protocol import ANSWER_MOST, Verb

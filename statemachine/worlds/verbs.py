@@ -21,8 +21,8 @@ from ..errors import (
 )
 from ..interface import Array, Ints, Model, State
 from ..interface.checks import as_count, as_vector, check_state, kind_of
-from ..interface.data import alone
 from ..interface.options import checked_options
+from ..interface.turns import alone
 from ..interface.worlds import BATCHED, WRITABLE, Worlds, in_world
 from ..processes import free_memory
 
