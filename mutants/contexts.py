@@ -16,6 +16,7 @@ import pytest
 from coverage import Coverage
 
 _seconds: dict[str, float] = defaultdict(float)
+_fixtures: dict[str, float] = defaultdict(float)
 _failed: set[str] = set()
 
 
@@ -45,6 +46,9 @@ def pytest_runtest_call(item: pytest.Item) -> object:
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     _seconds[report.nodeid] += report.duration
+    if report.when == "setup":
+        file = report.nodeid.partition("::")[0]
+        _fixtures[file] = max(_fixtures[file], report.duration)
     if report.failed:
         _failed.add(report.nodeid)
 
@@ -53,5 +57,5 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     if measuring := Coverage.current():
         measuring.save()
     if not hasattr(session.config, "workerinput"):
-        told = {"seconds": _seconds, "failed": sorted(_failed)}
+        told = {"seconds": _seconds, "fixtures": _fixtures, "failed": sorted(_failed)}
         Path(os.environ["MUTANTS_TIMES"]).write_text(json.dumps(told), "utf-8")

@@ -64,6 +64,7 @@ class Covered:
             for test, seconds in told["seconds"].items()
             if test not in failed and not test.startswith(FROZEN)
         }
+        self._fixtures: dict[str, float] = told["fixtures"]
         self._of_file: dict[str, list[str]] = defaultdict(list)
         for test in self._seconds:
             self._of_file[test.partition("::")[0]].append(test)
@@ -73,7 +74,7 @@ class Covered:
 
         Those whose file is named after its room or module come first, then the quickest. What
         runs at import belongs to the tests of all functions of its module, and what a fixture
-        runs to all tests of its file.
+        runs to all tests of its file. The fixtures of a file take their time once.
 
         Args:
             site: Where the mutant stands.
@@ -89,12 +90,17 @@ class Covered:
         rooms = set(site.mutant.file.removesuffix(".py").replace("/", "_").split("_")[1:])
 
         def order(test: str) -> tuple[bool, float]:
-            own = rooms & set(test.partition("::")[0].removesuffix(".py").split("_")[1:])
-            return not own, self._seconds[test]
+            file = test.partition("::")[0]
+            own = rooms & set(file.removesuffix(".py").split("_")[1:])
+            return not own, self._seconds[test] + self._fixtures.get(file, 0.0)
 
         chosen: list[str] = []
+        prepared: set[str] = set()
         for test in sorted(found & set(self._seconds), key=order):
-            seconds -= self._seconds[test]
-            if not chosen or seconds > 0:
+            file = test.partition("::")[0]
+            fixtures = 0.0 if file in prepared else self._fixtures.get(file, 0.0)
+            if not chosen or self._seconds[test] + fixtures < seconds:
+                seconds -= self._seconds[test] + fixtures
+                prepared.add(file)
                 chosen.append(test)
         return chosen

@@ -16,7 +16,7 @@ MODELS = {
     "arm": "so101",
     "arm on a floor": "so101/scene",
     "arm with a box": "so101/scene_box",
-    "arm's URDF": ROOT / "models" / "so101" / "so101.urdf",
+    "arm as URDF": ROOT / "models" / "so101" / "so101.urdf",
     "inverted pendulum": _ROBOTS / "gym/gymnasium/envs/mujoco/assets/inverted_pendulum.xml",
     "reacher": _ROBOTS / "gym/gymnasium/envs/mujoco/assets/reacher.xml",
     "hopper": _ROBOTS / "gym/gymnasium/envs/mujoco/assets/hopper.xml",
@@ -24,14 +24,14 @@ MODELS = {
     "cheetah": _ROBOTS / "dmc/dm_control/suite/cheetah.xml",
     "fixed ant": _ROBOTS / "dmc/dm_control/third_party/ant/ant.xml",
     "manipulator": _ROBOTS / "dmc/dm_control/suite/manipulator.xml",
-    "Newton's cradle": _ROBOTS / "mj/model/replicate/newton_cradle.xml",
+    "newton cradle": _ROBOTS / "mj/model/replicate/newton_cradle.xml",
 }
 PAIRS = tomllib.loads((HERE / "pairs.toml").read_text("utf-8"))
 _LESSONS = (
     *("objects", "state", "write", "forward", "hold", "gravity", "reset", "replay", "time"),
     *("speed", "questions"),
 )
-_AUDITED = {"arm with a box", "inverted pendulum", "fixed ant", "Newton's cradle"}
+_AUDITED = {"arm with a box", "inverted pendulum", "fixed ant", "newton cradle"}
 _EXPERIMENTS = ("hold", "gravity", "droop", "fall", "box", "waves")
 
 

@@ -105,14 +105,15 @@ def test_tests_are_chosen_by_line_room_and_time(tmp_path: Path) -> None:
     seconds |= {f"tests/test_other.py::{name}": 1 for name in ("elsewhere", "fails")}
     seconds |= {f"tests/test_page.py::{name}": 2 for name in ("first", "second")}
     seconds |= {"tests/test_golden.py::frozen": 1}
-    times = {"seconds": seconds, "failed": ["tests/test_other.py::fails"]}
+    fixtures = {"tests/test_page.py": 40.0}
+    times = {"seconds": seconds, "fixtures": fixtures, "failed": ["tests/test_other.py::fails"]}
     (tmp_path / "times.json").write_text(json.dumps(times), "utf-8")
     found = list(sites(_module(tmp_path), tmp_path))
     inside = next(site for site in found if site.lines == range(8, 9))
     covered = Covered(tmp_path)
     names = [test.partition("::")[2] for test in covered.tests(inside, 60)]
     assert names == ["slow", "quick", "first", "second"]
-    assert len(covered.tests(inside, 6.5)) == 2
+    assert len(covered.tests(inside, 6.5)) == len(covered.tests(inside, 40)) == 2
     at_import = next(site for site in found if not site.called)
     assert len(covered.tests(at_import, 60)) == 5
 
