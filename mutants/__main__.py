@@ -28,8 +28,7 @@ _STATES = ("killed", "survived", "timed out", "not covered", "gone")
 
 
 def _git(*arguments: str) -> str:
-    done = subprocess.run(["git", *arguments], cwd=ROOT, check=True, capture_output=True, text=True)
-    return done.stdout.strip()
+    return subprocess.check_output(["git", *arguments], cwd=ROOT, text=True).strip()
 
 
 def _copy(name: str) -> Path:
@@ -78,8 +77,7 @@ def _tried(site: Site, tests: list[str], tree: Path) -> tuple[str, str]:
             os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
     if running.returncode == 0:
         return "survived", ""
-    output = log.read_text("utf-8", errors="replace")
-    named = re.search(r"^(?:FAILED|ERROR) (\S+)", output, re.MULTILINE)
+    named = re.search(r"^(?:FAILED|ERROR) (\S+)", log.read_text(errors="replace"), re.MULTILINE)
     return "killed", named[1] if named else f"exit code {running.returncode}"
 
 
@@ -98,8 +96,8 @@ def _run(mutants: list[Mutant]) -> list[dict[str, object]]:
     covered = Covered(tested)
     chosen = [covered.tests(site, SECONDS / 3) if site else [] for _, site in found]
     log = tested / "tried.jsonl"  # typed again, what was interrupted goes on
-    lines = log.read_text("utf-8").splitlines() if log.exists() else []
-    tried = dict(json.loads(line) for line in lines)
+    log.touch()
+    tried = dict(json.loads(line) for line in log.read_text("utf-8").splitlines())
     free: SimpleQueue[Path] = SimpleQueue()
     for tree in trees:
         free.put(tree)

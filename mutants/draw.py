@@ -79,13 +79,6 @@ class Site:
         return text[: self.start] + self.mutant.becomes.encode() + text[self.stop :]
 
 
-def _is_text(node: ast.expr) -> bool:
-    text = ast.JoinedStr, ast.List, ast.Tuple
-    return isinstance(node, text) or (
-        isinstance(node, ast.Constant) and isinstance(node.value, str)
-    )
-
-
 def _faults(node: ast.AST) -> Iterator[tuple[str, str]]:
     """Kind and code of each fault that a node itself allows."""
     match node:
@@ -96,7 +89,12 @@ def _faults(node: ast.AST) -> Iterator[tuple[str, str]]:
                 others = [*operators[:place], _OTHER[type(operator)](), *operators[place + 1 :]]
                 yield "comparison", f"({ast.unparse(ast.Compare(left, others, right))})"
         case ast.BinOp(left=left, op=operator, right=right):
-            if type(operator) in _OTHER and not _is_text(left) and not _is_text(right):
+            lists = ast.JoinedStr, ast.List, ast.Tuple
+            text = any(
+                isinstance(side, lists) or isinstance(getattr(side, "value", None), str)
+                for side in (left, right)
+            )
+            if type(operator) in _OTHER and not text:
                 other = ast.BinOp(left, _OTHER[type(operator)](), right)
                 yield "sign", f"({ast.unparse(other)})"
         case ast.UnaryOp(op=ast.USub(), operand=operand):
@@ -150,8 +148,7 @@ def sites(file: Path, root: Path) -> Iterator[Site]:
         starts.append(starts[-1] + len(line))
     for statement, scope, called in _statements(ast.parse(text)):
         body = getattr(statement, "body", None) or getattr(statement, "cases", None)
-        printed = ast.unparse(statement)
-        printed = printed.partition("\n")[0] if body else printed
+        printed = ast.unparse(statement).partition("\n" if body else "\0")[0]
         end = statement.end_lineno or statement.lineno
         after = getattr(body[0], "lineno", end + 1) if body else end + 1
         lines = range(statement.lineno, max(after, statement.lineno + 1))
@@ -175,11 +172,8 @@ def all_sites(root: Path) -> list[Site]:
 
 def draw(count: int, seed: int) -> list[Mutant]:
     """Mutants of the package, each fault equally likely."""
-    mutants = sorted(
-        {site.mutant for site in all_sites(ROOT)}, key=lambda one: (one.file, str(one))
-    )
-    chosen = random.Random(seed).sample(mutants, count)
-    return sorted(chosen, key=str)
+    mutants = sorted({site.mutant for site in all_sites(ROOT)}, key=str)
+    return sorted(random.Random(seed).sample(mutants, count), key=str)
 
 
 def find(mutant: Mutant, standing: dict[tuple[str, str, int, str], list[Site]]) -> Site | None:

@@ -32,6 +32,8 @@ _LESSONS = (
     *("speed", "questions"),
 )
 _AUDITED = {"arm with a box", "inverted pendulum", "fixed ant", "newton cradle"}
+# Without them the lesson looks how fast the machine is.
+_LENGTHS = {"gravity": ("--seconds", "4", "--longer", "20")}
 _EXPERIMENTS = ("hold", "gravity", "droop", "fall", "box", "waves")
 
 
@@ -52,14 +54,16 @@ class Case:
     writes: str = ""
 
 
-def of_model(model: str, path: str) -> Iterator[Case]:
+def of_model(model: str) -> Iterator[Case]:
     """Every question about a model, on both engines."""
+    path = str(MODELS[model])
     both = ("--model", path, "--backend", "all")
     for name in _LESSONS:
         case = f"lesson {name}"
-        yield Case(case, case, ("lesson", name, *both, "--json"))
+        command = ("lesson", name, *both, *_LENGTHS.get(name, ()))
+        yield Case(case, case, (*command, "--json"))
         if name not in {"speed", "time"}:
-            yield Case(f"{case}, marks", "", ("lesson", name, *both, "--no-questions"))
+            yield Case(f"{case}, marks", "", (*command, "--no-questions"))
     for name in _EXPERIMENTS:
         command = ("compare", name, "--model", path, "--json")
         yield Case(f"compare {name}", "compare", command)
@@ -72,7 +76,8 @@ def of_model(model: str, path: str) -> Iterator[Case]:
     yield Case("fingertip", "fingertip", ("fingertip", *both, "--poses", "20", "--json"))
     if model in _AUDITED:
         yield Case("audit", "audit", ("audit", *both, "--steps", "10", "--json"))
-    file = path if Path(path).exists() else str(_shipped(path))
+    shipped = ROOT / "models" / (f"{path}.xml" if "/" in path else f"{path}/{path}.xml")
+    file = path if Path(path).exists() else str(shipped)
     yield Case("robots", "robots", ("robots", file, "--quick", "--json"))
     for engine in ("mujoco", "pybullet"):
         for name in ("waves", "gravity"):
@@ -81,12 +86,8 @@ def of_model(model: str, path: str) -> Iterator[Case]:
             yield Case(f"trace of {name}, {engine}", "", run, out)
 
 
-def _shipped(name: str) -> Path:
-    return ROOT / "models" / (f"{name}.xml" if "/" in name else f"{name}/{name}.xml")
-
-
-def of_pair(name: str, folder: Path) -> Iterator[Case]:
-    """What two files differ in, how far apart they run, and why."""
+def of_pair(name: str) -> Iterator[Case]:
+    """What two files differ in, how far apart they run, and why; writes the right one."""
     pair = PAIRS[name]
     source = HERE / "pairs" / pair["file"]
     other = HERE / "pairs" / pair.get("other", pair["file"])
@@ -95,7 +96,7 @@ def of_pair(name: str, folder: Path) -> Iterator[Case]:
         if before not in text:
             raise ValueError(f"{name}: {other.name} has no {before}")
         text = text.replace(before, after)
-    changed = folder / f"right{other.suffix}"
+    changed = Path(f"right{other.suffix}").resolve()
     changed.write_text(text, "utf-8")
     left, *told_left = f"{source}{pair.get('left', '')}".split()
     right, *told_right = f"{changed}{pair.get('right', '')}".split()

@@ -91,10 +91,8 @@ def of_output(text: str, kind: str) -> Figures:
 
 def _tolerance(key: str) -> tuple[float, float]:
     """Relative and absolute tolerance of a figure on other wheels and processors."""
-    for rule in _TOLERANCES:
-        if re.search(rule["keys"], key):
-            return rule["relative"], rule["absolute"]
-    raise KeyError(f"tolerances.toml has no rule for {key!r}")
+    rule = next(rule for rule in _TOLERANCES if re.search(rule["keys"], key))
+    return rule["relative"], rule["absolute"]
 
 
 def _close(old: Any, new: Any, relative: float, absolute: float) -> bool:

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from statemachine.cli import main as statemachine
+from statemachine.installed import ENGINES, engine_version
 
 from . import questions
 from .cases import HERE, MODELS, PAIRS, Case, of_model, of_pair
@@ -29,13 +30,12 @@ _BACKENDS = ("mujoco", "pybullet")
 
 def machine() -> dict[str, str]:
     """Wheels and kind of processor, on which the figures are the same to the bit."""
-    wheels = ("mujoco", "pybullet", "pin", "numpy", "scipy", "pyarrow")
     features = np._core._multiarray_umath.__cpu_features__  # pyright: ignore[reportAttributeAccessIssue]
     vectors = [name for name in ("AVX2", "AVX512F", "AVX512_SPR", "ASIMD") if features.get(name)]
-    kind = f"{platform.system()} {platform.machine()} {' '.join(vectors)}"
-    return {"processor": kind, "python": platform.python_version()[:4]} | {
-        name: version(name) for name in wheels
-    }
+    kind = " ".join((platform.system(), platform.machine(), *vectors))
+    engines = {name: engine_version(name) for name in ENGINES}
+    others = {name: version(name) for name in ("numpy", "scipy", "pyarrow")}
+    return {"processor": kind, "python": platform.python_version()[:4], **engines, **others}
 
 
 def _of(case: Case) -> Figures:
@@ -55,25 +55,21 @@ def _of(case: Case) -> Figures:
     return figures
 
 
-def _commands(cases: Iterable[Case]) -> dict[str, Figures]:
-    return {case.name: _of(case) for case in cases}
+def _commands(cases: Callable[..., Iterable[Case]], *of: str) -> dict[str, Figures]:
+    return {case.name: _of(case) for case in cases(*of)}
 
 
 def _engines() -> dict[str, Figures]:
     """Every convention, the contract, and a Data of each engine."""
-    asked = _commands([Case("conventions", "conventions", ("conventions", "--json"))])
+    asked = {"conventions": _of(Case("", "conventions", ("conventions", "--json")))}
     for backend in _BACKENDS:
         asked[f"contract, {backend}"] = questions.contract(backend)
         asked[f"Data, {backend}"] = questions.one_data(backend)
     return asked
 
 
-def _worlds() -> dict[str, Figures]:
-    return {backend: questions.many_worlds(backend) for backend in _BACKENDS}
-
-
-def _tasks() -> dict[str, Figures]:
-    return {backend: questions.tasks(backend) for backend in _BACKENDS}
+def _on_each(question: Callable[[str], Figures]) -> dict[str, Figures]:
+    return {backend: question(backend) for backend in _BACKENDS}
 
 
 def _sweep() -> dict[str, Figures]:
@@ -81,34 +77,27 @@ def _sweep() -> dict[str, Figures]:
     vary = ("--vary", "timestep=0.002,0.005", "--vary", "damping=0.5x:2x:3", "--seeds", "2")
     sweep = ("sweep", "hold", *vary, "--seconds", "0.5", "--out", "cells", "--jobs", "1", "--json")
     report = ("sweep", "--report", "cells", "--jobs", "1", "--json")
-    return _commands([Case("sweep", "sweep", sweep), Case("report", "report", report)])
+    return {"sweep": _of(Case("", "sweep", sweep)), "report": _of(Case("", "report", report))}
 
 
 def _students() -> dict[str, Figures]:
     """What the judge says of each attempt, and of the solutions."""
     files = dict(questions.student_files(Path.cwd()))
     files["the solution"] = HERE.parent / "teaching" / "solutions" / "step_loop.py"
-    return _commands(
-        Case(name, "check", ("check", str(file), "--json")) for name, file in files.items()
-    )
-
-
-def _pair(name: str) -> dict[str, Figures]:
-    return _commands(of_pair(name, Path.cwd()))
-
-
-def _model(name: str) -> dict[str, Figures]:
-    return _commands(of_model(name, str(MODELS[name])))
+    return {
+        name: _of(Case(name, "check", ("check", str(file), "--json")))
+        for name, file in files.items()
+    }
 
 
 GROUPS: dict[str, Callable[[], dict[str, Figures]]] = {
     "engines": _engines,
-    "worlds": _worlds,
-    "tasks": _tasks,
+    "worlds": partial(_on_each, questions.many_worlds),
+    "tasks": partial(_on_each, questions.tasks),
     "sweep": _sweep,
     "students": _students,
-    **{f"pair {name}": partial(_pair, name) for name in PAIRS},
-    **{name: partial(_model, name) for name in MODELS},
+    **{f"pair {name}": partial(_commands, of_pair, name) for name in PAIRS},
+    **{name: partial(_commands, of_model, name) for name in MODELS},
 }
 
 

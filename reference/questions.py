@@ -15,6 +15,7 @@ import numpy as np
 import statemachine as sm
 from statemachine import conformance
 from statemachine.gym.policies import play, random_policy, scripted_policy
+from statemachine.interface import DERIVED
 from statemachine.worlds import get_state, make_worlds, record, reset, set_state, step
 
 from .figures import Figures, curve
@@ -41,9 +42,7 @@ def one_data(backend: str) -> Figures:
             futures.append(np.concatenate([data.qpos, data.qvel]))
         figures["two restores have the same future"] = bool(np.array_equal(*futures))
         sm.forward(model, data)
-        names = ["xpos", "xquat", "site_xpos", "site_xmat", "qacc", "qfrc_bias", "qfrc_actuator"]
-        names += ["qfrc_passive", "qfrc_constraint", "qfrc_contact", "qfrc_friction", "qfrc_limit"]
-        figures |= {name: curve(getattr(data, name)) for name in names}
+        figures |= {name: curve(getattr(data, name)) for name in DERIVED}
         figures["contacts"] = len(data.contacts)
         figures["time [s]"] = data.time
     return figures

@@ -19,10 +19,12 @@ _CONDITIONAL = re.compile(r"\{%-?\s*(?:el)?if\b|<!--\s*if\b")
 
 def statements(tree: ast.AST) -> int:
     """Without imports and docstrings: squeezing text or formatting gains nothing."""
-    nodes = [node for node in ast.walk(tree) if isinstance(node, ast.stmt)]
-    text = [isinstance(n, ast.Expr) and isinstance(n.value, ast.Constant) for n in nodes]
-    imports = [isinstance(node, ast.Import | ast.ImportFrom) for node in nodes]
-    return len(nodes) - sum(text) - sum(imports)
+    return sum(
+        isinstance(node, ast.stmt)
+        and not isinstance(node, ast.Import | ast.ImportFrom)
+        and not (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant))
+        for node in ast.walk(tree)
+    )
 
 
 def _trees(files: Iterable[Path]) -> list[ast.AST]:
@@ -54,13 +56,16 @@ def counts(root: Path = ROOT) -> dict[str, int]:
 
 def beyond(found: dict[str, int], limits: dict[str, dict[str, dict[str, int]]]) -> list[str]:
     """A line for what is larger than its limit, and for what has none."""
-    lines = []
-    for key, count in sorted(found.items()):
-        room, what = key.split(".")
-        limit = limits.get(room, {}).get(what, {}).get("limit", 0)
-        if count > limit:
-            lines.append(f"size.toml: {room}, {what}: {count}, and the limit is {limit}")
-    return lines
+    allowed = {
+        f"{room}.{what}": row["limit"]
+        for room, rows in limits.items()
+        for what, row in rows.items()
+    }
+    return [
+        f"size.toml: {key} is {count}, and the limit {allowed.get(key, 0)}"
+        for key, count in sorted(found.items())
+        if count > allowed.get(key, 0)
+    ]
 
 
 def lowered(text: str, found: dict[str, int]) -> str:
