@@ -89,10 +89,10 @@ class Covered:
             found.update(self._of_file[file] if stage == "setup)" else [test])
         rooms = set(site.mutant.file.removesuffix(".py").replace("/", "_").split("_")[1:])
 
-        def order(test: str) -> tuple[bool, float]:
+        def order(test: str) -> tuple[bool, float, str]:
             file = test.partition("::")[0]
             own = rooms & set(file.removesuffix(".py").split("_")[1:])
-            return not own, self._seconds[test] + self._fixtures.get(file, 0.0)
+            return not own, self._seconds[test] + self._fixtures.get(file, 0.0), test
 
         chosen: list[str] = []
         prepared: set[str] = set()
