@@ -83,7 +83,6 @@ fuzz: $(VENV)/test.stamp
 	@$(BIN)/python -m fuzz --seed $(SEED) --times $(TIMES)
 
 mutate: $(VENV)/test.stamp
-	@$(PIP) $(CONSTRAINTS) -e '.[mutate]'
 	@$(BIN)/python -m mutants
 
 # make reference    which figure is another than before the house became smaller?

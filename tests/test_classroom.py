@@ -212,7 +212,7 @@ def test_what_was_skipped_is_a_row_with_the_reason(folder: Path, judged: list[st
             "or a reset without keyframe=0",
             "that is a new Data",
         ),
-        ("not graded: it reads /home/t/bob.py, which was not", "not graded: it reads bob.py"),
+        ("not graded: it reads /class/t/bob.py, which was not", "not graded: it reads bob.py"),
         ("line 2: ZeroDivisionError: division by zero (in `x`)",
          "line 2: ZeroDivisionError: division by zero"),
     ],

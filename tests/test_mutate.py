@@ -8,16 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-
-from .conftest import ROOT
-
-pytest.importorskip("coverage", reason="the extra 'mutate' is not installed")
-
 from coverage import CoverageData
 
 from mutants import __main__ as run
 from mutants.covered import Covered
 from mutants.draw import Mutant, Site, all_sites, find, sites
+
+from .conftest import ROOT
 
 SOURCE = '''"""A module."""
 LIMIT = 3

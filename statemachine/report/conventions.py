@@ -37,7 +37,9 @@ def calls_page(result: Phrasebook) -> Page:
             call = next((each for each in calls if each.concept == concept), None)
             mark = "✓" if call and call.works else "✗" if call else ""
             rows.append((engine, mark, call.code if call else _NOT_ASKED))
-        blocks.append(Table(("", "", "what to type"), rows, concept, frozenset({0, 1, 2})))
+        blocks.append(
+            Table(("", "", "what to type"), rows, concept, frozenset({0, 1, 2}), code=True)
+        )
     every = [(engine, call) for engine, calls in result.engines.items() for call in calls]
     wrong = [(engine, call) for engine, call in every if not call.works]
     blocks += [Verdict(f"{engine}, {call.concept}: {call.said}", False) for engine, call in wrong]
