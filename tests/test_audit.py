@@ -32,7 +32,7 @@ from statemachine.cli import main
 from statemachine.engines.auditing import Driver, ReferenceRun
 from statemachine.engines.futures import Coordinates, FutureGap, gap
 from statemachine.engines.mujoco.audit import MujocoDriver
-from statemachine.errors import BadInputError
+from statemachine.errors import BadInputError, EngineWarning
 from statemachine.installed import require
 from statemachine.report import audit as report
 
@@ -277,9 +277,11 @@ def test_where_a_run_diverges_it_is_not_saved(tmp_path: Path) -> None:
         <geom size=".1" pos=".3 0 0"/></body></worldbody>
         <actuator><position joint="j" kp="9e4" ctrlrange="-1 1"/></actuator></mujoco>"""
     )
+    with pytest.warns(EngineWarning, match="stiffness of joint j is negative"):
+        model = sm.load(file)
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # nothing is said of it but that
-        result = audit.run(sm.load(file), steps=20)
+        result = audit.run(model, steps=20)
     assert result.holds
     assert {each.point for each in result.audited[0].points} == {"default", "motion", "clock"}
     assert "limp: the run diverges" in result.without
