@@ -521,7 +521,6 @@ def test_no_process_outlives_one_that_is_killed_in_a_step(number: signal.Signals
 @pytest.mark.slow
 def test_ctrl_c_while_the_processes_start() -> None:
     run = script(_SCRIPT, start_new_session=True)
-    time.sleep(1.2)
     children: list[int] = []
     deadline = time.monotonic() + 30
     while not children and time.monotonic() < deadline:
