@@ -24,9 +24,9 @@ from benchmarks.interleave import NULL, Ratio, interleaved
 from statemachine import __version__
 from statemachine.compare.why import explain
 from statemachine.compare.why.causes import built
-from statemachine.scenarios import scenario
-from statemachine.scenarios.runs import silent
-from statemachine.traces import recorder
+from statemachine.runs import recorder
+from statemachine.runs.drive import silent
+from statemachine.runs.scenarios import scenario
 from statemachine.worlds import make_worlds
 from statemachine.worlds import step as step_worlds
 

@@ -17,7 +17,7 @@ import numpy as np
 
 import statemachine as sm
 from statemachine.errors import MissingEngineError, TraceError
-from statemachine.traces import Trace, files, record, write
+from statemachine.runs import Trace, files, record, write
 
 from ._tally import Tally
 

@@ -11,7 +11,7 @@ import numpy as np
 
 import statemachine as sm
 from statemachine.compare.why import Explanation, explain
-from statemachine.scenarios import Scenario
+from statemachine.runs.scenarios import Scenario
 
 # Two links on servos above a floor, a ball on the floor, and a weight on a spring.
 ARM = """

@@ -18,9 +18,9 @@ from statemachine.compare import compare
 from statemachine.lessons import LESSONS
 from statemachine.lessons.session import page_of_lesson, take
 from statemachine.page import Page, Table, Text, Verdict
-from statemachine.scenarios import SCENARIOS, fitting
-from statemachine.scenarios.commands import hold_ctrl, is_servo
-from statemachine.traces import record_scenario
+from statemachine.runs import record_scenario
+from statemachine.runs.commands import hold_ctrl, is_servo
+from statemachine.runs.scenarios import SCENARIOS, fitting
 
 from .conftest import need_engine
 

@@ -26,14 +26,14 @@ from statemachine.compare import (
 )
 from statemachine.compare.series import normal_forces, total_forces
 from statemachine.compare.tolerances import COUNT
-from statemachine.comparison import parse_tolerances
 from statemachine.errors import BadInputError, MissingEngineError, TraceError, UnknownNameError
 from statemachine.installed import available
+from statemachine.measures import parse_tolerances
 from statemachine.page import Text
 from statemachine.report import compare as report
 from statemachine.report import terminal
-from statemachine.scenarios import SCENARIOS
-from statemachine.traces import Trace, record, record_scenario, write
+from statemachine.runs import Trace, record, record_scenario, write
+from statemachine.runs.scenarios import SCENARIOS
 
 from .conftest import ROOT, Cli, need_engine
 

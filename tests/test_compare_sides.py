@@ -23,8 +23,8 @@ from statemachine.compare import (
 from statemachine.errors import BadInputError, StateMachineError, TraceError, UnknownNameError
 from statemachine.report import compare as report
 from statemachine.report import terminal
-from statemachine.traces import record, write
-from statemachine.traces.controllers import command_function, controller_from
+from statemachine.runs import record, write
+from statemachine.runs.controllers import command_function, controller_from
 
 from .conftest import Cli, need_engine
 

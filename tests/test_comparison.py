@@ -9,11 +9,11 @@ import pytest
 
 import statemachine as sm
 from statemachine.compare import compare, touches
-from statemachine.comparison import ContactNames, Gap, largest, nearest, same_pairs, text, together
+from statemachine.measures import ContactNames, Gap, largest, nearest, same_pairs, text, together
 from statemachine.report.events import events_of
 from statemachine.report.plot_panels import of_trace
-from statemachine.scenarios import SCENARIOS
-from statemachine.traces import Trace, record, record_scenario, shipped
+from statemachine.runs import Trace, record, record_scenario, shipped
+from statemachine.runs.scenarios import SCENARIOS
 
 from .conftest import lesson_result
 

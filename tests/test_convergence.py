@@ -11,7 +11,7 @@ import statemachine as sm
 from statemachine.compare import TimestepConvergence, convergence
 from statemachine.errors import EndedEarlyError
 from statemachine.report.convergence import page
-from statemachine.traces import Trace, record
+from statemachine.runs import Trace, record
 
 from .conftest import Cli, need_engine
 

@@ -20,7 +20,7 @@ from statemachine.lessons._tips import random_qpos
 from statemachine.lessons.speed import Speed
 from statemachine.models import models_dir
 from statemachine.page import Verdict
-from statemachine.scenarios.provenance import provenance
+from statemachine.runs.provenance import provenance
 
 from .conftest import lesson_result, need_engine
 

@@ -10,7 +10,7 @@ import pytest
 import statemachine as sm
 from statemachine.compare.why import Explanation, explain
 from statemachine.compare.why.shapley import shapley
-from statemachine.scenarios import scenario
+from statemachine.runs.scenarios import scenario
 
 from .conftest import ROOT, need_engine
 from .explained import (

@@ -15,7 +15,7 @@ from statemachine.compare.why.causes import differences_of
 from statemachine.engines.mujoco.differences import edited
 from statemachine.errors import StateMachineError
 from statemachine.interface import Model
-from statemachine.scenarios import SCENARIOS, fitting
+from statemachine.runs.scenarios import SCENARIOS, fitting
 
 from .conftest import SHARED, shared
 

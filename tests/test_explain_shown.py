@@ -15,7 +15,7 @@ from statemachine.cli import main
 from statemachine.compare import Request, Side
 from statemachine.compare import why as instrument
 from statemachine.compare.why import Explanation, explain
-from statemachine.comparison.text import capital, percent
+from statemachine.measures.text import capital, percent
 from statemachine.report.why_words import three
 
 from . import test_explain as known

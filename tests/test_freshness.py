@@ -14,8 +14,6 @@ import pytest
 
 import statemachine as sm
 from statemachine.backends.mujoco_backend import MujocoData
-from statemachine.comparison import Gap
-from statemachine.comparison.readings import readings
 from statemachine.errors import (
     BadInputError,
     ClosedDataError,
@@ -24,6 +22,8 @@ from statemachine.errors import (
     StaleReadError,
 )
 from statemachine.interface import DERIVED, POSES, Data, Model
+from statemachine.measures import Gap
+from statemachine.measures.readings import readings
 from statemachine.report.as_json import plain
 from statemachine.rotations import matrix_from_quat
 from statemachine.staleness import age

@@ -15,7 +15,7 @@ import statemachine as sm
 from fuzz import command_lines, kills, mjb, models, threads, traces
 from fuzz.__main__ import run_apart, targets
 from statemachine.errors import BusyDataError
-from statemachine.traces import parquet_files
+from statemachine.runs import parquet_files
 
 from .conftest import ROOT, in_its_own_python
 
@@ -126,7 +126,7 @@ def test_a_reader_of_models_that_fails_is_found(monkeypatch: pytest.MonkeyPatch)
 # Writes in place, and the second file after a moment.
 IN_PLACE = """
 import contextlib, time
-from statemachine.traces import csv_files, whole
+from statemachine.runs import csv_files, whole
 @contextlib.contextmanager
 def beside(*targets):
     yield [str(target) for target in targets]

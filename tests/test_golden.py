@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.scenarios import TARGET
+from statemachine.runs.scenarios import TARGET
 
 Golden = Callable[[str], np.ndarray]
 

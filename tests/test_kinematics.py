@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 import statemachine as sm
 from statemachine.errors import BadInputError, ModelError, ModelFileError, UnknownNameError
 from statemachine.rotations import matrix_from_quat
-from statemachine.scenarios.provenance import model_digest
+from statemachine.runs.provenance import model_digest
 
 pytestmark = pytest.mark.usefixtures("pinocchio")
 

@@ -36,8 +36,8 @@ from statemachine.lessons.session import CodeRun, CodeWatch, Taken, load_line, p
 from statemachine.page import Code, Heading, Page, Printed, Question, Table, Text, Traces, Verdict
 from statemachine.report import progress as bar
 from statemachine.report import quiz
-from statemachine.scenarios import SCENARIOS
-from statemachine.traces.recorder import record_scenario
+from statemachine.runs.recorder import record_scenario
+from statemachine.runs.scenarios import SCENARIOS
 
 from .conftest import ROOT, Cli, lesson_result, need_engine
 

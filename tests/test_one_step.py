@@ -12,7 +12,7 @@ from statemachine.compare.one_step import RELATIVE
 from statemachine.compare.perturbed import Rerun
 from statemachine.compare.stages import STAGES
 from statemachine.errors import BadInputError
-from statemachine.scenarios import scenario
+from statemachine.runs.scenarios import scenario
 
 from .conftest import need_engine
 

@@ -249,7 +249,7 @@ def test_pybullet_as_it_comes_has_none_of_them() -> None:
 
 def test_energies_are_those_of_the_changed_mass() -> None:
     need_engine("pybullet")
-    from statemachine.traces.energy import energies
+    from statemachine.runs.energy import energies
 
     found = []
     for backend in ("mujoco", "pybullet"):

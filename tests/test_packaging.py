@@ -53,7 +53,7 @@ def test_the_wheel_holds_the_models_and_nothing_else(wheel: Path) -> None:
     assert "statemachine/py.typed" in names
     for name in ("page.html", "page.css", "page.js", "scene.js", "gl.js"):
         assert f"statemachine/report/html/{name}" in names
-    assert "statemachine/traces/recorded/hold.pybullet.npz" in names
+    assert "statemachine/runs/recorded/hold.pybullet.npz" in names
     tops = {name.split("/")[0] for name in names}
     assert {top for top in tops if not top.endswith(".dist-info")} == {
         "statemachine",

@@ -30,7 +30,7 @@ from statemachine.rendering.motion import corners, rows_at
 from statemachine.report.film import Film, write_film
 from statemachine.report.film_overlay import Overlay, Strip
 from statemachine.report.plot import drawn, plot, plot_trace, write_plot
-from statemachine.traces import Trace, record, shipped, write
+from statemachine.runs import Trace, record, shipped, write
 
 from .conftest import ROOT, Cli, need_engine
 from .rendering import rendering_environment, silhouettes

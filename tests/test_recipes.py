@@ -19,8 +19,8 @@ RECIPES = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
 # Where a recipe says "in QUANTITIES": how the line of the file begins after which its lines go.
 PLACES = {
     "statemachine/lessons/__init__.py, in LESSONS": "    for lesson in (",
-    "statemachine/comparison/quantities.py, in QUANTITIES": '        Quantity("force"',
-    "statemachine/comparison/quantities.py, in _SUFFIXES": "_SUFFIXES = (",
+    "statemachine/measures/quantities.py, in QUANTITIES": '        Quantity("force"',
+    "statemachine/measures/quantities.py, in _SUFFIXES": "_SUFFIXES = (",
     "statemachine/compare/series.py, in series": "            found += _joint(",
     "statemachine/compare/tolerances.py, in tolerance_for": "        return Tolerance(given[",
     "statemachine/conventions/__init__.py, in QUESTIONS": '    "timestep",',

@@ -23,9 +23,9 @@ from statemachine.compare import Comparison, compare, series, sides_of, touches
 from statemachine.compare.series import total_forces
 from statemachine.compare.sides import Request
 from statemachine.compare.why import Attribution, Deviation, FactorTrial, FirstTouch
-from statemachine.comparison.text import quantity
 from statemachine.drawing import drawing_of
 from statemachine.errors import BadInputError
+from statemachine.measures.text import quantity
 from statemachine.page import (
     Block,
     Headline,
@@ -49,8 +49,8 @@ from statemachine.report.html.geometry import bones_of, mesh_of, octahedral
 from statemachine.report.html.timeline import frames_of
 from statemachine.report.markdown import markdown
 from statemachine.report.over_time import chart_of
-from statemachine.scenarios import SCENARIOS
-from statemachine.traces import Trace, record_scenario, shipped, write
+from statemachine.runs import Trace, record_scenario, shipped, write
+from statemachine.runs.scenarios import SCENARIOS
 
 from .browser import Tab, browser
 from .conftest import ROOT, Cli, need_engine

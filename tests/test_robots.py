@@ -31,9 +31,9 @@ from statemachine.robots import (
     many,
 )
 from statemachine.robots import table as tables
-from statemachine.scenarios import scenario
-from statemachine.scenarios.provenance import model_files
-from statemachine.traces import record_scenario
+from statemachine.runs import record_scenario
+from statemachine.runs.provenance import model_files
+from statemachine.runs.scenarios import scenario
 
 from .conftest import ROOT, Cli, need_engine
 

@@ -23,9 +23,9 @@ from statemachine.errors import BadInputError, ModelFileError, TraceError
 from statemachine.interface import JointType
 from statemachine.report import compare as report
 from statemachine.report import terminal
-from statemachine.scenarios import SCENARIOS
-from statemachine.traces import Trace, model_file, read, record, write
-from statemachine.traces.whole import check_place, replace_file
+from statemachine.runs import Trace, model_file, read, record, write
+from statemachine.runs.scenarios import SCENARIOS
+from statemachine.runs.whole import check_place, replace_file
 
 from .conftest import Cli, need_engine
 

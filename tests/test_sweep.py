@@ -22,7 +22,8 @@ import pytest
 import statemachine as sm
 from statemachine.cli import main
 from statemachine.errors import BadInputError, MissingEngineError, StateMachineError
-from statemachine.scenarios import scenario
+from statemachine.runs import record_scenario
+from statemachine.runs.scenarios import scenario
 from statemachine.sweep import (
     COLUMNS,
     Design,
@@ -38,7 +39,6 @@ from statemachine.sweep.factors import parse_vary, with_kinds
 from statemachine.sweep.folder import locked, settle_manifest
 from statemachine.sweep.rows import KEY, MEASURED, RowWriter, counted, remove_failed
 from statemachine.sweep.worker import run_batch
-from statemachine.traces import record_scenario
 
 from .conftest import ROOT, in_its_own_python, need_engine
 

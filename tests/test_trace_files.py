@@ -18,7 +18,7 @@ from numpy.lib import format as npy
 
 import statemachine as sm
 from statemachine.errors import TraceError
-from statemachine.traces import Trace, export_csv, parquet_files, read, record, whole, write
+from statemachine.runs import Trace, export_csv, parquet_files, read, record, whole, write
 
 from .conftest import Cli
 
@@ -242,7 +242,7 @@ def test_a_csv_and_its_contacts_are_replaced_together(
         raise OSError(28, "No space left on device")
 
     before = table.read_bytes()
-    monkeypatch.setattr("statemachine.traces.csv_files._write_contacts", full)
+    monkeypatch.setattr("statemachine.runs.csv_files._write_contacts", full)
     with pytest.raises(OSError, match="No space"):
         export_csv(box, table)
     assert table.read_bytes() == before

@@ -22,8 +22,7 @@ from statemachine.errors import (
     TraceError,
     UnknownNameError,
 )
-from statemachine.scenarios import SCENARIOS
-from statemachine.traces import (
+from statemachine.runs import (
     COLUMNS,
     CONTACTS,
     Trace,
@@ -36,7 +35,8 @@ from statemachine.traces import (
     shipped_names,
     write,
 )
-from statemachine.traces.controllers import controller_from
+from statemachine.runs.controllers import controller_from
+from statemachine.runs.scenarios import SCENARIOS
 
 from .conftest import ROOT, Cli, need_engine
 
@@ -223,7 +223,7 @@ def test_a_controller_that_kicks_is_repeated_exactly(backend: str) -> None:
 
 
 def test_an_engine_that_does_not_repeat_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    from statemachine.traces import recorder
+    from statemachine.runs import recorder
 
     honest, calls = recorder.step, []
 
@@ -335,7 +335,7 @@ def test_opening_one_needs_no_engine(tmp_path: Path, box: Trace) -> None:
     code = (
         "import sys\n"
         "for name in ('mujoco', 'pybullet', 'pinocchio'): sys.modules[name] = None\n"
-        "from statemachine.traces import read\n"
+        "from statemachine.runs import read\n"
         "from statemachine.compare import compare\n"
         f"trace = read({str(path)!r})\n"
         "print(len(trace), compare(trace, trace).agrees)"

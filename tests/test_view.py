@@ -20,7 +20,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.errors import BadInputError, TraceError, UnknownNameError
-from statemachine.traces import record, write
+from statemachine.runs import record, write
 from statemachine.view import frames, words
 from statemachine.view.frames import (
     Command,

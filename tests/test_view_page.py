@@ -15,7 +15,7 @@ import pytest
 
 import statemachine as sm
 from statemachine.drawing import drawing_of
-from statemachine.traces import record
+from statemachine.runs import record
 from statemachine.view import server as serving
 from statemachine.view.door import Door
 from statemachine.view.frames import Pause, Play, ResetTo, SetCtrl

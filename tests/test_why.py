@@ -22,8 +22,8 @@ from statemachine.interface import Model
 from statemachine.report import terminal
 from statemachine.report import why as report
 from statemachine.report.as_json import dumps
-from statemachine.scenarios import Scenario, scenario
-from statemachine.traces import record_scenario
+from statemachine.runs import record_scenario
+from statemachine.runs.scenarios import Scenario, scenario
 
 from .conftest import ROOT, Cli, need_engine, registered
 
@@ -341,7 +341,7 @@ def test_as_it_comes_is_what_a_user_of_pybullet_gets(tmp_path: Path) -> None:
     import pybullet as pb
 
     from statemachine.engines.pybullet.dials import dials
-    from statemachine.scenarios import TARGET
+    from statemachine.runs.scenarios import TARGET
 
     fresh = quietly("so101/scene", defaults="engine")
     found = dials(fresh, {})

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Literal
 
 import statemachine as sm
-from statemachine.scenarios import SCENARIOS
-from statemachine.traces import Trace, record_scenario, write
+from statemachine.runs import Trace, record_scenario, write
+from statemachine.runs.scenarios import SCENARIOS
 
 FOLDER = Path(__file__).resolve().parents[2] / "statemachine" / "traces" / "recorded"
 

@@ -16,8 +16,8 @@ from ..engines.auditing import Driver, Measured, ReferenceRun, SavePoint
 from ..errors import BadInputError, DivergedError
 from ..interface import Model
 from ..interface.checks import as_count
-from ..scenarios.provenance import Provenance, provenance
-from ..scenarios.runs import Progress, silent
+from ..runs.drive import Progress, silent
+from ..runs.provenance import Provenance, provenance
 from . import apart, elsewhere, falls, look, repeat, restore
 from .conclusions import Conclusion, conclude
 from .drivers import drivers_of

@@ -152,7 +152,7 @@ def _look(request: Any, trace: Any, place: int) -> Any:
     from ..backends import load
     from ..drawing import drawing_of
     from ..report.html import SideDrawing
-    from ..scenarios.provenance import provenance
+    from ..runs.provenance import provenance
 
     header = trace.header
     file = header.provenance.model_file
@@ -172,7 +172,7 @@ def _look(request: Any, trace: Any, place: int) -> Any:
 
 def _typed(options: argparse.Namespace, request: Any) -> str:
     """The command as typed, without folders of this machine."""
-    from ..comparison.text import command
+    from ..measures.text import command
 
     words = [PROGRAM, "compare", *(Path(word).name for word in request.what)]
     words += [side.label for side in request.sides]

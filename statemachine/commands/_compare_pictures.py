@@ -76,7 +76,7 @@ def checked(options: argparse.Namespace) -> Pictures:
         BadInputError: A file has another suffix or cannot be written, or a figure is none.
         MissingEngineError: An extra is missing, or nothing here can draw a film.
     """
-    from ..traces.whole import check_place
+    from ..runs.whole import check_place
 
     plot, film = (None if word is None else Path(word) for word in (options.plot, options.film))
     if plot is not None:
@@ -167,7 +167,7 @@ def write(
 def _models(options: Any, files: Any, *traces: Any) -> Any:
     """What the traces are drawn with; a word where it is not what they were recorded with."""
     from ..backends import load
-    from ..scenarios.provenance import provenance
+    from ..runs.provenance import provenance
 
     models = []
     for k, trace in enumerate(traces):

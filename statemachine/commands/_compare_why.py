@@ -149,7 +149,7 @@ def explain(request: Any, quantity: str | None, progress: Any, uncertain: Any) -
     """
     from ..backends import load
     from ..compare.why import attribute
-    from ..scenarios import scenario
+    from ..runs.scenarios import scenario
 
     asked = scenario(request.what[0])
     asked = replace(asked, options={**asked.options, **request.options})

@@ -109,7 +109,7 @@ def check(options: argparse.Namespace) -> None:
         check_target(options.html)
     if options.plot is not None:
         from ..report.figures import check_suffix
-        from ..traces.whole import check_place
+        from ..runs.whole import check_place
 
         check_suffix(options.plot)
         check_place(options.plot)
@@ -117,7 +117,7 @@ def check(options: argparse.Namespace) -> None:
 
 def report(options: argparse.Namespace, folder: str | Path) -> tuple[Any, Any]:
     """The report of a dataset, and its page; what is to be written is written."""
-    from ..comparison import parse_tolerances
+    from ..measures import parse_tolerances
     from ..report import sweep_report as words
     from ..report.progress import progress
     from ..sweep.analysis import FLOOR_CELLS, sweep_report

@@ -84,7 +84,7 @@ def run(options: argparse.Namespace) -> int:
     if (not options.files) == (options.mutants is None):
         options.parser.error("expected one of FILE and --mutants TESTFILE")
     from ..grading.classroom import is_one_students
-    from ..traces.whole import check_place
+    from ..runs.whole import check_place
 
     folder = any(Path(file).is_dir() for file in options.files)
     table = options.csv or options.roster or options.tests or options.jobs is not None
@@ -132,7 +132,7 @@ def _one(options: argparse.Namespace) -> int:
 
 def _gradescope(target: Path, grade: Any, refusal: str) -> None:
     from ..report import gradescope
-    from ..traces.whole import replace_text
+    from ..runs.whole import replace_text
 
     replace_text(target, gradescope.results(grade, refusal))
 

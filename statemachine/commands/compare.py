@@ -172,7 +172,7 @@ def request_of(options: argparse.Namespace) -> Any:
 
 def _check_sides(options: argparse.Namespace, what: tuple[str, ...], sides: Any) -> None:
     """Refuse an option that has no meaning for what was asked."""
-    from ..traces.controllers import is_function
+    from ..runs.controllers import is_function
 
     if sides:
         for name, instead in (
@@ -233,7 +233,7 @@ def _run_why(options: argparse.Namespace) -> int:
 
 def _run_compare(options: argparse.Namespace, why_not: str = "") -> int:
     from ..compare import compare, run_sides, sides_of, touches, witness
-    from ..comparison import parse_tolerances
+    from ..measures import parse_tolerances
     from ..report import compare as report
     from ..report.progress import progress
 

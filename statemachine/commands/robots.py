@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     from ..report.progress import progress
     from ..robots import examine_all, find
     from ..robots.table import check_suffix
-    from ..traces.whole import check_place
+    from ..runs.whole import check_place
 
     out = Path(options.out) if options.out else None
     if out is not None:

@@ -126,9 +126,9 @@ def run_record(options: argparse.Namespace) -> int:
         )
     from ..backends import load
     from ..report.progress import progress
-    from ..scenarios import scenario
-    from ..traces import record, record_scenario
-    from ..traces.controllers import controller_from
+    from ..runs import record, record_scenario
+    from ..runs.controllers import controller_from
+    from ..runs.scenarios import scenario
 
     changes = {} if options.timestep is None else {"timestep": options.timestep}
     asked = None if options.what is None else scenario(options.what)
@@ -173,7 +173,7 @@ def run_play(options: argparse.Namespace) -> int:
     """Play a trace's commands on an engine, and write what came of it."""
     from ..backends import load
     from ..report.progress import progress
-    from ..traces import model_file, play, read
+    from ..runs import model_file, play, read
 
     trace = read(options.file)
     target = _target(options.output, f"{Path(options.file).stem}.{options.backend}.npz")
@@ -208,7 +208,7 @@ def run_play(options: argparse.Namespace) -> int:
 
 def _typed_play(options: argparse.Namespace) -> str:
     """The command that plays this again, without paths of this machine."""
-    from ..comparison.text import command
+    from ..measures.text import command
 
     return one_line(
         command(
@@ -222,7 +222,7 @@ def _typed_play(options: argparse.Namespace) -> str:
 def run_show(options: argparse.Namespace) -> int:
     """What is in a trace."""
     from ..report import trace as report
-    from ..traces import read
+    from ..runs import read
 
     trace = read(options.file)
     return show(report.page(trace, Path(options.file).name), trace.header, options.json)
@@ -230,7 +230,7 @@ def run_show(options: argparse.Namespace) -> int:
 
 def run_csv(options: argparse.Namespace) -> int:
     """Export."""
-    from ..traces import export_csv, read
+    from ..runs import export_csv, read
 
     trace = read(options.file)
     target = _target(options.output, f"{Path(options.file).stem}.csv", (".csv",))
@@ -241,7 +241,7 @@ def run_csv(options: argparse.Namespace) -> int:
 
 def run_pictures(options: argparse.Namespace) -> int:
     """A figure or a film of one trace."""
-    from ..traces import read
+    from ..runs import read
 
     name = options.picture
     usual = f"{Path(options.file).stem}.{'svg' if name == 'plot' else 'webp'}"
@@ -255,8 +255,8 @@ def run_pictures(options: argparse.Namespace) -> int:
 
 def _target(given: str | None, usual: str, suffixes: tuple[str, ...] = ()) -> Path:
     """Where to write, refused before anything runs if that cannot be."""
-    from ..traces.files import SUFFIXES
-    from ..traces.whole import check_place
+    from ..runs.files import SUFFIXES
+    from ..runs.whole import check_place
 
     target = Path(given or usual)
     known = suffixes or SUFFIXES
@@ -267,7 +267,7 @@ def _target(given: str | None, usual: str, suffixes: tuple[str, ...] = ()) -> Pa
 
 
 def _written(trace: Any, target: Path) -> int:
-    from ..traces import write
+    from ..runs import write
 
     again = " (the file that was there is replaced)" if target.exists() else ""
     path = write(trace, target)
@@ -287,7 +287,7 @@ def _written(trace: Any, target: Path) -> int:
 
 def _typed(options: argparse.Namespace) -> str:
     """The command that records this again, without paths of this machine."""
-    from ..comparison.text import command
+    from ..measures.text import command
 
     words = [PROGRAM, "trace", "record"]
     if options.what:

@@ -107,7 +107,7 @@ def _play(options: argparse.Namespace, port: int) -> int:
     """One recording or two."""
     from ..backends import load
     from ..drawing import drawing_of
-    from ..traces import model_file, read
+    from ..runs import model_file, read
     from ..view.recording import TraceSession
 
     if len(options.traces) > 2:

@@ -9,12 +9,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..comparison import QUANTITIES, SAME, common_moments, largest, same_pairs
-from ..comparison.text import on
 from ..errors import TraceError
 from ..interface import Array
-from ..scenarios.provenance import Provenance
-from ..traces import Trace
+from ..measures import QUANTITIES, SAME, common_moments, largest, same_pairs
+from ..measures.text import on
+from ..runs import Trace
+from ..runs.provenance import Provenance
 from .labels import labels_of
 from .notes import notes_on
 from .series import Series, series

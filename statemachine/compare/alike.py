@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..interface import Array, Data, Model
-from ..scenarios import Controller
-from ..traces import Header, Trace
-from ..traces.recorder import layout_of
+from ..runs import Header, Trace
+from ..runs.recorder import layout_of
+from ..runs.scenarios import Controller
 from .matching import Matched, Pairs
 
 

@@ -14,11 +14,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..comparison import common_moments
 from ..errors import EndedEarlyError
 from ..interface import Array, Ints
-from ..scenarios.runs import Progress, silent
-from ..traces import Trace
+from ..measures import common_moments
+from ..runs import Trace
+from ..runs.drive import Progress, silent
 from .labels import labels_of
 from .series import Series, default_tip, series
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..comparison import common_moments
 from ..errors import TraceError
 from ..interface import Array
-from ..scenarios.runs import Progress, silent
-from ..traces import Trace
+from ..measures import common_moments
+from ..runs import Trace
+from ..runs.drive import Progress, silent
 from .agreement import Agreement, Comparison, compare
 from .perturbed import EXACT, ROUNDING, RUNS, Rerun, Uncertainty, perturbed_runs
 from .series import default_tip, series

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..traces import Header
+from ..runs import Header
 
 Two = tuple[str, str]
 

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from ..comparison import SAME, Common
-from ..comparison.text import milliseconds, numbers, significant
 from ..interface import JointType
-from ..traces import Header, Trace
+from ..measures import SAME, Common
+from ..measures.text import milliseconds, numbers, significant
+from ..runs import Header, Trace
 from .labels import labels_of
 from .series import tell
 

@@ -25,7 +25,7 @@ from ..interface import (
     set_state,
     step,
 )
-from ..scenarios.runs import Progress, silent
+from ..runs.drive import Progress, silent
 from .matching import Matched, match_models
 from .perturbed import Rerun
 from .stages import Reading, StageReader

@@ -11,9 +11,9 @@ import numpy as np
 from ..errors import BadInputError
 from ..interface import Array, Data, JointType, Model
 from ..rotations import times
-from ..scenarios import Controller, Scenario
-from ..scenarios.runs import Progress, part_of, silent
-from ..traces import Trace, record
+from ..runs import Trace, record
+from ..runs.drive import Progress, part_of, silent
+from ..runs.scenarios import Controller, Scenario
 from .matching import start_of
 
 RUNS = 4

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from ..comparison.text import command, listed
 from ..errors import BadInputError, StateMachineError, unknown_name
 from ..installed import PAIR
+from ..measures.text import command, listed
 from ..models import SUFFIXES as MODELS
-from ..scenarios import SCENARIOS, Scenario, scenario
-from ..traces.controllers import function_scenario, is_function
-from ..traces.files import SUFFIXES
+from ..runs.controllers import function_scenario, is_function
+from ..runs.files import SUFFIXES
+from ..runs.scenarios import SCENARIOS, Scenario, scenario
 from .side import Side, parse_sides
 
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..comparison import QUANTITIES, Common, common_moments, same_pairs
 from ..interface import Array, JointType, usual_site
+from ..measures import QUANTITIES, Common, common_moments, same_pairs
 from ..rotations import angle_between, matrix_from_quat
-from ..traces import Header, Trace
+from ..runs import Header, Trace
 
 NORMAL = ", normal force"  # after a pair of bodies: the sum over its contacts
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..backends import backend_names, load
-from ..comparison.text import command
 from ..errors import BadInputError, MissingEngineError, StateMachineError, unknown_name
 from ..installed import DEFAULT
-from ..scenarios import SCENARIOS, scenario
-from ..scenarios.runs import Progress, part_of, silent
-from ..traces import Trace, model_file, play, read, record_scenario, shipped
+from ..measures.text import command
+from ..runs import Trace, model_file, play, read, record_scenario, shipped
+from ..runs.drive import Progress, part_of, silent
+from ..runs.scenarios import SCENARIOS, scenario
 from .request import Request, is_trace
 from .two_sides import run_sides
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison import ContactNames
 from ..engines import part
 from ..engines.parts import OneStepPart
 from ..errors import UnsupportedError
 from ..interface import Array, Data, Ints, JointType, Model
+from ..measures import ContactNames
 from ..rotations import angle_between, matrix_from_quat
 from .matching import Matched
 

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..comparison import Tolerance
-from ..comparison.text import milliseconds, rounded
 from ..interface import Array
-from ..traces import Trace
+from ..measures import Tolerance
+from ..measures.text import milliseconds, rounded
+from ..runs import Trace
 from .series import Series
 
 # A 12-bit encoder, as in the SO-101's servos (Feetech STS3215).

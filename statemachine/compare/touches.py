@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..comparison import SAME, common_moments, same_pairs
-from ..traces import Trace
+from ..measures import SAME, common_moments, same_pairs
+from ..runs import Trace
 from .agreement import SETTLED
 from .series import normal_forces, total_forces
 

@@ -9,14 +9,14 @@ from typing import Any, Literal
 import numpy as np
 
 from ..backends import load
-from ..comparison import common_moments
-from ..comparison.text import milliseconds
 from ..errors import BadInputError, StateMachineError, TraceError
 from ..interface import Array, Model
-from ..scenarios import Controller, Scenario
-from ..scenarios.runs import Progress, check_length, part_of, silent, steps_in
-from ..traces import Trace, model_file, play, read
-from ..traces.recorder import layout_of
+from ..measures import common_moments
+from ..measures.text import milliseconds
+from ..runs import Trace, model_file, play, read
+from ..runs.drive import Progress, check_length, part_of, silent, steps_in
+from ..runs.recorder import layout_of
+from ..runs.scenarios import Controller, Scenario
 from .alike import beginning_with, replace_layout, retold, told_alike, translated
 from .labels import files_apart, labels_of
 from .matching import Matched, match_models, start_of

@@ -12,8 +12,8 @@ from ..errors import MissingEngineError, StateMachineError
 from ..installed import WITNESS
 from ..interface import JointType
 from ..kinematics import Kinematics, shared_joints
-from ..scenarios.provenance import model_files
-from ..traces import Header, Trace, model_file
+from ..runs import Header, Trace, model_file
+from ..runs.provenance import model_files
 from .series import default_tip
 
 

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ..backends import load
-from ..comparison.readings import readings
 from ..interface import (
     OPTIONS,
     Array,
@@ -24,6 +23,7 @@ from ..interface import (
     step,
 )
 from ..interface.options import unsupported
+from ..measures.readings import readings
 
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
 

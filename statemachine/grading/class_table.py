@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import BadInputError
-from ..traces.whole import replace_text
+from ..runs.whole import replace_text
 from .calls import reason
 from .exercise import LOOK, Judgement
 from .judges import JUDGES

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..comparison.text import position, signed
+from ..measures.text import position, signed
 from ..page import Table, Text, Verdict
-from ..scenarios.robot import ARM
+from ..runs.robot import ARM
 from ._fall import BALANCE, Droop, Gravity
 from ._robot import robot_word
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison import largest
-from ..comparison.text import millimetres
 from ..interface import Array, Data, Model
+from ..measures import largest
+from ..measures.text import millimetres
 from ..page import Table, Text, Traces
-from ..scenarios.robot import body_pairs
-from ..scenarios.runs import Progress
+from ..runs.drive import Progress
+from ..runs.robot import body_pairs
 from ._words import where
 from .session import CodeWatch
 

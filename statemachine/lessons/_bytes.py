@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..comparison.readings import readings
 from ..interface import INPUTS, Contacts, Data
+from ..measures.readings import readings
 
 
 def read_stored(data: Data) -> dict[str, bytes]:

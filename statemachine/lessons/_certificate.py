@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from ..comparison.text import capital, count, degrees, listed, millimetres, vector
 from ..installed import WITNESS
+from ..measures.text import capital, count, degrees, listed, millimetres, vector
 from ..page import Items, Page, Table, Text, Verdict
 from ..witness import OWN_READING
 from ._words import differences, page_of, where

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison.text import NONE, apart, position
 from ..engines.parts import LeftAlone
 from ..errors import UnsupportedError
 from ..interface import Array, Data, forward
+from ..measures.text import NONE, apart, position
 from ..page import Table, Text, Traces, Verdict
-from ..scenarios.provenance import Provenance
-from ..scenarios.robot import carried_by, dofs_of, touching
-from ..scenarios.runs import Progress, steps_in
+from ..runs.drive import Progress, steps_in
+from ..runs.provenance import Provenance
+from ..runs.robot import carried_by, dofs_of, touching
 from ._robot import coordinate
 from ._words import where
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..comparison import largest, together
-from ..comparison.text import apart, position, short_time
 from ..interface import Array
+from ..measures import largest, together
+from ..measures.text import apart, position, short_time
 from ..page import Question, Traces
-from ..scenarios.provenance import Provenance
+from ..runs.provenance import Provenance
 from ._words import where
 
 _THERE = np.radians(0.1)  # rad, or m

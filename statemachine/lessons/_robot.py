@@ -10,8 +10,8 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..interface import Array, Data, JointType, Model, make_data
-from ..scenarios.commands import load_at_start, start_keyframe
-from ..scenarios.robot import ARM, carried_by, scalar_joint
+from ..runs.commands import load_at_start, start_keyframe
+from ..runs.robot import ARM, carried_by, scalar_joint
 
 USUAL = "shoulder_lift"  # the arm's joint that lessons are about
 _VALUE = 0.8  # rad

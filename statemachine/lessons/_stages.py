@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import conventions
-from ..comparison import largest
-from ..comparison.text import count, millimetres, short_time
 from ..engines import part
 from ..interface import INPUTS, Array, Data, Model, forward, make_data, step
+from ..measures import largest
+from ..measures.text import count, millimetres, short_time
 from ..page import Block, Heading, Pipeline, Table, Text, Traces, Verdict
-from ..scenarios.commands import hold_ctrl
-from ..scenarios.provenance import Provenance, provenance
-from ..scenarios.runs import Progress
+from ..runs.commands import hold_ctrl
+from ..runs.drive import Progress
+from ..runs.provenance import Provenance, provenance
 from ._bytes import read_derived, read_stored
 from ._robot import ReadPlace, is_of_the_arm, the_tip
 from ._words import sentence, where

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import BadInputError, unknown_name
 from ..interface import Array, JointType, Model, make_data
 from ..kinematics import Kind
-from ..scenarios.robot import carried_by
+from ..runs.robot import carried_by
 from ..witness import labels
 from ._robot import FINGERTIP
 

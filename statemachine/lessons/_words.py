@@ -6,10 +6,10 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ..comparison.text import capital, milliseconds
 from ..interface import Model
+from ..measures.text import capital, milliseconds
 from ..page import Code, Page, Printed, Question, Table, Text
-from ..scenarios.runs import steps_in
+from ..runs.drive import steps_in
 from .records import Session
 
 _WORDS = (

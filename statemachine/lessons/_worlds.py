@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..backends import load as load_model
-from ..comparison.text import count, duration, listed
 from ..interface import Data, Model, make_data
 from ..interface import reset as reset_data
 from ..interface import step as step_data
+from ..measures.text import count, duration, listed
 from ..page import Question, Table, Text, Traces
 from ..processes import free_memory, resident_memory
-from ..scenarios.provenance import Provenance, provenance
-from ..scenarios.runs import Progress
+from ..runs.drive import Progress
+from ..runs.provenance import Provenance, provenance
 from ..worlds import make_worlds, reset, step
 from ._words import page_of, typed
 from .in_turns import Ratio, in_turns

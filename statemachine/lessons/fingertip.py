@@ -21,9 +21,9 @@ from ..interface import Array, Model, forward, make_data
 from ..interface.checks import as_count
 from ..kinematics import Kind, Kinematics, Pose, shared_joints
 from ..rotations import angle_between, matrix_from_quat
-from ..scenarios.provenance import Provenance, provenance
-from ..scenarios.robot import carried_by
-from ..scenarios.runs import Progress, silent
+from ..runs.drive import Progress, silent
+from ..runs.provenance import Provenance, provenance
+from ..runs.robot import carried_by
 from ..witness import labels
 from ._tips import Tip, random_qpos, slots, tips_of
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison.text import count, millimetres, vector
 from ..interface import Array, Data, Model
 from ..interface.checks import as_scalar
+from ..measures.text import count, millimetres, vector
 from ..page import Page, Question, Table, Text, Verdict
-from ..scenarios.provenance import Provenance, provenance
-from ..scenarios.runs import Progress, steps_in
+from ..runs.drive import Progress, steps_in
+from ..runs.provenance import Provenance, provenance
 from ._robot import ReadPlace, a_tip, coordinate, the_tip, tip_of, usual_tip, with_joint
 from ._stages import (
     Look,

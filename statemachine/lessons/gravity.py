@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison import largest
-from ..comparison.text import apart, short_time, signed
 from ..engines import part
 from ..engines.parts import AsItComes
 from ..errors import BadInputError, DivergedError, UnsupportedError
 from ..interface import Data, JointType, Model, make_data, reset, step
+from ..measures import largest
+from ..measures.text import apart, short_time, signed
 from ..page import Page, Question, Table, Text
-from ..scenarios import SCENARIOS, drives
-from ..scenarios.commands import is_servo, load_at_start, start_keyframe
-from ..scenarios.provenance import provenance
-from ..scenarios.robot import ARM, has_floor, is_the_arm
-from ..scenarios.runs import Progress, cost_of_a_second, part_of, steps_in
+from ..runs.commands import is_servo, load_at_start, start_keyframe
+from ..runs.drive import Progress, cost_of_a_second, part_of, steps_in
+from ..runs.provenance import provenance
+from ..runs.robot import ARM, has_floor, is_the_arm
+from ..runs.scenarios import SCENARIOS, drives
 from ._balance import engine_alone, force, parts_of, unit_of, who_holds
 from ._fall import BALANCE, Droop, Falling, Gravity, longer, longer_apart, milestones
 from ._robot import USUAL, coordinate, start_line, with_joint

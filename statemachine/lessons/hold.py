@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison.text import NONE
 from ..errors import BadInputError, DivergedError, UnsupportedError
 from ..interface import Array, Data, Ints, JointType, Model, forward, make_data, reset, step
+from ..measures.text import NONE
 from ..page import Page, Table, Text
-from ..scenarios.commands import hold_ctrl, is_servo, start_keyframe
-from ..scenarios.provenance import provenance
-from ..scenarios.robot import ARM, command, moved_by_actuators, touching
-from ..scenarios.runs import Progress, steps_in
+from ..runs.commands import hold_ctrl, is_servo, start_keyframe
+from ..runs.drive import Progress, steps_in
+from ..runs.provenance import provenance
+from ..runs.robot import ARM, command, moved_by_actuators, touching
 from ._hold import Hold, apart_freely, apart_until, at, at_end, gap, question, row, traces
 from ._robot import Coordinate, coordinate, start_line
 from ._words import differences, page_of, spans, typed, where

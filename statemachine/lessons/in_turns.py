@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from ..scenarios.runs import Progress, silent
+from ..runs.drive import Progress, silent
 
 FEWEST = 5  # rounds; the middle half of fewer says nothing
 

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from ..backends import load
-from ..comparison.text import count, duration
 from ..errors import BadInputError
 from ..interface import Array, Data, Model, make_data, step
 from ..interface.checks import as_count
+from ..measures.text import count, duration
 from ..page import Page, Question, Table, Text, Verdict
-from ..scenarios.provenance import Provenance, provenance
-from ..scenarios.runs import Progress, part_of
+from ..runs.drive import Progress, part_of
+from ..runs.provenance import Provenance, provenance
 from ._robot import is_of_the_arm
 from ._words import differences, page_of, sentence, typed, where, words
 from .records import Session

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..comparison.text import count, degrees, duration, millimetres
 from ..interface import Model
+from ..measures.text import count, degrees, duration, millimetres
 from ..page import Page, Question, Text, Verdict
-from ..scenarios.provenance import Provenance, provenance
-from ..scenarios.runs import Progress, part_of
+from ..runs.drive import Progress, part_of
+from ..runs.provenance import Provenance, provenance
 from . import LESSONS, forward, gravity, objects, replay, state, time
 from ._robot import is_of_the_arm
 from ._words import page_of, where

@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison import largest
-from ..comparison.text import count, degrees, millimetres, vector
 from ..engines import part
 from ..engines.parts import AsItComes, WayBack
 from ..errors import UnsupportedError, unknown_name
 from ..interface import Array, Ints, JointType, Model, get_state
 from ..interface.checks import as_count
+from ..measures import largest
+from ..measures.text import count, degrees, millimetres, vector
 from ..page import Page, Question, Table, Text, Verdict
-from ..scenarios.provenance import Provenance, provenance
-from ..scenarios.robot import command, is_the_arm
-from ..scenarios.runs import Progress, part_of
+from ..runs.drive import Progress, part_of
+from ..runs.provenance import Provenance, provenance
+from ..runs.robot import command, is_the_arm
 from ._broken import BREAKS, BROKEN, Broken, Paths, course, growth, in_short, traces
 from ._robot import is_of_the_arm
 from ._ways import of_its_own, through_us, ways_back

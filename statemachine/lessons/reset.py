@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison.text import count, millimetres
 from ..interface import INPUTS, Data, JointType, Model, forward, make_data, reset, step
+from ..measures.text import count, millimetres
 from ..page import Page, Question, Table, Text, Verdict
-from ..scenarios.provenance import Provenance, provenance
-from ..scenarios.robot import body_pairs, carried_by, moved_by_actuators
-from ..scenarios.runs import Progress
+from ..runs.drive import Progress
+from ..runs.provenance import Provenance, provenance
+from ..runs.robot import body_pairs, carried_by, moved_by_actuators
 from ._bytes import read_derived, read_stored
 from ._words import differences, emulation, page_of, sentence, typed, where
 from .records import Session

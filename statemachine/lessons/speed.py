@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..backends import load as load_model
-from ..comparison.text import capital, count, duration
 from ..engines import part
 from ..interface import Data, Model
 from ..interface.checks import as_count
+from ..measures.text import capital, count, duration
 from ..page import Page, Question, Table, Text
-from ..scenarios.provenance import Provenance, provenance
-from ..scenarios.runs import Progress
+from ..runs.drive import Progress
+from ..runs.provenance import Provenance, provenance
 from . import _worlds
 from ._words import differences, page_of, sentence, typed
 from .in_turns import FEWEST, Ratio, in_turns

@@ -10,8 +10,8 @@ from ..engines import part
 from ..engines.parts import AsItComes, Term
 from ..interface import JointType, Model, make_data, reset
 from ..page import Page, Question, Slots, Table, Text
-from ..scenarios.provenance import Provenance, provenance
-from ..scenarios.runs import Progress
+from ..runs.drive import Progress
+from ..runs.provenance import Provenance, provenance
 from ._words import differences, page_of, typed
 from .records import Session
 from .session import CodeRun

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison.text import count, duration
 from ..errors import BadInputError
 from ..interface import Data, Model
+from ..measures.text import count, duration
 from ..page import Page, Question, Table, Text, Verdict
-from ..scenarios.provenance import Provenance, provenance
-from ..scenarios.runs import Progress, steps_in
+from ..runs.drive import Progress, steps_in
+from ..runs.provenance import Provenance, provenance
 from ._words import page_of, typed, where
 from .records import Session
 from .session import CodeRun, CodeWatch

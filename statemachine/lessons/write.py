@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison.text import count, position
 from ..errors import StateMachineError
 from ..interface import (
     DERIVED,
@@ -23,9 +22,10 @@ from ..interface import (
     step,
 )
 from ..interface.checks import as_scalar
+from ..measures.text import count, position
 from ..page import Page, Question, Table, Text, Verdict
-from ..scenarios.provenance import Provenance, provenance
-from ..scenarios.runs import Progress
+from ..runs.drive import Progress
+from ..runs.provenance import Provenance, provenance
 from ._bytes import read_derived
 from ._robot import coordinate, with_joint
 from ._words import emulation, page_of, sentence, typed, where

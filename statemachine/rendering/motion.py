@@ -12,7 +12,7 @@ from ..drawing import drawing_of
 from ..errors import TraceError
 from ..interface import Array, Ints, Model, forward, make_data
 from ..rotations import matrix_from_quat
-from ..traces import Trace
+from ..runs import Trace
 
 
 @dataclass(frozen=True, eq=False)

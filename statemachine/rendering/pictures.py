@@ -19,7 +19,7 @@ from ..drawing.camera import Camera, framed
 from ..drawing.shots import Pixels
 from ..errors import BadInputError, EngineError
 from ..interface import Array, Model
-from ..traces import Trace
+from ..runs import Trace
 from .motion import Motion, corners, models_of, motion_of
 from .probe import Renderer, environment_of, renderer_here
 

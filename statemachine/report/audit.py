@@ -8,8 +8,8 @@ from ..audit import Audit, Audited
 from ..audit.falls import BOXES, FALL, STEPS
 from ..audit.findings import EACH_OTHER, AuditFinding
 from ..audit.restore import FORGETS, NO_CONTACTS, NOT_RESTORED, RESTORE, WITHOUT
-from ..comparison.text import count, milliseconds, rough
 from ..engines.futures import worst
+from ..measures.text import count, milliseconds, rough
 from ..page import Block, Page, Table, Text, Verdict
 from .audit_words import cell, sentences
 

@@ -8,8 +8,8 @@ from ..audit import Audited
 from ..audit.conclusions import Conclusion, Missing
 from ..audit.look import LOOK
 from ..audit.repeat import AGAIN
-from ..comparison.text import rough
 from ..engines.futures import FutureGap, worst
+from ..measures.text import rough
 
 _SAME = "same"
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..comparison.text import count
 from ..grading.class_table import NOTHING, ClassEntry
 from ..grading.judges import JUDGES
+from ..measures.text import count
 from ..page import Page, Table, Text, Verdict
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..comparison import largest
-from ..comparison.text import figure, on, quantity
 from ..interface import Array, JointType
+from ..measures import largest
+from ..measures.text import figure, on, quantity
 from ..page import Block, Section, Table, Text
-from ..traces import Trace
+from ..runs import Trace
 
 _NEAR = 0.2  # rad: joints that end as near as this to their ctrl were told an angle
 

@@ -18,10 +18,10 @@ from ..compare import (
     touches,
 )
 from ..compare.why import Attribution, Explanation
-from ..comparison import QUANTITIES
-from ..comparison.text import NONE, milliseconds, quantity, sentence
+from ..measures import QUANTITIES
+from ..measures.text import NONE, milliseconds, quantity, sentence
 from ..page import Block, Code, Items, Page, Section, Table, TableCell, Text, Verdict
-from ..traces import Trace
+from ..runs import Trace
 from ..witness import SAME_READING
 from . import explain, why
 from .commanded import commanded

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..compare import Comparison, Contact, Touch
-from ..comparison.text import capital, figure, on, quantity, short_time
+from ..measures.text import capital, figure, on, quantity, short_time
 from ..page import Block, Section, Text
 from .finding import short_labels, window
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..comparison.text import reading, significant
 from ..conventions import Answered, Conventions
 from ..conventions.phrasebook import CONCEPTS, Phrasebook
 from ..engines.measured import Measurement
+from ..measures.text import reading, significant
 from ..page import Block, Page, Table, Text, Verdict
 
 _ZERO = 1e-12

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..compare import QuantityLimit, TimestepConvergence
-from ..comparison.text import listed, milliseconds, quantity, short_time
+from ..measures.text import listed, milliseconds, quantity, short_time
 from ..page import Block, Headline, Page, Table, TableCell, Text
 from .finding import name_of
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ..compare import Comparison, Touch
-from ..comparison.text import capital, short_time
+from ..measures.text import capital, short_time
 from ..page import Table, TableCell
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..compare.why import ADDS_UP, CauseShare, Explanation
-from ..comparison.text import NONE, capital, few, percent, quantity, short_time, significant
+from ..measures.text import NONE, capital, few, percent, quantity, short_time, significant
 from ..page import Block, Items, Page, Section, Table, TableCell, Text, Verdict
 from . import why
 from .why_words import SMALL, THREE, inside, noisy, three

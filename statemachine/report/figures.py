@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import BadInputError
 from ..installed import require_extra
 from ..page import Bars, Block, HeatMap, Pipeline, Slots, Traces
-from ..traces.whole import replace_bytes
+from ..runs.whole import replace_bytes
 from .log_axis import LogAxis
 
 _COLOURS = ("#1f5fa8", "#c2571a", "#2f8f4e", "#8a4fa0", "#b03a48", "#6b6b6b", "#3aa6a6")

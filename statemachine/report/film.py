@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from ..compare import Comparison, Series, labels_of, series
-from ..comparison.text import reading
 from ..errors import BadInputError
 from ..installed import require_extra
 from ..interface import Model
+from ..measures.text import reading
 from ..rendering import Renderer, Timing, frames, renderer_here, timing_of
 from ..rendering.pictures import check_size
-from ..scenarios.runs import Progress, silent
-from ..traces import Trace
+from ..runs import Trace
+from ..runs.drive import Progress, silent
 from .film_files import SUFFIXES, write_mp4, write_webp
 from .film_overlay import Overlay, Strip
 

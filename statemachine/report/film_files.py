@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from ..errors import EngineError
-from ..traces.whole import beside, replace_file
+from ..runs.whole import beside, replace_file
 
 SUFFIXES = (".webp", ".mp4")
 _QUALITY = 70  # of WebP, 0 to 100

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison.text import figure
 from ..drawing.shots import GHOST
 from ..interface import Array
+from ..measures.text import figure
 from ..rendering import Timing
 from .log_axis import LogAxis
 

@@ -10,8 +10,8 @@ import numpy as np
 from ..compare import Agreement, Comparison, Series
 from ..compare.agreement import SETTLED
 from ..compare.why import Attribution
-from ..comparison import QUANTITIES
-from ..comparison.text import capital, on, quantity, short_time
+from ..measures import QUANTITIES
+from ..measures.text import capital, on, quantity, short_time
 from ..page import Block, Headline, Section, Text
 from .events import Event
 from .why_words import amount, causes

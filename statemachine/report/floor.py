@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..compare import ChaosFloor, Comparison, FloorBand
-from ..comparison.text import count, listed, quantity, rounded, short_time
+from ..measures.text import count, listed, quantity, rounded, short_time
 from ..page import Block, Text
 from .finding import name_of, short_labels
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..compare import Agreement, Comparison, SidesRun
-from ..comparison.text import NONE, quantity
+from ..measures.text import NONE, quantity
 from ..page import Block, Headline, Items, Section, Table, TableCell, Text
 from .finding import name_of, short_labels
 

@@ -7,7 +7,7 @@ from itertools import groupby
 
 from ..compare.models import AgreedFigures, Compared, DescribedFile, Difference
 from ..compare.models.ledger import SUBJECTS, Value
-from ..comparison.text import after, capital, listed, reading, rounded, sentence, significant
+from ..measures.text import after, capital, listed, reading, rounded, sentence, significant
 from ..page import Block, Items, Page, Table, Text, Verdict
 
 _ROWS = 8  # of a table, unless all are asked for

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..comparison.text import count
 from ..grading.mutants.run import Examination, Failure, MutantTrial
+from ..measures.text import count
 from ..page import Block, Page, Table, Text, Verdict
 
 _WIDTH, _SHOWN = 30, 200  # characters of a test's name, and of what it said

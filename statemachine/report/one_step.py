@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..compare import StepComparison
 from ..compare.step_samples import StageGap
-from ..comparison.text import NONE, count, figure, quantity, sentence, short_time
+from ..measures.text import NONE, count, figure, quantity, sentence, short_time
 from ..page import Block, Headline, Items, Page, Table, TableCell, Text
 
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 from ..compare import Agreement, Series
 from ..compare.series import NORMAL, normal_forces, total_forces
-from ..comparison import same_pairs
-from ..comparison.text import capital, figure, on, quantity, reading, short_time
 from ..interface import Array
+from ..measures import same_pairs
+from ..measures.text import capital, figure, on, quantity, reading, short_time
 from ..page import Interactive
-from ..traces import Trace
+from ..runs import Trace
 from .events import Event
 from .finding import name_of
 

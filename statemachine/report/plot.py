@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from ..compare import ChaosFloor, Comparison
-from ..traces import Trace
-from ..traces.whole import replace_bytes
+from ..runs import Trace
+from ..runs.whole import replace_bytes
 from . import plot_panels
 from .figures import SETTINGS, check_suffix, saved
 from .plot_panels import Plot

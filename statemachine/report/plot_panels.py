@@ -18,10 +18,10 @@ from ..compare import (
     series,
 )
 from ..compare.tolerances import COUNT
-from ..comparison import QUANTITIES
-from ..comparison.text import few, milliseconds, quantity, reading, short_time
 from ..interface import Array, JointType
-from ..traces import Header, Trace
+from ..measures import QUANTITIES
+from ..measures.text import few, milliseconds, quantity, reading, short_time
+from ..runs import Header, Trace
 from .floor import changed_by
 
 MOST = 16  # panels of joints and bodies

@@ -9,7 +9,7 @@ from pathlib import Path
 from .. import __version__
 from ..grading.predictions import KIND, answers_in
 from ..page import Question
-from ..traces.whole import replace_text
+from ..runs.whole import replace_text
 from .quiz import Reader
 
 

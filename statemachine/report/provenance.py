@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from ..compare import Comparison
-from ..comparison.text import listed, milliseconds, numbers
+from ..measures.text import listed, milliseconds, numbers
 from ..page import Block, Section, Table, TableCell, Text
-from ..traces import Header
+from ..runs import Header
 
 # Of the promises that a backend may emulate, those that move the arm, in plain words.
 PHYSICS = {

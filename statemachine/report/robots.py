@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from ..comparison.text import count, figure, listed, rough, sentence
+from ..measures.text import count, figure, listed, rough, sentence
 from ..page import Block, Page, Table, Text, Verdict
 from ..robots.examine import TRIED
 from ..robots.gaps import STEPS

@@ -9,16 +9,16 @@ from pathlib import Path
 from ..backends import backend_names, load
 from ..compare import Request, compare, series, sides_of, witness
 from ..compare.why import attribute
-from ..comparison.text import reading
 from ..conventions import phrasebook, probe
 from ..errors import MissingEngineError
 from ..installed import available
 from ..lessons import LESSONS
 from ..lessons.pictures import with_picture
 from ..lessons.session import page_of_lesson, take
+from ..measures.text import reading
 from ..page import Page, Picture, RobotPicture, Traces, Verdict
-from ..scenarios import scenario
-from ..traces.whole import replace_bytes
+from ..runs.scenarios import scenario
+from ..runs.whole import replace_bytes
 from . import compare as comparison
 from . import conventions, why
 from .cheat_sheet import cheat_sheet

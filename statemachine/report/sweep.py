@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..comparison.text import count, listed
+from ..measures.text import count, listed
 from ..page import Block, Page, Table, Text, Verdict
 from ..sweep import PreparedSweep, SweepSummary
 

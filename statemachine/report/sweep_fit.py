@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..comparison.text import count, listed, quantity
+from ..measures.text import count, listed, quantity
 from ..page import Block, Text
 from ..sweep.analysis import SweepReport
 from ..sweep.analysis_together import BroughtTogether

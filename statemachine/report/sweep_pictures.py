@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..comparison.text import listed, reading, significant
+from ..measures.text import listed, reading, significant
 from ..page import Bars, HeatMap, Traces
 from ..sweep.analysis import SweepReport
 from ..sweep.analysis_map import GapMap

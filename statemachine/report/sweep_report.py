@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..comparison.text import (
+from ..measures.text import (
     NONE,
     capital,
     count,

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison.text import figure, milliseconds, numbers, short_time
+from ..measures.text import figure, milliseconds, numbers, short_time
 from ..page import Page, Table, Text
-from ..traces import COLUMNS, Trace
+from ..runs import COLUMNS, Trace
 
 
 def page(trace: Trace, name: str) -> Page:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from ..compare.why import UNEXPLAINED, Attribution, FactorTrial
-from ..comparison.text import NONE, capital, listed, percent, quantity, short_time
+from ..measures.text import NONE, capital, listed, percent, quantity, short_time
 from ..page import Block, Items, Page, Section, Table, TableCell, Text, Verdict
 from .why_words import (
     SMALL,

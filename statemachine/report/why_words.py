@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..compare.why import FACTORS, UNEXPLAINED, Attribution, FactorTrial
-from ..comparison.text import listed, percent, quantity, short_time
+from ..measures.text import listed, percent, quantity, short_time
 
 _WORTH = 0.005  # the least part of the gap that is spoken of
 _SOME = 0.1  # part of the gap from which on a factor is a cause

@@ -7,7 +7,7 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
-from ..traces.whole import replace_text
+from ..runs.whole import replace_text
 from .examine import examine
 from .records import ExaminedModel
 

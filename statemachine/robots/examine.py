@@ -30,8 +30,8 @@ from ..errors import (
 from ..installed import DEFAULT, WITNESS, require
 from ..interface import Model, get_state, make_data, reset, set_state, step
 from ..lessons.in_turns import Ratio, in_turns
-from ..scenarios import scenario
-from ..traces import record_scenario
+from ..runs import record_scenario
+from ..runs.scenarios import scenario
 from . import gaps
 from .places import witness_row
 from .records import RUNS, BackendRow, ExaminedModel

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 from ..errors import BadInputError
 from ..installed import DEFAULT
 from ..models import SUFFIXES
-from ..scenarios.provenance import model_digest, model_files
+from ..runs.provenance import model_digest, model_files
 
 _ROOTS = (DEFAULT, "robot")  # of MJCF, whose root is called after its engine, and of URDF
 _BINARY = ".mjb"

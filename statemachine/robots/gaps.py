@@ -10,7 +10,7 @@ import numpy as np
 from ..engines.futures import Coordinates, gap
 from ..errors import StateMachineError
 from ..interface import Array, JointType, Model, make_data, reset, step
-from ..scenarios.commands import start_keyframe
+from ..runs.commands import start_keyframe
 from .records import TOLERANCE, RunGap
 
 STEPS = 400

@@ -21,7 +21,7 @@ from ..grading.parallel import in_parallel
 from ..grading.unwinding import unwinding
 from ..installed import DEFAULT, ENGINES, engine_version, require
 from ..processes import ALONE, checked_jobs, fresh_python
-from ..scenarios.runs import Progress, silent
+from ..runs.drive import Progress, silent
 from . import table as tables
 from .files import ModelFile
 from .gaps import STEPS

@@ -14,7 +14,7 @@ from typing import Any
 
 from ..errors import BadInputError
 from ..grading.class_table import no_formula
-from ..traces.whole import replace_text
+from ..runs.whole import replace_text
 from .records import ExaminedModel
 
 SUFFIXES = (".csv", ".json")

@@ -9,9 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison import Gap
-from ..comparison.readings import Readings, readings
-from ..comparison.text import count, listed
 from ..interface import (
     DERIVED,
     INPUTS,
@@ -25,6 +22,9 @@ from ..interface import (
     make_data,
     set_state,
 )
+from ..measures import Gap
+from ..measures.readings import Readings, readings
+from ..measures.text import count, listed
 from ..rotations import times
 from .gaps import gaps, same
 from .result import Row

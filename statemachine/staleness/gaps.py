@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ..comparison import ContactNames, Gap
-from ..comparison.text import TINY
 from ..interface import Array, Contacts, JointType, Model
+from ..measures import ContactNames, Gap
+from ..measures.text import TINY
 from ..rotations import angle_between, matrix_from_quat
 
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from contextlib import nullcontext
 from typing import cast
 
-from ..comparison.readings import readings
-from ..comparison.text import few, milliseconds
 from ..interface import DERIVED, POSES, Contacts, Data, Model, get_state
+from ..measures.readings import readings
+from ..measures.text import few, milliseconds
 from .age import Age, Scratch, age_of, engine_step, row
 from .result import Freshness, Row
 from .watch import Watch

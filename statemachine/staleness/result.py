@@ -6,8 +6,8 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from ..comparison import Gap
 from ..errors import unknown_name
+from ..measures import Gap
 from .gaps import told
 
 WIDTH = 80

@@ -15,11 +15,11 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..comparison import Gap
-from ..comparison.readings import Readings, readings
-from ..comparison.text import few
 from ..errors import BadInputError, StaleReadError
 from ..interface import INPUTS, Array, Contacts, Data, Model, State, get_state
+from ..measures import Gap
+from ..measures.readings import Readings, readings
+from ..measures.text import few
 from .age import DEPEND, Age, Scratch, age_of, row, stale_row
 from .gaps import told
 from .result import Row, StaleRead, table

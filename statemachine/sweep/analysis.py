@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..comparison.text import listed
 from ..errors import BadInputError, unknown_name
 from ..interface import Array
-from ..scenarios.runs import Progress, part_of, silent
+from ..measures.text import listed
+from ..runs.drive import Progress, part_of, silent
 from .analysis_agreement import QuantityAgreement, SettingGap, agreement_of, only_rounding
 from .analysis_floor import SweepFloor, floor_of
 from .analysis_gaps import SweepGaps, gaps_of, median

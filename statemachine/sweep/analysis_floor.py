@@ -10,7 +10,7 @@ import numpy as np
 
 from ..compare.perturbed import ROUNDING
 from ..interface import Array, Ints
-from ..scenarios.runs import Progress, silent
+from ..runs.drive import Progress, silent
 from .analysis_gaps import SweepGaps, gap_between
 from .analysis_runs import CellRunner, evenly
 from .factors import Value

@@ -13,8 +13,8 @@ from ..backends import load
 from ..errors import StateMachineError
 from ..interface import Ints, JointType, Model, forward, make_data, reset
 from ..processes import checked_jobs
-from ..scenarios.runs import Progress, silent
-from ..traces.controllers import is_function
+from ..runs.controllers import is_function
+from ..runs.drive import Progress, silent
 from .analysis_gaps import SweepRuns, runs_of
 from .apart import apart
 from .cell import CellRules, SweepCell

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..interface import Array, Ints
-from ..scenarios.runs import Progress, silent
+from ..runs.drive import Progress, silent
 from .analysis_fit import FittedValue, Verdict, fit_curves, fit_scatter
 from .analysis_gaps import SweepGaps, SweepRuns, alike, gap_between, joined, median
 from .analysis_runs import CellRunner, Setting, evenly

@@ -10,14 +10,14 @@ from typing import Any, Literal
 import numpy as np
 
 from ..compare.perturbed import Uncertainty, nudged_controller, nudged_start
-from ..comparison import ContactNames
 from ..errors import TimedOutError
 from ..interface import Array, Data, Model, forward, make_data, reset, step
 from ..interface.records import usual_site
-from ..scenarios import Controller, Scenario, scenario
-from ..scenarios.runs import check_length, steps_in, write_ctrl
-from ..traces.controllers import function_scenario, is_function
-from ..traces.energy import energies
+from ..measures import ContactNames
+from ..runs.controllers import function_scenario, is_function
+from ..runs.drive import check_length, steps_in, write_ctrl
+from ..runs.energy import energies
+from ..runs.scenarios import Controller, Scenario, scenario
 from .factors import Value, Vary
 from .settings import drawn_start, start_at
 

@@ -19,7 +19,7 @@ from ..errors import BadInputError, StateMachineError
 from ..grading.unwinding import unwinding
 from ..installed import require_extra
 from ..processes import checked_jobs
-from ..scenarios.runs import Progress, silent
+from ..runs.drive import Progress, silent
 from .apart import Batch, Results, apart, deaf, require_joblib
 from .cell import DONE, CellRules
 from .folder import SCRATCH, check_folder, locked, settle_manifest

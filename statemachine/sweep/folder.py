@@ -10,9 +10,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..comparison.text import listed
 from ..errors import BadInputError, shown
-from ..traces.whole import replace_text
+from ..measures.text import listed
+from ..runs.whole import replace_text
 from .design import Design
 from .factors import Vary
 from .rows import CELLS

@@ -19,10 +19,10 @@ from ..errors import BadInputError, MissingEngineError, StateMachineError, unkno
 from ..interface import Model, make_data
 from ..interface.options import checked_options
 from ..models import resolve
-from ..scenarios import scenario
-from ..scenarios.provenance import model_digest
-from ..scenarios.runs import check_length, cost_of_a_second, steps_in
-from ..traces.controllers import is_function, parameters_of
+from ..runs.controllers import is_function, parameters_of
+from ..runs.drive import check_length, cost_of_a_second, steps_in
+from ..runs.provenance import model_digest
+from ..runs.scenarios import scenario
 from .cell import CellRules
 from .design import Design, require_qmc
 from .factors import MODEL, Vary, parse_vary, with_kinds

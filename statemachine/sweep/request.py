@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from ..comparison.text import command
-from ..traces.controllers import is_function
+from ..measures.text import command
+from ..runs.controllers import is_function
 from .cell import CellRules, SweepCell
 from .design import Design, DesignPoint, digest
 from .folder import SCHEMA

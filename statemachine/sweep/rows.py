@@ -13,7 +13,7 @@ from typing import Any
 
 from ..errors import BadInputError
 from ..installed import require_extra
-from ..traces.whole import replace_bytes
+from ..runs.whole import replace_bytes
 from .cell import DONE
 from .factors import Vary
 

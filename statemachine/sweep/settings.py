@@ -11,7 +11,7 @@ from ..compare.perturbed import Uncertainty, direction, turn
 from ..errors import BadInputError, unknown_name
 from ..interface import Array, JointType, Model
 from ..interface.checks import index_of
-from ..scenarios.robot import scalar_joint
+from ..runs.robot import scalar_joint
 from .factors import Value, Vary
 
 _AXES = ("x", "y", "z")

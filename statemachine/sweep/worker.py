@@ -17,14 +17,14 @@ from typing import Any, TypeVar
 
 from .. import __version__
 from ..backends import load
-from ..comparison.text import listed
 from ..errors import BadInputError
 from ..interface import Model
+from ..measures.text import listed
 from ..models import resolve
-from ..scenarios import Scenario
-from ..scenarios.provenance import model_digest
+from ..runs.controllers import function_file
+from ..runs.provenance import model_digest
+from ..runs.scenarios import Scenario
 from ..silence import silence
-from ..traces.controllers import function_file
 from .cell import DONE, FAILED, CellRules, SweepCell, run_cell, timed_out
 from .design import digest
 from .settings import options_at

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..comparison import largest
 from ..interface import Array, JointType, Model, usual_site
+from ..measures import largest
 
 _TURN = math.pi / 180  # radians in a degree
 

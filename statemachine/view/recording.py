@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import BadInputError, TraceError
 from ..interface import Array, usual_site
-from ..traces import Header, Trace
+from ..runs import Header, Trace
 from .frames import (
     Command,
     Control,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..comparison.text import millimetres, position, short_time
+from ..measures.text import millimetres, position, short_time
 from .frames import Snapshot
 from .live import Tempo
 

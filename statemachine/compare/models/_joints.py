@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from ...comparison.text import milliseconds, rounded
 from ...description.match import Pair
 from ...description.records import Actuator, Robot, RobotJoint
 from ...description.tree import GroupTree
+from ...measures.text import milliseconds, rounded
 from .ledger import Ledger
 
 _UNITS = {

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 
 from ...backends import load
-from ...comparison.text import few, rounded
 from ...engines.model_differences import ModelDifference
 from ...errors import StateMachineError
 from ...interface import Model
+from ...measures.text import few, rounded
 from ..matching import Matched, match_models
 from ..why.causes import differences_of, sensors_of
 from ._told import FLAGS, SETTINGS, SUBJECTS_OF, TOLD, WEIGHTS, WHOLE_LINK

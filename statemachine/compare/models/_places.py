@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from ...comparison.text import rounded
 from ...description.match import Pair
 from ...description.records import RobotJoint
 from ...description.tree import GroupTree
 from ...interface import Array
+from ...measures.text import rounded
 from ...rotations import angle_between
 from .ledger import Ledger
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...comparison.text import few, rounded
 from ...description.match import Matching, frame_names, match
 from ...description.records import HERE
 from ...description.tree import Group, GroupTree
+from ...measures.text import few, rounded
 from . import _joints, _places, _settings, _shapes, _solids
 from .ledger import AgreedFigures, Difference, Ledger, ordered
 

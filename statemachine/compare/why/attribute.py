@@ -8,8 +8,8 @@ from typing import Any
 
 from ...errors import EndedEarlyError, StateMachineError, unknown_name
 from ...interface import Model
-from ...scenarios import Scenario
-from ...scenarios.runs import Progress, silent
+from ...runs.drive import Progress, silent
+from ...runs.scenarios import Scenario
 from ..one_step import one_step
 from ..perturbed import EXACT, Uncertainty, rerun_of
 from ..stages import FOUND

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from ...backends import load
 from ...errors import StateMachineError
 from ...interface import Model
-from ...scenarios import Scenario
-from ...scenarios.runs import Progress
+from ...runs.drive import Progress
+from ...runs.scenarios import Scenario
 from .attribute import attribute
 from .gap import Deviation
 from .results import Attribution

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 from ...errors import BadInputError, EndedEarlyError, unknown_name
 from ...interface import Model
-from ...scenarios import Scenario
-from ...scenarios.provenance import Provenance, provenance
-from ...scenarios.runs import Progress, part_of, silent
+from ...runs.drive import Progress, part_of, silent
+from ...runs.provenance import Provenance, provenance
+from ...runs.scenarios import Scenario
 from ..labels import files_apart
 from ..matching import match_models
 from ..perturbed import EXACT, Uncertainty

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...comparison import SAME, common_moments, largest, nearest
 from ...errors import BadInputError, DivergedError, TraceError
 from ...interface import Array, Ints, JointType, Model, forward, make_data, usual_site
-from ...traces import Trace
+from ...measures import SAME, common_moments, largest, nearest
+from ...runs import Trace
 from ..matching import Matched
 from ..tolerances import BODY, BODY_TURN, COUNT, SLIDE
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from ...scenarios.provenance import Provenance
+from ...runs.provenance import Provenance
 from .gap import Deviation
 
 # Rounding, after it has grown for some seconds: less than this is no gap to be explained.

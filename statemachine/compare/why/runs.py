@@ -6,11 +6,11 @@ from typing import Any
 
 from ...errors import DivergedError, EngineError, UnsupportedError
 from ...interface import Data, Model
-from ...scenarios import Scenario
-from ...scenarios.provenance import provenance
-from ...scenarios.robot import moved_by_actuators, touching
-from ...scenarios.runs import Progress
-from ...traces import Trace, record
+from ...runs import Trace, record
+from ...runs.drive import Progress
+from ...runs.provenance import provenance
+from ...runs.robot import moved_by_actuators, touching
+from ...runs.scenarios import Scenario
 from ..perturbed import Rerun, Uncertainty, perturbed_runs
 from .factors import FACTORS
 from .gap import Curves, Deviation, Ruler

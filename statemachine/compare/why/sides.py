@@ -8,11 +8,11 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from ...comparison.text import milliseconds, rounded, significant
 from ...engines import part
 from ...engines.parts import Dials, DialsPart, Setting
 from ...errors import UnsupportedError
 from ...interface import Model
+from ...measures.text import milliseconds, rounded, significant
 from .factors import FACTORS, Factor
 
 How = Literal["parity", "off"]

@@ -20,8 +20,8 @@ from ...errors import DivergedError, EngineError, ModelError, UnsupportedError
 from ...installed import DEFAULT
 from ...interface import Array, Model
 from ...processes import checked_jobs
-from ...scenarios import Controller, Scenario
-from ...traces import Trace
+from ...runs import Trace
+from ...runs.scenarios import Controller, Scenario
 from ..alike import beginning_with, retold
 from ..forks import forks_for, in_forks
 from ..matching import Matched, start_of

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...comparison.text import rounded, vector
 from ...interface import Array, Data, Model, forward, make_data
+from ...measures.text import rounded, vector
 from ..answers import Answer
 from ..calls import Remark, reason
 from ..watch import Inputs

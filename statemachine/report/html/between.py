@@ -8,9 +8,9 @@ import numpy as np
 
 from ...compare import Series, series
 from ...compare.series import NORMAL
-from ...comparison import same_pairs
 from ...interface import Array, Ints, JointType
-from ...traces import Trace
+from ...measures import same_pairs
+from ...runs import Trace
 from .scene import slerp
 from .timeline import Frames
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...traces import Trace
+from ...runs import Trace
 
 
 @dataclass(frozen=True)

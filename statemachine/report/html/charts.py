@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...compare import Agreement, Series
-from ...comparison import largest
-from ...comparison.text import figure, on, reading
 from ...interface import Array, Ints
+from ...measures import largest
+from ...measures.text import figure, on, reading
 from ...page import Table
 from ..finding import name_of
 from ..log_axis import LogAxis

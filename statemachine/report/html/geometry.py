@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...drawing import Drawing, Part
 from ...interface import Array
-from ...traces import Trace
+from ...runs import Trace
 
 _CREASE = np.cos(np.radians(35.0))  # faces that meet at less than this are one round surface
 

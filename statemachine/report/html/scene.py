@@ -13,7 +13,7 @@ from ...compare import labels_of
 from ...drawing import Drawing
 from ...drawing.camera import Camera
 from ...interface import Array
-from ...traces import Trace
+from ...runs import Trace
 from .budget import Budget
 from .geometry import bones_of, mesh_as_data, mesh_of, packed, quantised
 from .timeline import Frames

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...comparison.text import short_time
 from ...drawing.camera import Camera
 from ...interface import Array
-from ...traces import Trace
+from ...measures.text import short_time
+from ...runs import Trace
 from .markup import Html, tag
 from .scene import ASPECT, Scene
 from .timeline import Frames

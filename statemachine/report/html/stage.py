@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...compare import Series
-from ...comparison.text import figure, on, reading, short_time
+from ...measures.text import figure, on, reading, short_time
 from ..over_time import BothRuns, QuantityChart
 from .between import own_series, shown_series
 from .budget import Budget

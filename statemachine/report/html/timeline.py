@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...comparison import common_moments
 from ...interface import Array, Ints
-from ...traces import Trace
+from ...measures import common_moments
+from ...runs import Trace
 
 _SMOOTH = 1 / 60  # seconds between two pictures that look like motion
 

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from ...errors import BadInputError
-from ...traces.whole import check_place, replace_text
+from ...runs.whole import check_place, replace_text
 
 SUFFIXES = (".html", ".htm")
 

@@ -12,11 +12,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..comparison.text import count
 from ..errors import BadInputError, StateMachineError
 from ..interface import Data, Model
 from ..interface.checks import as_vector
-from ..scenarios import Controller, Scenario
+from ..measures.text import count
+from .scenarios import Controller, Scenario
 
 Function = Callable[..., Any]
 _TAKES = ("model", "data")

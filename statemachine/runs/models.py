@@ -9,8 +9,8 @@ from pathlib import Path
 
 from ..errors import ModelFileError, StateMachineError
 from ..models import resolve
-from ..scenarios.provenance import model_digest
 from .header import Header
+from .provenance import model_digest
 
 
 def model_file(

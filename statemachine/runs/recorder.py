@@ -15,12 +15,12 @@ import numpy as np
 from ..errors import BadInputError, DivergedError, EngineError, TraceError
 from ..interface import Array, Data, Model, State, make_data, reset, set_state, step
 from ..interface.checks import HUGE
-from ..scenarios import Controller, Scenario
-from ..scenarios.provenance import provenance
-from ..scenarios.runs import Progress, check_length, part_of, silent, steps_in, write_ctrl
 from .derived import derived
+from .drive import Progress, check_length, part_of, silent, steps_in, write_ctrl
 from .energy import energies
 from .header import Header
+from .provenance import provenance
+from .scenarios import Controller, Scenario
 from .trace import Trace
 
 

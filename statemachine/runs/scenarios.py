@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ..comparison.text import count, listed
 from ..errors import BadInputError, unknown_name
 from ..interface import Array, Data, Model
+from ..measures.text import count, listed
 from .commands import TARGET, hold_ctrl, home, is_servo, waves
 from .robot import has_floor, is_the_arm
 

@@ -13,7 +13,7 @@ from typing import Any
 from ..errors import TraceError
 from ..interface import OPTIONS, JointType
 from ..interface.checks import HUGE
-from ..scenarios.provenance import Provenance
+from .provenance import Provenance
 
 SCHEMA = 1
 # Columns of numbers, one row for each moment; widths are numbers or counts of the header.

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..comparison import ContactNames
 from ..errors import TraceError
 from ..interface import Array, Ints
 from ..interface.checks import HUGE, index_of
+from ..measures import ContactNames
 from .checked import LARGEST
 from .header import COLUMNS, CONTACTS, INPUTS, Header
 

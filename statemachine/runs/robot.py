@@ -7,10 +7,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..comparison import ContactNames
 from ..errors import BadInputError
 from ..interface import Array, Contacts, JointType, Model
 from ..interface.checks import check_entries
+from ..measures import ContactNames
 
 ARM = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
 _PLANE, _HFIELD = 0, 1  # mjtGeom

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import DivergedError, UnsupportedError
 from ..interface import DERIVED, Array, Data, Model, forward, get_state, make_data, set_state, step
-from ..scenarios.runs import Progress
+from .drive import Progress
 from .trace import COLUMNS, CONTACTS
 
 _TOLD = tuple(name for name in DERIVED if name in COLUMNS)
