@@ -10,13 +10,13 @@ import numpy as np
 
 from ..engines import part
 from ..engines.parts import AsItComes
-from ..errors import BadInputError, DivergedError, UnsupportedError
-from ..interface import Data, JointType, Model, make_data, reset, step
+from ..errors import BadInputError, UnsupportedError
+from ..interface import Data, JointType, Model, make_data, reset
 from ..measures import largest
 from ..measures.text import apart, short_time, signed
 from ..page import Page, Question, Table, Text
 from ..runs.commands import is_servo, load_at_start, start_keyframe
-from ..runs.drive import Progress, cost_of_a_second, part_of, steps_in
+from ..runs.drive import Progress, cost_of_a_second, drive, part_of, steps_in
 from ..runs.provenance import provenance
 from ..runs.robot import ARM, has_floor, is_the_arm
 from ..runs.scenarios import SCENARIOS, drives
@@ -151,13 +151,9 @@ def _left_alone(model: Model, joint: str, seconds: float, progress: Progress) ->
     with make_data(model) as data:
         reset(model, data, start_keyframe(model))
         fall = Falling(data, joint, seconds, progress)
-        try:
-            for _ in range(steps_in(model, seconds)):
-                step(model, data)
-                fall.note(contacts=False)
-            return fall.end()
-        except DivergedError as error:
-            return fall.gave_up(error.time)
+        steps = steps_in(model, seconds)
+        error = drive(model, data, None, steps, after=lambda _k, _time: fall.note(contacts=False))
+        return fall.end() if error is None else fall.gave_up(error.time)
 
 
 def page(results: Mapping[str, Gravity], session: Session) -> Page:

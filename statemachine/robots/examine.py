@@ -28,9 +28,10 @@ from ..errors import (
     UnsupportedError,
 )
 from ..installed import DEFAULT, WITNESS, require
-from ..interface import Model, get_state, make_data, reset, set_state, step
+from ..interface import Array, Data, Model, get_state, make_data, reset, set_state, step
 from ..lessons.in_turns import Ratio, in_turns
 from ..runs import record_scenario
+from ..runs.drive import drive
 from ..runs.scenarios import scenario
 from . import gaps
 from .places import witness_row
@@ -179,16 +180,12 @@ class _Examination:
         ends = []
         with make_data(model) as data:
             reset(model, data, gaps.keyframe_of(model))
-            for ctrl in orders[:_FUTURE]:
-                data.ctrl[:] = ctrl
-                step(model, data)
+            _follow(model, data, orders[:_FUTURE])
             state = get_state(model, data)
             for again in range(3):
                 if again:
                     set_state(model, data, state)
-                for ctrl in orders[_FUTURE:]:
-                    data.ctrl[:] = ctrl
-                    step(model, data)
+                _follow(model, data, orders[_FUTURE:])
                 ends.append(get_state(model, data))
         if model.capabilities.exact_restore and ends[0] != ends[1]:
             return False
@@ -239,6 +236,12 @@ class _Examination:
                 }
                 times = in_turns(ways, _ROUNDS, seed=self.seed)
         return round(Ratio.of("", times["ours"], times["alone"]).median, 3)
+
+
+def _follow(model: Model, data: Data, orders: Array) -> None:
+    error = drive(model, data, gaps.in_order(orders), len(orders))
+    if error is not None:
+        raise error
 
 
 def _features(error: StateMachineError) -> tuple[str, ...]:

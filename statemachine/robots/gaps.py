@@ -9,8 +9,9 @@ import numpy as np
 
 from ..engines.futures import Coordinates, gap
 from ..errors import StateMachineError
-from ..interface import Array, JointType, Model, make_data, reset, step
+from ..interface import Array, JointType, Model, make_data, reset
 from ..runs.commands import start_keyframe
+from ..runs.drive import Controller, drive
 from .records import TOLERANCE, RunGap
 
 STEPS = 400
@@ -46,6 +47,12 @@ def commands(model: Model, steps: int, seed: int) -> Array:
     return np.repeat(middle + half * drawn, _HOLDS, axis=0)[:steps]
 
 
+def in_order(orders: Array) -> Controller:
+    """The controller that gives each row of `orders` (n, nu) in turn."""
+    rows = iter(orders)
+    return lambda _time, _data: next(rows)
+
+
 def keyframe_of(model: Model) -> int | None:
     """Where a run of a model starts, as in the experiments; None for the default state."""
     name = start_keyframe(model)
@@ -54,21 +61,22 @@ def keyframe_of(model: Model) -> int | None:
 
 def run(model: Model, orders: Array) -> Run:
     """Run a model from its start; `orders` (n, nu) is the ctrl of each step."""
-    qpos, qvel, ended = [], [], ""
+    rows, ended = [], ""
     with make_data(model) as data:
         reset(model, data, keyframe_of(model))
-        qpos.append(data.qpos.copy())
-        qvel.append(data.qvel.copy())
-        for ctrl in orders:
-            data.ctrl[:] = ctrl
-            try:
-                step(model, data)
-            except StateMachineError as error:
-                ended = f"{model.backend} stopped: {error}"
-                break
-            qpos.append(data.qpos.copy())
-            qvel.append(data.qvel.copy())
-    return Run(np.array(qpos), np.array(qvel), ended)
+
+        def keep(_k: int, _time: float) -> None:
+            rows.append((data.qpos.copy(), data.qvel.copy()))
+
+        keep(0, 0.0)
+        try:
+            error = drive(model, data, in_order(orders), len(orders), after=keep)
+        except StateMachineError as refusal:
+            error = refusal
+        if error is not None:
+            ended = f"{model.backend} stopped: {error}"
+    qpos, qvel = map(np.array, zip(*rows, strict=True))
+    return Run(qpos, qvel, ended)
 
 
 def run_gap(one: Model, other: Model, seed: int, halve: bool = False) -> RunGap:

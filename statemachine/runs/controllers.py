@@ -16,7 +16,8 @@ from ..errors import BadInputError, StateMachineError
 from ..interface import Data, Model
 from ..interface.checks import as_vector
 from ..measures.text import count
-from .scenarios import Controller, Scenario
+from .drive import Controller
+from .scenarios import Scenario
 
 Function = Callable[..., Any]
 _TAKES = ("model", "data")

@@ -15,12 +15,10 @@ import numpy as np
 from ..errors import BadInputError, unknown_name
 from ..interface import Array, Data, Model
 from ..measures.text import count, listed
-from .commands import TARGET, hold_ctrl, home, is_servo, waves
+from .commands import hold_ctrl, home, is_servo, waves
+from .drive import Controller
 from .robot import has_floor, is_the_arm
 
-__all__ = ["MOVING", "SCENARIOS", "TARGET", "Controller", "Scenario", "fitting", "scenario"]
-
-Controller = Callable[[float, Data], Any]  # (time, data) -> ctrl, or None to leave it
 # Swings the arm with the box in its jaws by 23 degrees.
 MOVING = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)
 
