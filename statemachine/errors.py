@@ -156,6 +156,12 @@ def shown(value: object) -> str:
     return text if len(text) <= 200 else f"{text[:197]}..."
 
 
+def did_you_mean(name: str, known: Iterable[str], cutoff: float = 0.5) -> str:
+    """The end of a message about a mistyped name: the nearest that is known, or nothing."""
+    close = difflib.get_close_matches(name, tuple(known), 1, cutoff)
+    return f". Did you mean {close[0]}?" if close else ""
+
+
 def unknown_name(kind: str, name: object, known: Iterable[str]) -> UnknownNameError:
     """The error for a mistyped name: what is known, and the nearest spelling."""
     names = tuple(known)

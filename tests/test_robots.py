@@ -53,7 +53,7 @@ URDF = """<robot name='r'><link name='base'/><link name='tip'><inertial><mass va
 # Read before anything else by the Python that examines; by the name of its model it goes wrong.
 SABOTAGE = """
 import json, os, sys, time
-if "statemachine.robots._child" in " ".join(sys.orig_argv):
+if "statemachine.robots.examine" in " ".join(sys.orig_argv):
     file = json.load(open(sys.orig_argv[-2]))["file"]
     if "crash" in file:
         os.abort()
@@ -382,7 +382,7 @@ def test_an_interrupt_leaves_a_table_and_no_process(
         except OSError:
             continue
         environment = entry.parent / "environ"
-        if b"robots._child" in words:
+        if b"robots.examine" in words:
             assert str(sabotage).encode() not in environment.read_bytes()
 
 
