@@ -24,57 +24,31 @@ _CREEP = 0.05  # of the way; a joint that goes on by more has not settled
 _FURTHER = 0.02  # rad or m; less is not worth a cause
 
 
-@dataclass(frozen=True)
-class Forces:
-    """The generalized forces on one joint at one moment [N·m; of a slide, N].
-
-    `bias` is on the other side of the equation of motion, so that gravity acts as
-    -bias; a part that the engine does not yield is None. `total` is what is left over
-    to accelerate the joint: zero at rest.
-    """
-
-    bias: float | None
-    actuator: float | None
-    passive: float | None
-    friction: float | None
-    contact: float | None
-    limit: float | None
-    equality: float | None
-
-    @property
-    def total(self) -> float | None:
-        """Sum of all parts, -bias among them; None if one is missing."""
-        parts = (
-            self.actuator,
-            self.passive,
-            self.friction,
-            self.contact,
-            self.limit,
-            self.equality,
-        )
-        if self.bias is None or any(part is None for part in parts):
-            return None
-        return sum(part for part in parts if part is not None) - self.bias
+# The generalized forces on one joint at one moment [N·m; of a slide, N], by the names of
+# `qfrc_…`. "bias" is on the other side of the equation of motion, so that gravity acts as -bias;
+# a part that the engine does not yield is None. "total" is what is left over to accelerate the
+# joint, zero at rest; None if a part is missing.
+Forces = dict[str, float | None]
+_PARTS = ("actuator", "passive", "friction", "contact", "limit", "equality")
 
 
 def forces_on(data: Data, dof: int) -> Forces:
     """Forces on a degree of freedom, of the moment that `data`'s derived arrays show."""
-
-    def part(name: str) -> float | None:
+    forces: Forces = {}
+    for name in ("bias", *_PARTS):
         try:
-            return float(getattr(data, f"qfrc_{name}")[dof])
+            forces[name] = float(getattr(data, f"qfrc_{name}")[dof])
         except UnsupportedError:
-            return None
+            forces[name] = None
+    return summed(forces)
 
-    return Forces(
-        bias=part("bias"),
-        actuator=part("actuator"),
-        passive=part("passive"),
-        friction=part("friction"),
-        contact=part("contact"),
-        limit=part("limit"),
-        equality=part("equality"),
-    )
+
+def summed(forces: Forces) -> Forces:
+    """The parts, and their "total"."""
+    known = [part for name in _PARTS if (part := forces[name]) is not None]
+    bias = forces["bias"]
+    whole = len(known) == len(_PARTS) and bias is not None
+    return {**forces, "total": sum(known) - bias if whole else None}
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +187,7 @@ class Falling:
             position=where,
             path=np.array(self._path),
             qpos=np.full(self._model.nq, np.nan),
-            forces=Forces(None, None, None, None, None, None, None),
+            forces=dict.fromkeys(("bias", *_PARTS, "total")),
             velocity=none,
             acceleration=none,
             touches=self._touches,
@@ -348,9 +322,8 @@ def _caught(prefix: str, result: Gravity, floor: Droop, free: Droop) -> Text | V
         f"{prefix}it is the contact that catches {result.joint}, not damping or friction: without "
         f"contacts it runs on to {position(alone, slide)}"
     )
-    if abs(free.forces.limit or 0.0) > BALANCE:
-        unit = "N" if slide else "N·m"
-        text += f", where its limit stops it with {abs(free.forces.limit or 0):.4f} {unit}"
+    if (limit := abs(free.forces["limit"] or 0.0)) > BALANCE:
+        text += f", where its limit stops it with {limit:.4f} {'N' if slide else 'N·m'}"
     if abs(float(floor.position[-1]) - then) > abs(then) * _CREEP:
         text += (
             f". And it does not stay where it was caught: at {short:g} s it is at "

@@ -19,7 +19,7 @@ from ._hold import Hold, apart_freely, apart_until, at, at_end, gap, question, r
 from ._robot import Coordinate, coordinate, start_line
 from ._words import differences, page_of, spans, typed, where
 from .records import Session
-from .session import CodeRun, CodeWatch
+from .session import CodeRun
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
 _PRINTED = (0.1, 0.2, 0.3, 0.4)  # s; and at the end
@@ -58,7 +58,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Hold:
     addresses = np.array([(at.place, at.dof) for at, _ in driven.values()], dtype=np.int64)
     total = steps_in(model, options["seconds"])
     way = _Way(model, addresses[:, 0], total, progress)
-    play(way)
+    play(before=way.before, after=way.after)
     _, data = play.worlds[0]
     way.end(data)
     ctrl = data.ctrl.copy()
@@ -105,7 +105,7 @@ def _goals(model: Model, ctrl: Array, servos: list[int | None]) -> Array:
     return np.array([np.nan if i is None else ctrl[i] / model.actuator_gear[i] for i in servos])
 
 
-class _Way(CodeWatch):
+class _Way:
     """Where the joints are after each step, and what the robot touched."""
 
     def __init__(self, model: Model, places: Ints, total: int, progress: Progress) -> None:
@@ -118,10 +118,10 @@ class _Way(CodeWatch):
         self.touching: tuple[str, ...] = ()
         self.contact_steps = 0
 
-    def before_step(self, model: Model, data: Data) -> None:
+    def before(self, _model: Model, data: Data) -> None:
         self._note(data)
 
-    def after_step(self, model: Model, data: Data) -> None:
+    def after(self, model: Model, data: Data) -> None:
         # The contacts of a step are those of the state that it started from.
         found = touching(model, data.contacts, self.robot)
         self.contact_steps += bool(found)

@@ -137,14 +137,14 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Replay
     model, nstep, way = play.model, options["steps"], options["break"]
     shares = [part_of(progress, k / 3, 1 / 3) for k in range(3)]
     paths = Paths(nstep, progress if way else shares[0])
-    play(paths)
+    play(before=paths.before, after=paths.after)
     first, second = paths.both()
     broken, finer = [], None
     if way is None:
         for each, share in zip(BREAKS, shares[1:], strict=True):
             watch = Paths(nstep, share)
             with CodeRun(code(model, {**options, "break": each}, "sm.load()"), model) as other:
-                other(watch)
+                other(before=watch.before, after=watch.after)
             broken.append(Broken.of(each, *watch.both()))
         finer = _finer(model, options, first[-1])
     gap = first - second
