@@ -15,9 +15,9 @@ import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +27,10 @@ from ..errors import BadInputError, EngineError, StateMachineError
 from ..installed import DEFAULT, engine_version
 from . import sandbox
 from .calls import reason
-from .examine import judged
+from .examine import Judgement, judged
 from .judges import JUDGES, judge_of
 from .own_files import LARGEST, digest, has_solutions, in_folder, named_by
+from .parallel import in_parallel
 from .recording import START, FunctionRecording, Limits, record
 from .unwinding import unwinding
 from .worlds import ExerciseWorld, Scenes
@@ -38,25 +39,6 @@ LOOK = "please look at this"
 TIME_LIMIT = 5.0  # [s] of computing for a function, from when its worlds are ready
 WALL_LIMIT = 10.0  # [s] on the clock for it, those apart in which others have the processor
 _TIMES = 2  # so many times what may be computed, at least
-
-
-@dataclass(frozen=True)
-class Judgement:
-    """What was found out about one function.
-
-    Attributes:
-        function: Its name.
-        written: False where it is still to be written.
-        passed: Whether it does what it should.
-        remarks: What is wrong with it, or what was verified, a line each.
-        judged: False where there is no verdict, for which the machine may be the reason.
-    """
-
-    function: str
-    written: bool
-    passed: bool
-    remarks: tuple[str, ...]
-    judged: bool = True
 
 
 @dataclass(frozen=True)
@@ -202,27 +184,23 @@ class ExerciseJudge:
         self, copy: _Copy, folder: Path, progress: Callable[[float], None]
     ) -> tuple[Judgement, ...]:
         """All functions at once, so that the slowest decides how long it takes."""
-        backend, limits, stop = self.backend, self.limits, threading.Event()
-        with ThreadPoolExecutor(len(JUDGES)) as pool:
-            try:
-                futures = {
-                    name: pool.submit(_recorded, copy, name, backend, limits, folder / name, stop)
-                    for name in JUDGES
-                }
-                # Meanwhile what is right is worked out here, where no code of the student's runs.
-                key = self._answer_key()
-                waiting = set(futures.values())
-                while waiting:
-                    if self.stop.is_set():
-                        stop.set()
-                    waiting = wait(waiting, timeout=0.1).not_done
-                    progress(1 - len(waiting) / len(futures))
-                return tuple(
-                    _judgement(copy, name, limits, *key[name], future.result())
-                    for name, future in futures.items()
-                )
-            finally:
-                stop.set()  # after an interrupt nothing goes on
+        stop, found = threading.Event(), dict[str, Any]()
+        work: dict[str, Callable[[], Any]] = {
+            name: partial(_recorded, copy, name, self.backend, self.limits, folder / name, stop)
+            for name in JUDGES
+        }
+
+        def waiting(left: int) -> None:
+            if self.stop.is_set():
+                stop.set()
+            progress(1 - left / len(work))
+
+        # Meanwhile what is right is worked out here, where no code of the student's runs.
+        work[""] = self._answer_key
+        in_parallel(work, len(work), found.__setitem__, stop.set, waiting)
+        return tuple(
+            _judgement(copy, name, self.limits, *found[""][name], found[name]) for name in JUDGES
+        )
 
     def _answer_key(self) -> dict[str, tuple[list[ExerciseWorld], list[Any]]]:
         """For each function what it is called on, and what is right there."""
@@ -341,14 +319,10 @@ def _verdict(
     if recording.forbidden:
         return Judgement(name, True, False, tuple(recording.forbidden))
     try:
-        verdict = judged(judge_of(name), worlds, rights, recording.answers)
+        if judgement := judged(name, worlds, rights, recording.answers):
+            return judgement
     except Exception as error:  # what was recorded may have been made up
         recording.broken = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
-        verdict = None
-    if verdict is not None:
-        holds = all(remark.holds for remark in verdict.remarks)
-        texts = tuple(remark.text for remark in verdict.remarks)
-        return Judgement(name, verdict.written, holds, texts)
     if recording.broken:
         text = f"what its process recorded is no record of a run ({recording.broken})"
         return Judgement(name, True, False, (text,))

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 
 if TYPE_CHECKING:
     from ..answers import Answer
-    from ..calls import Remark
     from ..worlds import ExerciseWorld, Scenes
 
 # By the functions of the student's file, in the order in which they stand there.
@@ -35,8 +34,8 @@ class Judge(Protocol):
         """What is right on each of the worlds, worked out by us."""
         ...
 
-    def judge(self, answer: Answer, world: ExerciseWorld, right: Any) -> list[Remark]:
-        """What is wrong with what it did there; or, in one remark that holds, what is right.
+    def judge(self, answer: Answer, world: ExerciseWorld, right: Any) -> list[str] | str:
+        """What is wrong with what it did there, a line each; or, in one text, what is right.
 
         Raises:
             FaultError: There is nothing to look at.
