@@ -59,7 +59,7 @@ _HOMES = {
 }
 _MODULES = (
     "backends", "compare", "conformance", "errors", "kinematics", "models",
-    "rotations", "traces",
+    "rotations", "runs",
 )  # fmt: skip
 
 __all__ = [

@@ -14,7 +14,7 @@ import statemachine as sm
 from statemachine.runs import Trace, record_scenario, write
 from statemachine.runs.scenarios import SCENARIOS
 
-FOLDER = Path(__file__).resolve().parents[2] / "statemachine" / "traces" / "recorded"
+FOLDER = Path(__file__).resolve().parents[2] / "statemachine" / "runs" / "recorded"
 
 
 # Name of the file: the scenario, and how PyBullet is loaded.

@@ -59,8 +59,8 @@ def read(path: str | os.PathLike[str]) -> Trace:
     """Open a trace. No engine is needed; nothing in the file is run.
 
     A file is not trusted: it may unfold into 256 MB or into a hundred times its size, and
-    into 4 GB at most. A parquet file carries a digest of its numbers, which is verified (one
-    of an earlier version has none, and opens); an npz file has a checksum of each array.
+    into 4 GB at most. A parquet file carries a digest of its numbers, which is verified; an npz
+    file has a checksum of each array.
 
     Raises:
         TraceError: The file is not there, or is no trace, or is damaged.
