@@ -219,7 +219,7 @@ def test_a_sum_that_is_none_is_still_found(model: Any) -> None:
 
 
 def test_a_divergence_costs_its_row(model: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    from statemachine.lessons import gravity
+    from statemachine.runs import drive
 
     steps = [0]
 
@@ -229,7 +229,7 @@ def test_a_divergence_costs_its_row(model: Any, monkeypatch: pytest.MonkeyPatch)
             raise errors.DivergedError("gone", time=data.time, quantity="qpos", index=0)
         sm.step(model, data)
 
-    monkeypatch.setattr(gravity, "step", step)
+    monkeypatch.setattr(drive, "step", step)
     found, page, _ = lesson("gravity", model(PASSIVE), seconds=0.1, longer=2.0)
     run = found.longer["contacts"]
     assert run.diverged == pytest.approx(1.4)

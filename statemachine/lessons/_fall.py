@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -290,21 +291,21 @@ def longer_apart(results: Mapping[str, Gravity]) -> list[tuple[str, Any]]:
         runs = [each.longer[label] for each in results.values() if label in each.longer]
         last = min(len(run.position) for run in runs) - 1
         rows.append(
-            (f"{first.off()}, {label}, at {first.longer[label].time[last]:g} s", _gap(label, last))
+            (
+                f"{first.off()}, {label}, at {first.longer[label].time[last]:g} s",
+                partial(_gap, label, last),
+            )
         )
     return rows
 
 
-def _gap(label: str, row: int) -> Any:
-    def say(one: Gravity, two: Gravity) -> str:
-        if label not in one.longer or label not in two.longer:
-            return NONE
-        ends = [each.longer[label].position[row] for each in (one, two)]
-        if not np.isfinite(ends).all():
-            return "one diverged"
-        return apart(abs(float(ends[0] - ends[1])), one.slide)
-
-    return say
+def _gap(label: str, row: int, one: Gravity, two: Gravity) -> str:
+    if label not in one.longer or label not in two.longer:
+        return NONE
+    ends = [each.longer[label].position[row] for each in (one, two)]
+    if not np.isfinite(ends).all():
+        return "one diverged"
+    return apart(abs(float(ends[0] - ends[1])), one.slide)
 
 
 def _caught(prefix: str, result: Gravity, floor: Droop, free: Droop) -> Text | Verdict:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -187,7 +188,9 @@ def page(results: Mapping[str, Forward], session: Session) -> Page:
         blocks += _findings(results, name, result)
     promises = ["zeros when fresh", "stale after a write"]
     blocks += emulation(results, *promises, *["stale after a step"] * lag)
-    rows = [(f"{a_tip(tip)}, reading {i + 1}", _apart(i)) for i in range(len(first.readings))]
+    rows = [
+        (f"{a_tip(tip)}, reading {i + 1}", partial(_apart, i)) for i in range(len(first.readings))
+    ]
     blocks += differences(results, rows)
     if arrays:
         blocks += arrays_section(stages, _own(results, "write"))
@@ -285,9 +288,6 @@ def _own(results: Mapping[str, Forward], question: str) -> dict[str, list[OwnAns
     }
 
 
-def _apart(reading: int) -> Callable[[Forward, Forward], str]:
-    def say(one: Forward, two: Forward) -> str:
-        tips = [each.readings[reading].fingertip for each in (one, two)]
-        return f"{math.dist(*tips):.1e} m"
-
-    return say
+def _apart(reading: int, one: Forward, two: Forward) -> str:
+    tips = [each.readings[reading].fingertip for each in (one, two)]
+    return f"{math.dist(*tips):.1e} m"

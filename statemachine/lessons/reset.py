@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -230,7 +231,7 @@ def page(results: Mapping[str, Reset], session: Session) -> Page:
     blocks += differences(
         results,
         [
-            (f"rise of the {scene.body}, {scene.name}", _rise(k))
+            (f"rise of the {scene.body}, {scene.name}", partial(_rise, k))
             for k, scene in enumerate(first.scenes)
             if scene.body
         ],
@@ -299,9 +300,6 @@ def _finding(results: Mapping[str, Reset], name: str, number: int, file: str) ->
     )
 
 
-def _rise(number: int) -> Any:
-    def say(one: Reset, two: Reset) -> str:
-        rises = millimetres(two.scenes[number].rise, 3), millimetres(one.scenes[number].rise, 3)
-        return f"{rises[0]} instead of {rises[1]}"
-
-    return say
+def _rise(number: int, one: Reset, two: Reset) -> str:
+    rises = [millimetres(each.scenes[number].rise, 3) for each in (two, one)]
+    return " instead of ".join(rises)
