@@ -150,6 +150,12 @@ class DivergedWarning(UserWarning):
     """Some of many worlds diverged and are left out from now on."""
 
 
+def check_name(kind: str, name: object, known: Iterable[str]) -> None:
+    """Raise UnknownNameError for a name that is not known."""
+    if not isinstance(name, str) or name not in known:
+        raise unknown_name(kind, name, known)
+
+
 def shown(value: object) -> str:
     """What somebody gave, on one line of a message."""
     text = " ".join("".join(c if c.isprintable() else " " for c in repr(value)).split())

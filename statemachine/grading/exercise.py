@@ -189,27 +189,73 @@ class ExerciseJudge:
             name: partial(_recorded, copy, name, self.backend, self.limits, folder / name, stop)
             for name in JUDGES
         }
+        # Meanwhile what is right is worked out here, where no code of the student's runs.
+        work[""] = self._work_out
 
         def waiting(left: int) -> None:
             if self.stop.is_set():
                 stop.set()
             progress(1 - left / len(work))
 
-        # Meanwhile what is right is worked out here, where no code of the student's runs.
-        work[""] = self._answer_key
         in_parallel(work, len(work), found.__setitem__, stop.set, waiting)
-        return tuple(
-            _judgement(copy, name, self.limits, *found[""][name], found[name]) for name in JUDGES
-        )
+        return tuple(self._judgement(copy, name, found[name]) for name in JUDGES)
 
-    def _answer_key(self) -> dict[str, tuple[list[ExerciseWorld], list[Any]]]:
-        """For each function what it is called on, and what is right there."""
+    def _work_out(self) -> None:
+        """For each function what it is called on, and what is right there; once."""
         with self._lock:
             if not self._key:
                 scenes = Scenes(self.backend, Path(tempfile.mkdtemp(dir=self._folder)))
                 worlds = {name: judge_of(name).worlds(scenes) for name in JUDGES}
                 self._key = {name: (w, judge_of(name).right(w)) for name, w in worlds.items()}
-            return self._key
+
+    def _judgement(self, copy: _Copy, name: str, recording: FunctionRecording) -> Judgement:
+        if recording.refusal:
+            kind, text = recording.refusal
+            known = getattr(errors, kind, None)
+            if isinstance(known, type) and issubclass(known, StateMachineError):
+                raise known(text)
+            raise EngineError(text)
+        others = copy.others(recording.reads)
+        if borrowed := ", ".join(other for other, matters in others.items() if matters):
+            text = (
+                f"not graded: it reads {borrowed}, which was not handed in with it. Is that your "
+                "own? Put it into this file"
+            )
+            return Judgement(name, True, False, (text,), judged=False)
+        looks = tuple(f"{LOOK}: it reads {other}" for other in others)
+        judgement = self._verdict(copy, name, recording)
+        return replace(judgement, remarks=judgement.remarks + looks)
+
+    def _verdict(self, copy: _Copy, name: str, recording: FunctionRecording) -> Judgement:
+        if recording.forbidden:
+            return Judgement(name, True, False, tuple(recording.forbidden))
+        try:
+            if judgement := judged(name, *self._key[name], recording.answers):
+                return judgement
+        except Exception as error:  # what was recorded may have been made up
+            recording.broken = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+        if recording.broken:
+            text = f"what its process recorded is no record of a run ({recording.broken})"
+            return Judgement(name, True, False, (text,))
+        if not recording.began:
+            return Judgement(name, True, False, (_not_ready(recording.outcome),), judged=False)
+        # It did not come to its end. The innermost line of the student's file comes first in what
+        # is noted last.
+        outcome, last = recording.outcome, recording.trace.rpartition("Timeout (")[2]
+        lines = re.findall(rf'File "{re.escape(str(copy.path))}", line (\d+)', last)
+        where = f"line {lines[0]}: " if lines else ""
+        if not outcome.timed_out:
+            text = where + _how_it_ended(self.limits, outcome)
+            return Judgement(name, True, False, (text,))
+        computed = max(0.0, outcome.cpu - recording.cpu)
+        busy, clock = "is this machine busy?", outcome.wall
+        if outcome.asleep > self.limits.wall:
+            busy, clock = "does it wait for something (sleep, a lock)?", self.limits.wall
+        text = (
+            f"{where}nothing could be judged: not at its end after {clock:.3g} s on the clock, "
+            f"of which it computed for {computed:.1f} s: {busy}"
+        )
+        return Judgement(name, True, False, (text,), judged=False)
 
 
 def _python_file(path: Path) -> Path:
@@ -280,75 +326,6 @@ def _recorded(
     if recording.began or recording.refusal or recording.broken or stop.is_set():
         return recording
     return record(copy.path, copy.folder, name, backend, limits, folder / "2", stop)
-
-
-def _judgement(
-    copy: _Copy,
-    name: str,
-    limits: Limits,
-    worlds: list[ExerciseWorld],
-    rights: list[Any],
-    recording: FunctionRecording,
-) -> Judgement:
-    if recording.refusal:
-        kind, text = recording.refusal
-        known = getattr(errors, kind, None)
-        if isinstance(known, type) and issubclass(known, StateMachineError):
-            raise known(text)
-        raise EngineError(text)
-    others = copy.others(recording.reads)
-    if borrowed := ", ".join(other for other, matters in others.items() if matters):
-        text = (
-            f"not graded: it reads {borrowed}, which was not handed in with it. Is that your own? "
-            "Put it into this file"
-        )
-        return Judgement(name, True, False, (text,), judged=False)
-    looks = tuple(f"{LOOK}: it reads {other}" for other in others)
-    judgement = _verdict(copy.path, name, limits, worlds, rights, recording)
-    return replace(judgement, remarks=judgement.remarks + looks)
-
-
-def _verdict(
-    path: Path,
-    name: str,
-    limits: Limits,
-    worlds: list[ExerciseWorld],
-    rights: list[Any],
-    recording: FunctionRecording,
-) -> Judgement:
-    if recording.forbidden:
-        return Judgement(name, True, False, tuple(recording.forbidden))
-    try:
-        if judgement := judged(name, worlds, rights, recording.answers):
-            return judgement
-    except Exception as error:  # what was recorded may have been made up
-        recording.broken = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
-    if recording.broken:
-        text = f"what its process recorded is no record of a run ({recording.broken})"
-        return Judgement(name, True, False, (text,))
-    if not recording.began:
-        return Judgement(name, True, False, (_not_ready(recording.outcome),), judged=False)
-    return _unfinished(path, name, limits, recording)
-
-
-def _unfinished(path: Path, name: str, limits: Limits, recording: FunctionRecording) -> Judgement:
-    """The judgement on a function that did not come to its end."""
-    outcome, trace = recording.outcome, recording.trace
-    # The innermost line of the student's file comes first in what is noted last.
-    last = trace.rpartition("Timeout (")[2]
-    lines = re.findall(rf'File "{re.escape(str(path))}", line (\d+)', last)
-    where = f"line {lines[0]}: " if lines else ""
-    if not outcome.timed_out:
-        return Judgement(name, True, False, (where + _how_it_ended(limits, outcome),))
-    computed = max(0.0, outcome.cpu - recording.cpu)
-    busy, clock = "is this machine busy?", outcome.wall
-    if outcome.asleep > limits.wall:
-        busy, clock = "does it wait for something (sleep, a lock)?", limits.wall
-    text = (
-        f"{where}nothing could be judged: not at its end after {clock:.3g} s on the clock, "
-        f"of which it computed for {computed:.1f} s: {busy}"
-    )
-    return Judgement(name, True, False, (text,), judged=False)
 
 
 def _not_ready(outcome: sandbox.ProcessOutcome) -> str:

@@ -218,8 +218,15 @@ def page(results: Mapping[str, WorldsSpeed], session: Session) -> Any:
             Table(
                 ("worlds", "workers", "to make them", "a step of one", "worlds to one Data"),
                 [
-                    (f"{c.n:,}", f"{c.workers}", duration(c.made), duration(c.step), _spread(c))
+                    (
+                        f"{c.n:,}",
+                        f"{c.workers}",
+                        duration(c.made),
+                        duration(c.step),
+                        c.faster.spread(" ×"),
+                    )
                     for c in result.costs
+                    for more in [c.faster.spread(" ×")]
                 ],
                 title=f"Wall time with the number of worlds: {name}",
                 words=frozenset(),
@@ -282,11 +289,6 @@ def _told(result: WorldsSpeed) -> str:
         f"is seen with {count(best.n, 'world')}: a step of one takes {duration(best.step)}, and "
         f"{best.faster.median:.2f} times as many steps are taken as with one Data in bulk."
     )
-
-
-def _spread(cost: WorldsCost) -> str:
-    ratio = cost.faster
-    return f"{ratio.median:.2f} ×  ({ratio.low:.2f} to {ratio.high:.2f})"
 
 
 def _memory(size: float | None) -> str:

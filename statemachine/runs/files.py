@@ -15,8 +15,8 @@ from ..errors import (
     ModelFileError,
     StateMachineError,
     TraceError,
+    check_name,
     did_you_mean,
-    unknown_name,
 )
 from ..models import resolve
 from .header import Header
@@ -96,8 +96,7 @@ def shipped(experiment: str, backend: str, defaults: str = "model") -> Trace:
         UnknownNameError: None was recorded of this.
     """
     name = f"{experiment}.{backend}" + (".engine" if defaults == "engine" else "")
-    if name not in shipped_names():
-        raise unknown_name("recorded trace", name, shipped_names())
+    check_name("recorded trace", name, shipped_names())
     return read(_FOLDER / f"{name}.npz")
 
 

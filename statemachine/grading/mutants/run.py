@@ -20,7 +20,14 @@ from typing import Any
 
 from ...backends import backend_names
 from ...engines import rooms_with
-from ...errors import BadInputError, EngineError, MissingEngineError, ModelFileError, unknown_name
+from ...errors import (
+    BadInputError,
+    EngineError,
+    MissingEngineError,
+    ModelFileError,
+    check_name,
+    unknown_name,
+)
 from ...installed import DEFAULT, engine_version, require
 from ...processes import checked_jobs
 from .. import sandbox
@@ -129,7 +136,9 @@ def examine(
         EngineError: pytest did not come as far as the tests.
     """
     path = _test_file(file)
-    mutants = [_mutant(name) for name in dict.fromkeys(only or MUTANTS)]
+    for name in only:
+        check_name("mutant", name, MUTANTS)
+    mutants = [MUTANTS[name] for name in dict.fromkeys(only or MUTANTS)]
     version = _ready(backend)
     with unwinding():
         return _examine(path, backend, version, mutants, seconds, clock, progress)
@@ -179,12 +188,6 @@ def _test_file(file: str | os.PathLike[str]) -> Path:
     if path.suffix != ".py":
         raise BadInputError(f"{path.name} is no Python file: --mutants takes a file of tests")
     return path
-
-
-def _mutant(name: str) -> Mutant:
-    if name not in MUTANTS:
-        raise unknown_name("mutant", name, MUTANTS)
-    return MUTANTS[name]
 
 
 def _ready(backend: str) -> str:
