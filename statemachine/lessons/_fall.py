@@ -48,8 +48,9 @@ def summed(forces: Forces) -> Forces:
     """The parts, and their "total"."""
     known = [part for name in _PARTS if (part := forces[name]) is not None]
     bias = forces["bias"]
-    whole = len(known) == len(_PARTS) and bias is not None
-    return {**forces, "total": sum(known) - bias if whole else None}
+    if bias is None or len(known) < len(_PARTS):
+        return {**forces, "total": None}
+    return {**forces, "total": sum(known) - bias}
 
 
 @dataclass(frozen=True, eq=False)

@@ -226,7 +226,6 @@ def page(results: Mapping[str, WorldsSpeed], session: Session) -> Any:
                         c.faster.spread(" ×"),
                     )
                     for c in result.costs
-                    for more in [c.faster.spread(" ×")]
                 ],
                 title=f"Wall time with the number of worlds: {name}",
                 words=frozenset(),

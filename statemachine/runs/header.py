@@ -153,9 +153,9 @@ class Header:
             if facts.get("schema") != SCHEMA:
                 given = repr(facts.get("schema"))[:20]
                 raise TraceError(f"this trace has schema {given}; this version reads {SCHEMA}")
-            by = {name: _frozen(value) for name, value in facts["provenance"].items()}
+            by = {name: _frozen(value) for name, value in facts.pop("provenance").items()}
             frozen = {name: _frozen(value) for name, value in facts.items()}
-            header = cls(**frozen | {"provenance": Provenance(**by)})
+            header = cls(provenance=Provenance(**by), **frozen)
             header._check()
         except TraceError:
             raise
