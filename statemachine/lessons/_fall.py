@@ -143,9 +143,8 @@ class Falling:
         self._bodies = carried_by(model, [int(model.jnt_bodyid[model.joint_id(joint)])])
         self._total = steps_in(model, seconds)
         marks = milestones(self._total * model.timestep)
-        self._marks = {round(mark / model.timestep) for mark in marks}
+        self._marks = [round(mark / model.timestep) for mark in marks]
         self._times: list[float] = []
-        self._positions: list[float] = []
         self._path: list[float] = []
         self._touches: dict[str, float] = {}
         self._look()
@@ -154,7 +153,7 @@ class Falling:
         """A step is over; `contacts`: whether to look at them, too."""
         if contacts:  # those of a step are of the state that it started from
             for touch in touching(self._model, self._data.contacts, self._bodies):
-                self._touches.setdefault(touch, self._began)
+                self._touches.setdefault(touch, self._times[-1])
         self._look()
 
     def end(self) -> Droop:
@@ -166,8 +165,8 @@ class Falling:
             self._touches.setdefault(touch, data.time)
         return Droop(
             others=self._others(),
-            time=np.array(self._times),
-            position=np.array(self._positions),
+            time=np.array(self._times)[self._marks],
+            position=np.array(self._path)[self._marks],
             path=np.array(self._path),
             qpos=data.qpos.copy(),
             forces=forces_on(data, self._dof),
@@ -182,7 +181,8 @@ class Falling:
         """The run until the engine diverged; the rows after that are NaN."""
         marks = np.array(milestones(self._total * self._model.timestep))
         where = np.full(len(marks), np.nan)
-        where[: len(self._positions)] = self._positions
+        reached = [mark for mark in self._marks if mark < len(self._path)]
+        where[: len(reached)] = np.array(self._path)[reached]
         none = float("nan")
         return Droop(
             time=marks,
@@ -210,14 +210,10 @@ class Falling:
         return float(speeds.max(initial=0.0)), float(pushes.max(initial=0.0))
 
     def _look(self) -> None:
-        row = len(self._path)
-        self._began = self._data.time
+        if len(self._path) % 1000 == 0:
+            self._progress(len(self._path) / self._total)
+        self._times.append(self._data.time)
         self._path.append(float(self._data.qpos[self._place]))
-        if row in self._marks:
-            self._times.append(self._data.time)
-            self._positions.append(self._path[-1])
-        if row % 1000 == 0:
-            self._progress(row / self._total)
 
 
 def milestones(seconds: float) -> list[float]:
