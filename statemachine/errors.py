@@ -150,10 +150,22 @@ class DivergedWarning(UserWarning):
     """Some of many worlds diverged and are left out from now on."""
 
 
+def check_name(kind: str, name: object, known: Iterable[str]) -> None:
+    """Raise UnknownNameError for a name that is not known."""
+    if not isinstance(name, str) or name not in known:
+        raise unknown_name(kind, name, known)
+
+
 def shown(value: object) -> str:
     """What somebody gave, on one line of a message."""
     text = " ".join("".join(c if c.isprintable() else " " for c in repr(value)).split())
     return text if len(text) <= 200 else f"{text[:197]}..."
+
+
+def did_you_mean(name: str, known: Iterable[str], cutoff: float = 0.5) -> str:
+    """The end of a message about a mistyped name: the nearest that is known, or nothing."""
+    close = difflib.get_close_matches(name, tuple(known), 1, cutoff)
+    return f". Did you mean {close[0]}?" if close else ""
 
 
 def unknown_name(kind: str, name: object, known: Iterable[str]) -> UnknownNameError:

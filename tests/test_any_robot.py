@@ -16,6 +16,7 @@ from statemachine import errors, models, robot_packages
 from statemachine.cli import main
 from statemachine.compare import compare
 from statemachine.lessons import LESSONS
+from statemachine.lessons._fall import summed
 from statemachine.lessons.session import page_of_lesson, take
 from statemachine.page import Page, Table, Text, Verdict
 from statemachine.runs import record_scenario
@@ -199,7 +200,7 @@ def test_no_balance_is_drawn_while_the_rest_moves(model: Any) -> None:
     end = found.servos_on
     assert found.joint == "rail"
     assert abs(end.velocity) < 0.01  # stands on its rail, which swings
-    assert abs(end.forces.total) > 0.1
+    assert abs(end.forces["total"]) > 0.1
     assert page.holds
     assert "but the robot still moves" in words(page)
 
@@ -209,7 +210,7 @@ def test_a_sum_that_is_none_is_still_found(model: Any) -> None:
 
     taken = take(LESSONS["gravity"], sm.load("so101/scene"), "mujoco", {"longer": 0.0})
     run = taken.result.servos_on
-    forces = dataclasses.replace(run.forces, actuator=0.1)
+    forces = summed({**run.forces, "actuator": 0.1})
     belied = dataclasses.replace(
         taken.result, servos_on=dataclasses.replace(run, forces=forces, others=(0.0, 0.0))
     )
@@ -218,7 +219,7 @@ def test_a_sum_that_is_none_is_still_found(model: Any) -> None:
 
 
 def test_a_divergence_costs_its_row(model: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    from statemachine.lessons import gravity
+    from statemachine.runs import drive
 
     steps = [0]
 
@@ -228,7 +229,7 @@ def test_a_divergence_costs_its_row(model: Any, monkeypatch: pytest.MonkeyPatch)
             raise errors.DivergedError("gone", time=data.time, quantity="qpos", index=0)
         sm.step(model, data)
 
-    monkeypatch.setattr(gravity, "step", step)
+    monkeypatch.setattr(drive, "step", step)
     found, page, _ = lesson("gravity", model(PASSIVE), seconds=0.1, longer=2.0)
     run = found.longer["contacts"]
     assert run.diverged == pytest.approx(1.4)

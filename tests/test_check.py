@@ -25,7 +25,7 @@ from statemachine.errors import MissingEngineError
 from statemachine.grading import exercise, own_files, recording
 from statemachine.grading.answers import Answer
 from statemachine.grading.calls import FaultError
-from statemachine.grading.examine import FunctionVerdict, answers_of, answers_of_file, judged
+from statemachine.grading.examine import Judgement, answers_of, answers_of_file, judged
 from statemachine.grading.judges import JUDGES, judge_of
 from statemachine.grading.transcript import decode, encode
 from statemachine.grading.watch import engine_watched
@@ -48,14 +48,14 @@ def _name(attempt: Attempt) -> str:
 Prepared = tuple[list[ExerciseWorld], list[Any]]
 
 
-def _verdict(attempt: Attempt, prepared: Prepared) -> FunctionVerdict:
+def _verdict(attempt: Attempt, prepared: Prepared) -> Judgement:
     worlds, rights = prepared
     if attempt.raw:  # which may leave the engine's own model changed
         with tempfile.TemporaryDirectory() as folder:
             worlds = judge_of(attempt.solves).worlds(Scenes("mujoco", Path(folder)))
     with engine_watched(worlds[0].model.backend):
         answers = (_through_text(each) for each in answers_of(attempt.function, worlds))
-        verdict = judged(judge_of(attempt.solves), worlds, rights, answers)
+        verdict = judged(attempt.solves, worlds, rights, answers)
     assert verdict is not None
     return verdict
 
@@ -83,15 +83,11 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], P
 Prepare = Callable[[str, str], Prepared]
 
 
-def _texts(verdict: FunctionVerdict) -> list[str]:
-    return [remark.text for remark in verdict.remarks]
-
-
 @pytest.mark.parametrize("attempt", WRONG, ids=_name)
 def test_a_wrong_solution_is_told_what_is_wrong(attempt: Attempt, prepared: Prepare) -> None:
     verdict = _verdict(attempt, prepared(attempt.solves, "mujoco"))
-    texts = _texts(verdict)
-    assert not any(remark.holds for remark in verdict.remarks)
+    texts = verdict.remarks
+    assert not verdict.passed
     assert any(attempt.message in text for text in texts), texts
     assert all("\n" not in text for text in texts)
     assert not any(re.search(r"you return (.+?)( at \d s| m)? where \1( |$)", t) for t in texts), (
@@ -109,16 +105,16 @@ def test_hints_do_not_lead_astray(prepared: Prepare) -> None:
         ("gravity-nothing_read_from_the_runs", "no gravity"),
         ("forward-two_readings", "positions is"),
     ):
-        texts = _texts(_verdict(wrong[name], prepared(wrong[name].solves, "mujoco")))
+        texts = _verdict(wrong[name], prepared(wrong[name].solves, "mujoco")).remarks
         assert not any(misleading in text for text in texts), texts
     speeds = wrong["gravity-speed_for_position"]
-    for text in _texts(_verdict(speeds, prepared("demo_gravity", "mujoco"))):
+    for text in _verdict(speeds, prepared("demo_gravity", "mujoco")).remarks:
         assert text.endswith("that is its speed, qvel; its position is in qpos")
 
 
 def test_what_is_said_of_a_right_solution_is_short_and_true(prepared: Prepare) -> None:
     for attempt in RIGHT:
-        (text,) = _texts(_verdict(attempt, prepared(attempt.solves, "mujoco")))
+        (text,) = _verdict(attempt, prepared(attempt.solves, "mujoco")).remarks
         assert len(text) <= 96, text
         assert "untouched" not in text  # who writes zeros into zeros is right, too
 
@@ -131,14 +127,15 @@ def test_every_wrong_solution_has_a_message_of_its_own() -> None:
 @pytest.mark.parametrize("attempt", RIGHT, ids=_name)
 def test_right_solutions_of_other_kinds_pass(attempt: Attempt, prepared: Prepare) -> None:
     verdict = _verdict(attempt, prepared(attempt.solves, "mujoco"))
-    assert all(remark.holds for remark in verdict.remarks), _texts(verdict)
+    assert verdict.passed, verdict.remarks
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("attempt", [each for each in WRONG + RIGHT if not each.raw], ids=_name)
 def test_pybullet_judges_alike(attempt: Attempt, prepared: Prepare) -> None:
-    texts = _texts(verdict := _verdict(attempt, prepared(attempt.solves, "pybullet")))
-    assert all(remark.holds == (attempt in RIGHT) for remark in verdict.remarks), texts
+    verdict = _verdict(attempt, prepared(attempt.solves, "pybullet"))
+    texts = verdict.remarks
+    assert verdict.passed == (attempt in RIGHT), texts
     assert any(attempt.message in text for text in texts), texts
 
 
@@ -455,11 +452,11 @@ def test_what_belongs_to_a_file_is_given_along(tmp_path: Path) -> None:
 def test_a_judge_that_is_replaced_is_another_process_s(tmp_path: Path) -> None:
     found = _grade(
         tmp_path,
-        "from statemachine.grading import calls, examine, judges",
+        "from statemachine.grading import examine, judges",
         "for name in judges.JUDGES:",
-        "    judges.judge_of(name).judge = lambda *_: [calls.Remark('patched', True)]",
+        "    judges.judge_of(name).judge = lambda *_: 'patched'",
         "    judges.judge_of(name).right = lambda worlds: [None for _ in worlds]",
-        "examine.judged = lambda *_: examine.FunctionVerdict((calls.Remark('patched', True),))",
+        "examine.judged = lambda *_: examine.Judgement('demo_gravity', True, True, ('patched',))",
         *(f"def {name}(*_): return 1" for name in JUDGES),
     )
     for judgement in found.values():
@@ -515,14 +512,13 @@ def test_a_file_that_cannot_be_called_is_told_in_a_line(
 ) -> None:
     file = tmp_path / "student.py"
     file.write_text(content, encoding="latin-1")
-    judge, there = judge_of("demo_gravity"), prepared("demo_gravity", "mujoco")
-    worlds, rights = there
+    worlds, rights = prepared("demo_gravity", "mujoco")
     answers = answers_of_file(file, "demo_gravity", worlds)
-    verdict = judged(judge, worlds, rights, answers)
+    verdict = judged("demo_gravity", worlds, rights, answers)
     assert verdict is not None
     (remark,) = verdict.remarks
-    assert message in remark.text
-    assert not remark.holds
+    assert message in remark
+    assert not verdict.passed
 
 
 def test_the_solution_passes_on_every_backend(cli: Cli, backend: str) -> None:

@@ -24,7 +24,7 @@ from statemachine.errors import BadInputError, StateMachineError, TraceError, Un
 from statemachine.report import compare as report
 from statemachine.report import terminal
 from statemachine.runs import record, write
-from statemachine.runs.controllers import command_function, controller_from
+from statemachine.runs.controllers import controller_from, function_scenario
 
 from .conftest import Cli, need_engine
 
@@ -429,7 +429,7 @@ def test_a_mistake_in_a_function_is_one_line_about_it(files: Path, name: str, sa
         run_sides(asked(f"{files / 'own.py'}:{name}", arm, arm))
     assert "\n" not in str(caught.value)
     with pytest.raises(BadInputError, match=r"no controller file.*Did you mean own.py"):
-        command_function(str(files / "owm.py:hold"))
+        function_scenario(str(files / "owm.py:hold"))
 
 
 # Closed loop and open loop.

@@ -15,7 +15,7 @@ import statemachine as sm
 from statemachine.errors import BadInputError, ModelError
 from statemachine.lessons import fingertip, in_turns, session
 from statemachine.lessons._certificate import page
-from statemachine.lessons._fall import Forces, milestones
+from statemachine.lessons._fall import milestones, summed
 from statemachine.lessons._tips import random_qpos
 from statemachine.lessons.speed import Speed
 from statemachine.models import models_dir
@@ -41,9 +41,10 @@ def test_milestones() -> None:
 
 
 def test_forces_sum_with_the_bias_on_the_other_side() -> None:
-    forces = Forces(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
-    assert forces.total == 2 + 3 + 4 + 5 + 6 + 7 - 1
-    assert Forces(1.0, None, 0, 0, 0, 0, 0).total is None
+    names = ("bias", "actuator", "passive", "friction", "contact", "limit", "equality")
+    forces = {name: k + 1.0 for k, name in enumerate(names)}
+    assert summed(forces)["total"] == 2 + 3 + 4 + 5 + 6 + 7 - 1
+    assert summed({**forces, "actuator": None})["total"] is None
 
 
 def test_gravity_is_read_at_the_moment_of_the_end() -> None:
@@ -52,7 +53,7 @@ def test_gravity_is_read_at_the_moment_of_the_end() -> None:
     with sm.make_data(model) as data:
         sm.step(model, data, 200)
         sm.forward(model, data)
-        assert found.servos_on.forces.actuator == data.qfrc_actuator[1]
+        assert found.servos_on.forces["actuator"] == data.qfrc_actuator[1]
         assert found.servos_on.qpos.tolist() == data.qpos.tolist()
     touch = found.servos_off.touches["gripper on floor (fixed_stud_1)"]
     limp = model.replace(actuation=False)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.runs.scenarios import TARGET
+from statemachine.runs.commands import TARGET
 
 Golden = Callable[[str], np.ndarray]
 

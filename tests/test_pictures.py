@@ -26,11 +26,12 @@ from statemachine.engines.pybullet import rendering as pybullet_rendering
 from statemachine.errors import BadInputError, MissingEngineError, TraceError, UnknownNameError
 from statemachine.rendering import Timing, frames, motion_of, probe, timing_of
 from statemachine.rendering.compose import compose, halved
-from statemachine.rendering.motion import corners, rows_at
+from statemachine.rendering.motion import corners
 from statemachine.report.film import Film, write_film
 from statemachine.report.film_overlay import Overlay, Strip
 from statemachine.report.plot import drawn, plot, plot_trace, write_plot
 from statemachine.runs import Trace, record, shipped, write
+from statemachine.runs.header import INPUTS
 
 from .conftest import ROOT, Cli, need_engine
 from .rendering import rendering_environment, silhouettes
@@ -91,13 +92,6 @@ def test_a_film_lasts_as_long_as_the_simulated_time() -> None:
         np.testing.assert_allclose(timing.times * slow * fps, np.arange(timing.count), atol=1e-9)
 
 
-def test_rows_are_the_nearest_from_the_start_of_each_trace() -> None:
-    trace = _still(times=10.0 + 0.004 * np.arange(6))
-    np.testing.assert_array_equal(
-        rows_at(trace, np.array([0, 0.0019, 0.0021, 0.02, 9])), [0, 0, 1, 5, 5]
-    )
-
-
 def _still(times: np.ndarray) -> Trace:
     """A trace of a ball that does not move, without what an engine derives."""
     model = sm.load(_ball())
@@ -131,8 +125,8 @@ def _a_ball(tmp_path_factory: pytest.TempPathFactory) -> None:
 
 def test_a_trace_without_poses_has_them_from_its_qpos(sides: tuple[sm.Model, Trace, Trace]) -> None:
     model, one, _ = sides
-    bare = Trace(one.header, {n: one[n] for n in ("time", "qpos", "qvel", "ctrl")})
-    times = np.array([0.0, 0.2, 0.4])
+    bare = Trace(one.header, {n: one[n] + 10 * (n == "time") for n in INPUTS})
+    times = np.array([0.0, 0.2, 0.4])  # counted from the start of each
     whole, derived = motion_of(one, model, times), motion_of(bare, model, times)
     np.testing.assert_allclose(derived.xpos, whole.xpos, atol=1e-12)
     np.testing.assert_allclose(derived.xquat, whole.xquat, atol=1e-12)

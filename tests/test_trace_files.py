@@ -18,7 +18,7 @@ from numpy.lib import format as npy
 
 import statemachine as sm
 from statemachine.errors import TraceError
-from statemachine.runs import Trace, export_csv, parquet_files, read, record, whole, write
+from statemachine.runs import Trace, export_csv, read, record, whole, write
 
 from .conftest import Cli
 
@@ -87,17 +87,6 @@ def test_a_parquet_file_that_others_changed_is_refused(box: Trace, tmp_path: Pat
     parquet.write_table(table.drop_columns(["qfrc_bias"]), path)
     with pytest.raises(TraceError, match="damaged"):
         read(path)
-
-
-def test_a_parquet_file_of_an_earlier_version_opens(box: Trace, tmp_path: Path) -> None:
-    pytest.importorskip("pyarrow")
-    from pyarrow import parquet
-
-    path = write(box, tmp_path / "box.parquet")
-    table = parquet.read_table(path)
-    header = {parquet_files._OLD_KEY: box.header.as_json().encode()}
-    parquet.write_table(table.replace_schema_metadata(header), path)
-    assert same(read(path), box)
 
 
 def test_no_flipped_bit_of_an_archives_list_hides_a_column(box: Trace, tmp_path: Path) -> None:

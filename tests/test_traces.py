@@ -223,16 +223,16 @@ def test_a_controller_that_kicks_is_repeated_exactly(backend: str) -> None:
 
 
 def test_an_engine_that_does_not_repeat_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    from statemachine.runs import recorder
+    from statemachine.runs import drive
 
-    honest, calls = recorder.step, []
+    honest, calls = drive.step, []
 
     def restless(model: sm.Model, data: sm.Data) -> None:
         calls.append(1)
         honest(model, data)
         data.qpos[0] += 1e-15 * len(calls)
 
-    monkeypatch.setattr(recorder, "step", restless)
+    monkeypatch.setattr(drive, "step", restless)
     with pytest.raises(EngineError, match="could not be repeated"):
         traced("hold", seconds=0.1)
     with pytest.raises(EngineError, match="could not be repeated"):

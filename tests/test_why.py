@@ -341,7 +341,7 @@ def test_as_it_comes_is_what_a_user_of_pybullet_gets(tmp_path: Path) -> None:
     import pybullet as pb
 
     from statemachine.engines.pybullet.dials import dials
-    from statemachine.runs.scenarios import TARGET
+    from statemachine.runs.commands import TARGET
 
     fresh = quietly("so101/scene", defaults="engine")
     found = dials(fresh, {})

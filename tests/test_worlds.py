@@ -470,21 +470,6 @@ def test_worlds_belong_to_the_process_that_made_them(worlds: many.Worlds) -> Non
     assert worlds.time.all()
 
 
-def test_each_world_may_have_options_of_its_own(box: sm.Model) -> None:
-    values = {"timestep": [0.002, 0.005, 0.001], "damping": [0.1, 0.2, 0.7]}
-    with worlds_of(box, 3, **values) as worlds:
-        many.reset(worlds, keyframe=0)
-        many.step(worlds, 30)
-        for i in range(3):
-            model = box.replace(**{name: value[i] for name, value in values.items()})
-            assert worlds.model_of(i).timestep == model.timestep
-            data = sm.make_data(model)
-            sm.reset(model, data, 0)
-            sm.step(model, data, 30)
-            equal(worlds, [data] * 3, [i])
-            data.close()
-
-
 @pytest.fixture
 def mujoco_() -> None:
     need_engine("mujoco")

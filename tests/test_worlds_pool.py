@@ -153,21 +153,11 @@ def run_both(model: sm.Model, workers: int) -> None:
         data.close()
 
 
-def test_the_bits_are_those_of_single_data(model: sm.Model) -> None:
-    run_both(model, 2)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("workers", [1, 3, 64])
-def test_the_bits_do_not_depend_on_the_processes(model: sm.Model, workers: int) -> None:
+@pytest.mark.parametrize(
+    "workers", [2, *(pytest.param(workers, marks=pytest.mark.slow) for workers in (1, 3, 64))]
+)
+def test_the_bits_are_those_of_single_data(model: sm.Model, workers: int) -> None:
     run_both(model, workers)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("workers", [1, 2, 3])
-def test_a_hidden_world_with_contacts_has_the_same_bits(workers: int) -> None:
-    need_engine("pybullet")
-    run_both(sm.load("so101/scene_box", backend="pybullet"), workers)
 
 
 def test_what_is_not_written_keeps_what_the_engine_remembers() -> None:
@@ -218,35 +208,6 @@ def test_more_worlds_than_a_process_can_hold(model: sm.Model) -> None:
     vars(model)["capabilities"] = replace(model.capabilities, data_per_process=None)
     with pytest.raises(EngineError, match="6 worlds at most"):
         make_worlds(model, 8, workers=1)
-
-
-def test_each_world_has_its_own_options(model: sm.Model) -> None:
-    damping = [0.1, 0.2, 0.1]
-    with make_worlds(model, 3, workers=2, damping=damping) as worlds:
-        worlds.qvel[:] = 1.0
-        step(worlds, 5)
-        for world, value in enumerate(damping):
-            other = model.replace(damping=value)
-            assert bits(worlds.model_of(world).dof_damping) == bits(other.dof_damping)
-            with sm.make_data(other) as data:
-                data.qvel[:] = 1.0
-                sm.step(other, data, 5)
-                assert bits(worlds.qpos[world]) == bits(data.qpos)
-
-
-def test_a_state_of_a_world_whose_latency_is_its_own(model: sm.Model) -> None:
-    late = [0.0, 0.05, 0.0]
-    with make_worlds(model, 3, workers=2, latency=late) as worlds:
-        worlds.ctrl[:] = 0.1
-        step(worlds, 20)
-        for world, latency in enumerate(late):
-            other = model.replace(latency=latency)
-            with sm.make_data(other) as data:
-                data.ctrl[:] = 0.1
-                sm.step(other, data, 20)
-                state = get_state(worlds, world)
-                assert state == sm.get_state(other, data)
-                set_state(worlds, world, state)
 
 
 def test_a_world_that_diverges_or_breaks_is_left_out(worlds: Worlds) -> None:

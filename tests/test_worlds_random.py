@@ -94,6 +94,7 @@ def test_every_backend_has_worlds_that_differ(backend: str) -> None:
         model, 2, seed=4, mass=Uniform(0.8, 1.2, each=True), friction=(0.6, 1.0),
         kp=(0.8, 1.2), damping=(0.5, 2.0), latency=(0.005, 0.02),
     )  # fmt: skip
+    options["timestep"] = [0.004, 0.005]
     with make_worlds(model, 2, workers=2, **options) as many:
         worlds.reset(many, keyframe=0)
         many.ctrl += 0.1
@@ -105,6 +106,10 @@ def test_every_backend_has_worlds_that_differ(backend: str) -> None:
                 data.ctrl += 0.1
                 sm.step(one, data, 20)
                 np.testing.assert_array_equal(many.qpos[i], data.qpos)
+                assert many.model_of(i).timestep == one.timestep
+                state = worlds.get_state(many, i)  # whose layout is that of its latency
+                assert state == sm.get_state(one, data)
+                worlds.set_state(many, i, state)
     assert (many.qpos[0] != many.qpos[1]).any()
 
 

@@ -143,32 +143,34 @@ def _shape(raw: Any, geom: int, kind: str) -> Surface | None:
     """A geom in its own frame; None if there are no triangles to be had of it."""
     size = raw.geom_size[geom].tolist()
     data = int(raw.geom_dataid[geom])
-    if kind == "plane":
-        wide = _WIDE * float(raw.stat.extent)
-        return _shapes.rectangle(size[0] or wide, size[1] or wide)
-    if kind == "sphere":
-        return _shapes.ellipsoid([size[0]] * 3)
-    if kind == "ellipsoid":
-        return _shapes.ellipsoid(size)
-    if kind == "capsule":
-        return _shapes.capsule(size[0], size[1])
-    if kind == "cylinder":
-        return _shapes.cylinder(size[0], size[1])
-    if kind == "box":
-        return _shapes.box(size)
-    if kind == "hfield":
-        rows, columns = int(raw.hfield_nrow[data]), int(raw.hfield_ncol[data])
-        half_x, half_y, top, _ = raw.hfield_size[data].tolist()
-        start = int(raw.hfield_adr[data])
-        heights = raw.hfield_data[start : start + rows * columns].reshape(rows, columns)
-        return _shapes.terrain(top * heights, half_x, half_y)
-    if kind in ("mesh", "sdf") and data >= 0:
-        vert, face = int(raw.mesh_vertadr[data]), int(raw.mesh_faceadr[data])
-        return Surface(
-            raw.mesh_vert[vert : vert + int(raw.mesh_vertnum[data])],
-            raw.mesh_face[face : face + int(raw.mesh_facenum[data])],
-        )
-    return None
+    match kind:
+        case "plane":
+            wide = _WIDE * float(raw.stat.extent)
+            return _shapes.rectangle(size[0] or wide, size[1] or wide)
+        case "sphere":
+            return _shapes.ellipsoid([size[0]] * 3)
+        case "ellipsoid":
+            return _shapes.ellipsoid(size)
+        case "capsule":
+            return _shapes.capsule(size[0], size[1])
+        case "cylinder":
+            return _shapes.cylinder(size[0], size[1])
+        case "box":
+            return _shapes.box(size)
+        case "hfield":
+            rows, columns = int(raw.hfield_nrow[data]), int(raw.hfield_ncol[data])
+            half_x, half_y, top, _ = raw.hfield_size[data].tolist()
+            start = int(raw.hfield_adr[data])
+            heights = raw.hfield_data[start : start + rows * columns].reshape(rows, columns)
+            return _shapes.terrain(top * heights, half_x, half_y)
+        case "mesh" | "sdf" if data >= 0:
+            vert, face = int(raw.mesh_vertadr[data]), int(raw.mesh_faceadr[data])
+            return Surface(
+                raw.mesh_vert[vert : vert + int(raw.mesh_vertnum[data])],
+                raw.mesh_face[face : face + int(raw.mesh_facenum[data])],
+            )
+        case _:
+            return None
 
 
 def _mesh_name(raw: Any, geom: int, kind: str) -> str:

@@ -19,26 +19,6 @@ from typing import Any
 _LONGEST = 8_000_000  # characters of a line
 
 
-class _Record:
-    """The file."""
-
-    def __init__(self, path: str, nonce: str) -> None:
-        self._path = path
-        self._nonce = nonce
-
-    def say(self, stage: str, **facts: Any) -> None:
-        """Add a line."""
-        line = json.dumps({"nonce": self._nonce, "stage": stage, **facts})
-        if len(line) > _LONGEST:
-            line = json.dumps({"nonce": self._nonce, "stage": "fault", **_TOO_MUCH})
-        with open(self._path, "a", encoding="utf-8") as file:
-            file.write(line + "\n")
-
-    def note(self, kind: str, text: str) -> None:
-        """Add what `Guard` tells, at once: it stays, whatever the student's code does next."""
-        self.say(kind, text=text)
-
-
 _TOO_MUCH = {"text": "it returns more than can be looked at", "written": True}
 
 
@@ -47,13 +27,21 @@ def main(job_file: str) -> None:
     with open(job_file, encoding="utf-8") as file:
         job = json.load(file)
     os.unlink(job_file)
-    record = _Record(job["answers"], job["nonce"])
     path = Path(job["file"])
+
+    def say(stage: str, **facts: Any) -> None:
+        """Add a line to the file."""
+        line = json.dumps({"nonce": job["nonce"], "stage": stage, **facts})
+        if len(line) > _LONGEST:
+            line = json.dumps({"nonce": job["nonce"], "stage": "fault", **_TOO_MUCH})
+        with open(job["answers"], "a", encoding="utf-8") as file:
+            file.write(line + "\n")
+
     sys.argv = [str(path)]
     try:
         worlds = _prepare(job["function"], job["backend"])
     except Exception as error:
-        record.say("refused", kind=type(error).__name__, text=" ".join(str(error).split()))
+        say("refused", kind=type(error).__name__, text=" ".join(str(error).split()))
         return
     from .calls import FaultError
     from .examine import answers_of_file
@@ -64,15 +52,18 @@ def main(job_file: str) -> None:
     # Both work where Python's own threads do not get their turn, and tell the line.
     trace = open(job["trace"], "w", encoding="utf-8")  # noqa: SIM115  (till the end)
     faulthandler.enable(trace)
-    Guard(path, Path(job["own"]), Path(job["answers"]).parent, record.note)
+    # What `Guard` tells is told at once: it stays, whatever the student's code does next.
+    Guard(
+        path, Path(job["own"]), Path(job["answers"]).parent, lambda kind, text: say(kind, text=text)
+    )
     sys.path.insert(0, str(path.parent))  # as when the file is run; engines are loaded by now
-    record.say("running", cpu=time.process_time())
+    say("running", cpu=time.process_time())
     limit_cpu(job["cpu"], trace)
     for answer in answers_of_file(path, job["function"], worlds):
         if isinstance(answer, FaultError):
-            record.say("fault", text=str(answer), written=answer.written)
+            say("fault", text=str(answer), written=answer.written)
         else:
-            record.say("answer", answer=encode(answer))
+            say("answer", answer=encode(answer))
     # Threads that the student's code left, and what it registered for the end, have no say.
     os._exit(0)
 

@@ -8,7 +8,7 @@ import linecache
 import sys
 import traceback
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,14 +22,6 @@ from .worlds import ExerciseWorld
 Function = Callable[..., Any]
 _MODULE = "the_students_file"
 _LONGEST = 200  # characters of an error's own text
-
-
-@dataclass(frozen=True)
-class Remark:
-    """One thing found out about a function, in one line; `holds` is False for a fault."""
-
-    text: str
-    holds: bool = False
 
 
 def reason(*rows: tuple[object, str]) -> str:

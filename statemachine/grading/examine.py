@@ -10,21 +10,29 @@ from typing import Any
 import numpy as np
 
 from .answers import Answer
-from .calls import FaultError, Function, Remark, call, find, load_file
-from .judges import Judge
+from .calls import FaultError, Function, call, find, load_file
+from .judges import judge_of
 from .watch import engine_watched
 from .worlds import ExerciseWorld
 
 
 @dataclass(frozen=True)
-class FunctionVerdict:
-    """What was found out about a function; it passes if every remark holds.
+class Judgement:
+    """What was found out about one function.
 
-    `written` is False where the function is still to be written.
+    Attributes:
+        function: Its name.
+        written: False where it is still to be written.
+        passed: Whether it does what it should.
+        remarks: What is wrong with it, or what was verified, a line each.
+        judged: False where there is no verdict, for which the machine may be the reason.
     """
 
-    remarks: tuple[Remark, ...]
-    written: bool = True
+    function: str
+    written: bool
+    passed: bool
+    remarks: tuple[str, ...]
+    judged: bool = True
 
 
 def answers_of_file(
@@ -59,12 +67,12 @@ def answers_of(
 
 
 def judged(
-    judge: Judge,
+    function: str,
     worlds: Sequence[ExerciseWorld],
     rights: Sequence[Any],
     answers: Iterable[Answer | FaultError],
-) -> FunctionVerdict | None:
-    """The verdict on what came of a function, world after world, until one shows a fault.
+) -> Judgement | None:
+    """The judgement on what came of a function, world after world, until one shows a fault.
 
     None if there are fewer answers than worlds, and no fault.
     """
@@ -74,17 +82,16 @@ def judged(
             if isinstance(answer, FaultError):
                 raise answer
             with np.errstate(all="ignore"):
-                remarks = judge.judge(answer, world, right)
+                found = judge_of(function).judge(answer, world, right)
         except FaultError as fault:
-            remarks = [Remark(str(fault))]
+            found = [str(fault)]
             if not fault.written:
-                return FunctionVerdict(tuple(remarks), fault.written)
-        faults = [remark for remark in remarks if not remark.holds]
-        if faults:
+                return Judgement(function, False, False, tuple(found))
+        if not isinstance(found, str):
             where = f"{world.where}: " if world.where else ""
-            return FunctionVerdict(tuple(Remark(where + fault.text) for fault in faults))
-        passed += [remark.text for remark in remarks]
+            return Judgement(function, True, False, tuple(where + text for text in found))
+        passed.append(found)
     if len(passed) < len(worlds):
         return None
     also = f"; right in {len(worlds) - 1} other case{'s' * (len(worlds) > 2)}"
-    return FunctionVerdict((Remark(passed[0] + also, True),))
+    return Judgement(function, True, True, (passed[0] + also,))

@@ -15,9 +15,9 @@ import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +27,10 @@ from ..errors import BadInputError, EngineError, StateMachineError
 from ..installed import DEFAULT, engine_version
 from . import sandbox
 from .calls import reason
-from .examine import judged
+from .examine import Judgement, judged
 from .judges import JUDGES, judge_of
 from .own_files import LARGEST, digest, has_solutions, in_folder, named_by
+from .parallel import in_parallel
 from .recording import START, FunctionRecording, Limits, record
 from .unwinding import unwinding
 from .worlds import ExerciseWorld, Scenes
@@ -38,25 +39,6 @@ LOOK = "please look at this"
 TIME_LIMIT = 5.0  # [s] of computing for a function, from when its worlds are ready
 WALL_LIMIT = 10.0  # [s] on the clock for it, those apart in which others have the processor
 _TIMES = 2  # so many times what may be computed, at least
-
-
-@dataclass(frozen=True)
-class Judgement:
-    """What was found out about one function.
-
-    Attributes:
-        function: Its name.
-        written: False where it is still to be written.
-        passed: Whether it does what it should.
-        remarks: What is wrong with it, or what was verified, a line each.
-        judged: False where there is no verdict, for which the machine may be the reason.
-    """
-
-    function: str
-    written: bool
-    passed: bool
-    remarks: tuple[str, ...]
-    judged: bool = True
 
 
 @dataclass(frozen=True)
@@ -202,36 +184,78 @@ class ExerciseJudge:
         self, copy: _Copy, folder: Path, progress: Callable[[float], None]
     ) -> tuple[Judgement, ...]:
         """All functions at once, so that the slowest decides how long it takes."""
-        backend, limits, stop = self.backend, self.limits, threading.Event()
-        with ThreadPoolExecutor(len(JUDGES)) as pool:
-            try:
-                futures = {
-                    name: pool.submit(_recorded, copy, name, backend, limits, folder / name, stop)
-                    for name in JUDGES
-                }
-                # Meanwhile what is right is worked out here, where no code of the student's runs.
-                key = self._answer_key()
-                waiting = set(futures.values())
-                while waiting:
-                    if self.stop.is_set():
-                        stop.set()
-                    waiting = wait(waiting, timeout=0.1).not_done
-                    progress(1 - len(waiting) / len(futures))
-                return tuple(
-                    _judgement(copy, name, limits, *key[name], future.result())
-                    for name, future in futures.items()
-                )
-            finally:
-                stop.set()  # after an interrupt nothing goes on
+        stop, found = threading.Event(), dict[str, Any]()
+        work: dict[str, Callable[[], Any]] = {
+            name: partial(_recorded, copy, name, self.backend, self.limits, folder / name, stop)
+            for name in JUDGES
+        }
+        # Meanwhile what is right is worked out here, where no code of the student's runs.
+        work[""] = self._work_out
 
-    def _answer_key(self) -> dict[str, tuple[list[ExerciseWorld], list[Any]]]:
-        """For each function what it is called on, and what is right there."""
+        def waiting(left: int) -> None:
+            if self.stop.is_set():
+                stop.set()
+            progress(1 - left / len(work))
+
+        in_parallel(work, len(work), found.__setitem__, stop.set, waiting)
+        return tuple(self._judgement(copy, name, found[name]) for name in JUDGES)
+
+    def _work_out(self) -> None:
+        """For each function what it is called on, and what is right there; once."""
         with self._lock:
             if not self._key:
                 scenes = Scenes(self.backend, Path(tempfile.mkdtemp(dir=self._folder)))
                 worlds = {name: judge_of(name).worlds(scenes) for name in JUDGES}
                 self._key = {name: (w, judge_of(name).right(w)) for name, w in worlds.items()}
-            return self._key
+
+    def _judgement(self, copy: _Copy, name: str, recording: FunctionRecording) -> Judgement:
+        if recording.refusal:
+            kind, text = recording.refusal
+            known = getattr(errors, kind, None)
+            if isinstance(known, type) and issubclass(known, StateMachineError):
+                raise known(text)
+            raise EngineError(text)
+        others = copy.others(recording.reads)
+        if borrowed := ", ".join(other for other, matters in others.items() if matters):
+            text = (
+                f"not graded: it reads {borrowed}, which was not handed in with it. Is that your "
+                "own? Put it into this file"
+            )
+            return Judgement(name, True, False, (text,), judged=False)
+        looks = tuple(f"{LOOK}: it reads {other}" for other in others)
+        judgement = self._verdict(copy, name, recording)
+        return replace(judgement, remarks=judgement.remarks + looks)
+
+    def _verdict(self, copy: _Copy, name: str, recording: FunctionRecording) -> Judgement:
+        if recording.forbidden:
+            return Judgement(name, True, False, tuple(recording.forbidden))
+        try:
+            if judgement := judged(name, *self._key[name], recording.answers):
+                return judgement
+        except Exception as error:  # what was recorded may have been made up
+            recording.broken = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+        if recording.broken:
+            text = f"what its process recorded is no record of a run ({recording.broken})"
+            return Judgement(name, True, False, (text,))
+        if not recording.began:
+            return Judgement(name, True, False, (_not_ready(recording.outcome),), judged=False)
+        # It did not come to its end. The innermost line of the student's file comes first in what
+        # is noted last.
+        outcome, last = recording.outcome, recording.trace.rpartition("Timeout (")[2]
+        lines = re.findall(rf'File "{re.escape(str(copy.path))}", line (\d+)', last)
+        where = f"line {lines[0]}: " if lines else ""
+        if not outcome.timed_out:
+            text = where + _how_it_ended(self.limits, outcome)
+            return Judgement(name, True, False, (text,))
+        computed = max(0.0, outcome.cpu - recording.cpu)
+        busy, clock = "is this machine busy?", outcome.wall
+        if outcome.asleep > self.limits.wall:
+            busy, clock = "does it wait for something (sleep, a lock)?", self.limits.wall
+        text = (
+            f"{where}nothing could be judged: not at its end after {clock:.3g} s on the clock, "
+            f"of which it computed for {computed:.1f} s: {busy}"
+        )
+        return Judgement(name, True, False, (text,), judged=False)
 
 
 def _python_file(path: Path) -> Path:
@@ -302,79 +326,6 @@ def _recorded(
     if recording.began or recording.refusal or recording.broken or stop.is_set():
         return recording
     return record(copy.path, copy.folder, name, backend, limits, folder / "2", stop)
-
-
-def _judgement(
-    copy: _Copy,
-    name: str,
-    limits: Limits,
-    worlds: list[ExerciseWorld],
-    rights: list[Any],
-    recording: FunctionRecording,
-) -> Judgement:
-    if recording.refusal:
-        kind, text = recording.refusal
-        known = getattr(errors, kind, None)
-        if isinstance(known, type) and issubclass(known, StateMachineError):
-            raise known(text)
-        raise EngineError(text)
-    others = copy.others(recording.reads)
-    if borrowed := ", ".join(other for other, matters in others.items() if matters):
-        text = (
-            f"not graded: it reads {borrowed}, which was not handed in with it. Is that your own? "
-            "Put it into this file"
-        )
-        return Judgement(name, True, False, (text,), judged=False)
-    looks = tuple(f"{LOOK}: it reads {other}" for other in others)
-    judgement = _verdict(copy.path, name, limits, worlds, rights, recording)
-    return replace(judgement, remarks=judgement.remarks + looks)
-
-
-def _verdict(
-    path: Path,
-    name: str,
-    limits: Limits,
-    worlds: list[ExerciseWorld],
-    rights: list[Any],
-    recording: FunctionRecording,
-) -> Judgement:
-    if recording.forbidden:
-        return Judgement(name, True, False, tuple(recording.forbidden))
-    try:
-        verdict = judged(judge_of(name), worlds, rights, recording.answers)
-    except Exception as error:  # what was recorded may have been made up
-        recording.broken = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
-        verdict = None
-    if verdict is not None:
-        holds = all(remark.holds for remark in verdict.remarks)
-        texts = tuple(remark.text for remark in verdict.remarks)
-        return Judgement(name, verdict.written, holds, texts)
-    if recording.broken:
-        text = f"what its process recorded is no record of a run ({recording.broken})"
-        return Judgement(name, True, False, (text,))
-    if not recording.began:
-        return Judgement(name, True, False, (_not_ready(recording.outcome),), judged=False)
-    return _unfinished(path, name, limits, recording)
-
-
-def _unfinished(path: Path, name: str, limits: Limits, recording: FunctionRecording) -> Judgement:
-    """The judgement on a function that did not come to its end."""
-    outcome, trace = recording.outcome, recording.trace
-    # The innermost line of the student's file comes first in what is noted last.
-    last = trace.rpartition("Timeout (")[2]
-    lines = re.findall(rf'File "{re.escape(str(path))}", line (\d+)', last)
-    where = f"line {lines[0]}: " if lines else ""
-    if not outcome.timed_out:
-        return Judgement(name, True, False, (where + _how_it_ended(limits, outcome),))
-    computed = max(0.0, outcome.cpu - recording.cpu)
-    busy, clock = "is this machine busy?", outcome.wall
-    if outcome.asleep > limits.wall:
-        busy, clock = "does it wait for something (sleep, a lock)?", limits.wall
-    text = (
-        f"{where}nothing could be judged: not at its end after {clock:.3g} s on the clock, "
-        f"of which it computed for {computed:.1f} s: {busy}"
-    )
-    return Judgement(name, True, False, (text,), judged=False)
 
 
 def _not_ready(outcome: sandbox.ProcessOutcome) -> str:

@@ -192,7 +192,7 @@ def engine_watched(backend: str) -> Iterator[None]:
                 stack.enter_context(_replaced(engine, name, _seen_forward))
         for kind in Data.__subclasses__():
             if not (room and kind is room.DATA):
-                stack.enter_context(_replaced(kind, "_recompute", _seen_recompute))
+                stack.enter_context(_replaced(kind, "_recompute", _seen_forward))
         telling = backend if room else None
         stack.enter_context(_replaced(Data, "__init__", functools.partial(_seen_data, telling)))
         yield
@@ -227,16 +227,6 @@ def _seen_data(telling: str | None, original: Callable[..., None]) -> Callable[.
     return seen
 
 
-def _seen_recompute(original: Callable[..., None]) -> Callable[..., None]:
-    @functools.wraps(original)
-    def seen(data: Any) -> None:
-        original(data)
-        if _watch is not None:
-            _watch.recomputed(data)
-
-    return seen
-
-
 def _seen_step(original: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(original)
     def seen(m: Any, d: Any, nstep: int = 1) -> Any:
@@ -249,11 +239,13 @@ def _seen_step(original: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _seen_forward(original: Callable[..., Any]) -> Callable[..., Any]:
+    """What recomputes what is derived of a Data, or of the engine's own, its last argument."""
+
     @functools.wraps(original)
-    def seen(m: Any, d: Any) -> Any:
-        result = original(m, d)
+    def seen(*given: Any, **named: Any) -> Any:
+        result = original(*given, **named)
         if _watch is not None:
-            _watch.recomputed(d)
+            _watch.recomputed(named["d"] if "d" in named else given[-1])
         return result
 
     return seen

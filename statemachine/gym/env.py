@@ -10,7 +10,7 @@ from gymnasium.error import ResetNeeded
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike
 
-from ..errors import BadInputError, DivergedError, EngineError, unknown_name
+from ..errors import BadInputError, DivergedError, EngineError, check_name
 from ..installed import DEFAULT
 from ..interface import Array, forward, make_data, reset, step
 from .render import TaskPictures
@@ -135,8 +135,8 @@ class ArmEnv(gymnasium.Env[Array, ArrayLike]):
 
 def check_render_mode(render_mode: str | None) -> None:
     """Raise UnknownNameError for a render mode that there is not."""
-    if render_mode is not None and render_mode not in RENDER_MODES:
-        raise unknown_name("render mode", render_mode, RENDER_MODES)
+    if render_mode is not None:
+        check_name("render mode", render_mode, RENDER_MODES)
 
 
 def metadata_of(task: Task) -> dict[str, Any]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..backends import load
-from ..errors import unknown_name
+from ..errors import check_name
 from ..interface import Array, Model, forward, make_data
 from ..interface.checks import as_count, as_vector
 
@@ -231,8 +231,7 @@ def make_task(name: str, backend: str, frame_skip: int) -> Task:
     Raises:
         UnknownNameError: There is no such task or backend.
     """
-    if not isinstance(name, str) or name not in TASKS:
-        raise unknown_name("task", name, TASKS)
+    check_name("task", name, TASKS)
     return TASKS[name](backend, frame_skip)
 
 

@@ -14,7 +14,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import BadInputError, DivergedWarning, shown, unknown_name
+from ..errors import BadInputError, DivergedWarning, check_name, shown
 from ..installed import DEFAULT
 from ..interface import Array
 from ..interface.checks import as_count
@@ -70,8 +70,8 @@ class ArmVectorEnv(VectorEnv[Array, ArrayLike, NDArray[Any]]):
         """
         check_render_mode(render_mode)
         modes = [mode.value for mode in AutoresetMode]
-        if not isinstance(autoreset_mode, AutoresetMode) and autoreset_mode not in modes:
-            raise unknown_name("autoreset mode", autoreset_mode, modes)
+        if not isinstance(autoreset_mode, AutoresetMode):
+            check_name("autoreset mode", autoreset_mode, modes)
         self.num_envs = as_count(num_envs, "num_envs")
         most = max_episode_steps
         self._most = np.inf if most is None else as_count(most, "max_episode_steps")

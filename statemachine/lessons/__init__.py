@@ -1,17 +1,19 @@
 """The lessons: what each is called, asks and takes. Importing this loads no engine.
 
-A lesson is one module with three functions: `code(model, options, load)` is what a student
-types, `run(play, options, progress)` runs that code once, looks on, and returns what was found,
-and `page(results, session)` says what the results, by backend, mean. Terminal, documentation and
-notebook are made from the same three.
+A lesson is one module with three functions, in the order in which one reads them:
+`code(model, options, load)` is what a student types for a Model, where `load` is the call that
+loads it; `run(play, options, progress)` calls `play` (a `session.CodeRun`) once, which runs that
+code, looks on, and returns what was found; and `page(results, session)` says what the results, by
+backend, mean. One whose options depend on the robot also has `fit(model, options)`, which gives
+them back with nothing left open. Terminal, documentation and notebook are made from the same three.
 """
 
 from __future__ import annotations
 
 import importlib
-from typing import cast
+from typing import Any
 
-from .records import Lesson, Module, Option
+from .records import Lesson, Option
 
 # What depends on the robot has no default here: `fit` of the lesson's module gives it one.
 _JOINT = Option("--joint", None, "joint to write (default shoulder_lift, if there is one)")
@@ -120,6 +122,6 @@ LESSONS = {
 STATIONS = tuple(lesson for lesson in LESSONS.values() if lesson.station)
 
 
-def module(name: str) -> Module:
+def module(name: str) -> Any:
     """The module of a lesson."""
-    return cast("Module", importlib.import_module(f".{name}", __name__))
+    return importlib.import_module(f".{name}", __name__)

@@ -44,13 +44,13 @@ def unit_of(result: Gravity) -> str:
 
 
 def force(run: Droop, part: str) -> float | None:
-    value = getattr(run.forces, part)
+    value = run.forces[part]
     return -value if part == "bias" and value is not None else value
 
 
 def who_holds(name: str, run: Droop, first: Gravity) -> Text | Verdict:
     """Who carries the load, if the joint is at rest and its forces balance."""
-    total, load = run.forces.total, force(run, "bias")
+    total, load = run.forces["total"], force(run, "bias")
     if abs(run.velocity) > _SLOW or abs(run.acceleration) > _STARTS:
         speed = position(run.velocity, first.slide)
         return Text(f"{name}: {first.joint} still moves, at {speed}/s; no balance is drawn.")

@@ -16,7 +16,6 @@ from ..page import Table, Text, Traces
 from ..runs.drive import Progress
 from ..runs.robot import body_pairs
 from ._words import where
-from .session import CodeWatch
 
 BREAKS = ("extra-step", "late-ctrl")
 _STEPS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 300, 600, 1000, 2000, 5000, 10_000, 20_000)
@@ -27,7 +26,7 @@ BROKEN = {
 }
 
 
-class Paths(CodeWatch):
+class Paths:
     """Where the two runs go, step by step, and what touches in the first.
 
     Attributes:
@@ -41,11 +40,11 @@ class Paths(CodeWatch):
         self._poses: dict[Data, list[Array]] = {}
         self._nstep, self._progress = nstep, progress
 
-    def before_step(self, model: Model, data: Data) -> None:
+    def before(self, _model: Model, data: Data) -> None:
         if data not in self._poses:
             self._poses[data] = [data.qpos.copy()]
 
-    def after_step(self, model: Model, data: Data) -> None:
+    def after(self, model: Model, data: Data) -> None:
         poses = self._poses[data]
         poses.append(data.qpos.copy())
         if len(self._poses) == 1:

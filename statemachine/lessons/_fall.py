@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,57 +25,32 @@ _CREEP = 0.05  # of the way; a joint that goes on by more has not settled
 _FURTHER = 0.02  # rad or m; less is not worth a cause
 
 
-@dataclass(frozen=True)
-class Forces:
-    """The generalized forces on one joint at one moment [N·m; of a slide, N].
-
-    `bias` is on the other side of the equation of motion, so that gravity acts as
-    -bias; a part that the engine does not yield is None. `total` is what is left over
-    to accelerate the joint: zero at rest.
-    """
-
-    bias: float | None
-    actuator: float | None
-    passive: float | None
-    friction: float | None
-    contact: float | None
-    limit: float | None
-    equality: float | None
-
-    @property
-    def total(self) -> float | None:
-        """Sum of all parts, -bias among them; None if one is missing."""
-        parts = (
-            self.actuator,
-            self.passive,
-            self.friction,
-            self.contact,
-            self.limit,
-            self.equality,
-        )
-        if self.bias is None or any(part is None for part in parts):
-            return None
-        return sum(part for part in parts if part is not None) - self.bias
+# The generalized forces on one joint at one moment [N·m; of a slide, N], by the names of
+# `qfrc_…`. "bias" is on the other side of the equation of motion, so that gravity acts as -bias;
+# a part that the engine does not yield is None. "total" is what is left over to accelerate the
+# joint, zero at rest; None if a part is missing.
+Forces = dict[str, float | None]
+_PARTS = ("actuator", "passive", "friction", "contact", "limit", "equality")
 
 
 def forces_on(data: Data, dof: int) -> Forces:
     """Forces on a degree of freedom, of the moment that `data`'s derived arrays show."""
-
-    def part(name: str) -> float | None:
+    forces: Forces = {}
+    for name in ("bias", *_PARTS):
         try:
-            return float(getattr(data, f"qfrc_{name}")[dof])
+            forces[name] = float(getattr(data, f"qfrc_{name}")[dof])
         except UnsupportedError:
-            return None
+            forces[name] = None
+    return summed(forces)
 
-    return Forces(
-        bias=part("bias"),
-        actuator=part("actuator"),
-        passive=part("passive"),
-        friction=part("friction"),
-        contact=part("contact"),
-        limit=part("limit"),
-        equality=part("equality"),
-    )
+
+def summed(forces: Forces) -> Forces:
+    """The parts, and their "total"."""
+    known = [part for name in _PARTS if (part := forces[name]) is not None]
+    bias = forces["bias"]
+    if bias is None or len(known) < len(_PARTS):
+        return {**forces, "total": None}
+    return {**forces, "total": sum(known) - bias}
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,9 +143,8 @@ class Falling:
         self._bodies = carried_by(model, [int(model.jnt_bodyid[model.joint_id(joint)])])
         self._total = steps_in(model, seconds)
         marks = milestones(self._total * model.timestep)
-        self._marks = {round(mark / model.timestep) for mark in marks}
+        self._marks = [round(mark / model.timestep) for mark in marks]
         self._times: list[float] = []
-        self._positions: list[float] = []
         self._path: list[float] = []
         self._touches: dict[str, float] = {}
         self._look()
@@ -178,7 +153,7 @@ class Falling:
         """A step is over; `contacts`: whether to look at them, too."""
         if contacts:  # those of a step are of the state that it started from
             for touch in touching(self._model, self._data.contacts, self._bodies):
-                self._touches.setdefault(touch, self._began)
+                self._touches.setdefault(touch, self._times[-1])
         self._look()
 
     def end(self) -> Droop:
@@ -190,8 +165,8 @@ class Falling:
             self._touches.setdefault(touch, data.time)
         return Droop(
             others=self._others(),
-            time=np.array(self._times),
-            position=np.array(self._positions),
+            time=np.array(self._times)[self._marks],
+            position=np.array(self._path)[self._marks],
             path=np.array(self._path),
             qpos=data.qpos.copy(),
             forces=forces_on(data, self._dof),
@@ -206,14 +181,15 @@ class Falling:
         """The run until the engine diverged; the rows after that are NaN."""
         marks = np.array(milestones(self._total * self._model.timestep))
         where = np.full(len(marks), np.nan)
-        where[: len(self._positions)] = self._positions
+        reached = [mark for mark in self._marks if mark < len(self._path)]
+        where[: len(reached)] = np.array(self._path)[reached]
         none = float("nan")
         return Droop(
             time=marks,
             position=where,
             path=np.array(self._path),
             qpos=np.full(self._model.nq, np.nan),
-            forces=Forces(None, None, None, None, None, None, None),
+            forces=dict.fromkeys(("bias", *_PARTS, "total")),
             velocity=none,
             acceleration=none,
             touches=self._touches,
@@ -234,14 +210,10 @@ class Falling:
         return float(speeds.max(initial=0.0)), float(pushes.max(initial=0.0))
 
     def _look(self) -> None:
-        row = len(self._path)
-        self._began = self._data.time
+        if len(self._path) % 1000 == 0:
+            self._progress(len(self._path) / self._total)
+        self._times.append(self._data.time)
         self._path.append(float(self._data.qpos[self._place]))
-        if row in self._marks:
-            self._times.append(self._data.time)
-            self._positions.append(self._path[-1])
-        if row % 1000 == 0:
-            self._progress(row / self._total)
 
 
 def milestones(seconds: float) -> list[float]:
@@ -316,21 +288,21 @@ def longer_apart(results: Mapping[str, Gravity]) -> list[tuple[str, Any]]:
         runs = [each.longer[label] for each in results.values() if label in each.longer]
         last = min(len(run.position) for run in runs) - 1
         rows.append(
-            (f"{first.off()}, {label}, at {first.longer[label].time[last]:g} s", _gap(label, last))
+            (
+                f"{first.off()}, {label}, at {first.longer[label].time[last]:g} s",
+                partial(_gap, label, last),
+            )
         )
     return rows
 
 
-def _gap(label: str, row: int) -> Any:
-    def say(one: Gravity, two: Gravity) -> str:
-        if label not in one.longer or label not in two.longer:
-            return NONE
-        ends = [each.longer[label].position[row] for each in (one, two)]
-        if not np.isfinite(ends).all():
-            return "one diverged"
-        return apart(abs(float(ends[0] - ends[1])), one.slide)
-
-    return say
+def _gap(label: str, row: int, one: Gravity, two: Gravity) -> str:
+    if label not in one.longer or label not in two.longer:
+        return NONE
+    ends = [each.longer[label].position[row] for each in (one, two)]
+    if not np.isfinite(ends).all():
+        return "one diverged"
+    return apart(abs(float(ends[0] - ends[1])), one.slide)
 
 
 def _caught(prefix: str, result: Gravity, floor: Droop, free: Droop) -> Text | Verdict:
@@ -348,9 +320,8 @@ def _caught(prefix: str, result: Gravity, floor: Droop, free: Droop) -> Text | V
         f"{prefix}it is the contact that catches {result.joint}, not damping or friction: without "
         f"contacts it runs on to {position(alone, slide)}"
     )
-    if abs(free.forces.limit or 0.0) > BALANCE:
-        unit = "N" if slide else "N·m"
-        text += f", where its limit stops it with {abs(free.forces.limit or 0):.4f} {unit}"
+    if (limit := abs(free.forces["limit"] or 0.0)) > BALANCE:
+        text += f", where its limit stops it with {limit:.4f} {'N' if slide else 'N·m'}"
     if abs(float(floor.position[-1]) - then) > abs(then) * _CREEP:
         text += (
             f". And it does not stay where it was caught: at {short:g} s it is at "

@@ -18,7 +18,7 @@ from ..runs.drive import Progress
 from ..runs.provenance import Provenance, provenance
 from ._bytes import read_derived, read_stored
 from ._robot import ReadPlace, is_of_the_arm, the_tip
-from ._words import sentence, where
+from ._words import alike, sentence, where
 
 _STORED = (*INPUTS, "time")
 _MOMENTS = ("xpos", "site_xpos", "contacts", "qacc")  # shown of what a step leaves behind
@@ -187,15 +187,11 @@ def arrays_section(
         answers: What each engine itself does after a write.
     """
     blocks: list[Block] = [Heading("Which arrays does each call change?")]
-    alike = {stages.changes: [] for stages in results.values()}
-    for name, stages in results.items():
-        alike[stages.changes].append(name)
-    for changes, names in alike.items():
+    for prefix, one in alike(results, lambda each: each.changes):
         groups: dict[tuple[bool, ...], list[str]] = {}
-        for each in changes:
+        for each in one.changes:
             key = (each.stored, each.write, each.forward, each.step)
             groups.setdefault(key, []).append(each.name)
-        prefix = f"{', '.join(names)}: " if len(results) > 1 else ""
         blocks.append(
             Table(
                 ("", "a write", "forward", "step"),

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import BadInputError, unknown_name
+from ..errors import BadInputError, check_name
 from ..interface import Array, JointType, Model, make_data
 from ..kinematics import Kind
 from ..runs.robot import carried_by
@@ -61,8 +61,7 @@ def tips_of(model: Model, name: str | None) -> list[Tip]:
         site = sites.index(wanted)
         named = bool(model.site_names[site])
         return [Tip(wanted, "site", site, int(model.site_bodyid[site]), named)]
-    if wanted not in bodies:
-        raise unknown_name("site or body", wanted, [*sites, *bodies])
+    check_name("site or body", wanted, [*sites, *bodies])
     body = bodies.index(wanted)
     return [Tip(wanted, "body", body, body, bool(model.body_names[body]))]
 

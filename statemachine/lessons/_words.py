@@ -99,6 +99,17 @@ def differences(
     ]
 
 
+def alike(results: Mapping[str, Any], of: Callable[[Any], Any]) -> list[tuple[str, Any]]:
+    """Engines that say the same are shown once: the prefix "a, b: " and one's result."""
+    groups: dict[Any, list[str]] = {}
+    for name, result in results.items():
+        groups.setdefault(of(result), []).append(name)
+    several = len(results) > 1
+    return [
+        (f"{', '.join(names)}: " if several else "", results[names[0]]) for names in groups.values()
+    ]
+
+
 def sentence(results: Mapping[str, Any], backend: str, text: str) -> Text:
     """A paragraph about one engine; alone, it begins with a capital."""
     return Text(f"{backend}: {text}" if len(results) > 1 else capital(text))

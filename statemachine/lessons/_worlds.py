@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import statistics
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -102,10 +102,9 @@ def run(play: CodeRun, progress: Progress) -> WorldsSpeed:
     shared = model.capabilities.shared_model
     world_bytes = _world_bytes(model) if shared else None  # first: freed memory is used again
     play()
-    loads = [_wall(lambda: load_model(model.path, backend=model.backend)) for _ in range(_LOADS)]
-    before, data, walls = resident_memory(), list[Data](), []
-    for _ in range(_MANY if shared else _FEW):
-        walls.append(_wall(lambda: data.append(make_data(model))))
+    loads = _walls(lambda: load_model(model.path, backend=model.backend), _LOADS)
+    before, data = resident_memory(), list[Data]()
+    makes = _walls(lambda: data.append(make_data(model)), _MANY if shared else _FEW)
     for each in data:
         step_data(model, each)
     grown = resident_memory() - before
@@ -122,7 +121,7 @@ def run(play: CodeRun, progress: Progress) -> WorldsSpeed:
     one.close()
     return WorldsSpeed(
         load=statistics.median(loads),
-        make_data=statistics.median(walls),
+        make_data=statistics.median(makes),
         data_bytes=data_bytes,
         world_bytes=world_bytes if shared else data_bytes,
         shared=shared,
@@ -164,8 +163,8 @@ def _cost(model: Model, one: Data, n: int, progress: Progress) -> WorldsCost:
         made = time.perf_counter() - began
         if model.keyframes:
             reset(worlds, keyframe=0)
-        single = max(_wall(lambda: step_data(model, one, 20)) / 20, 1e-7)
-        steps = max(1, int(_ROUND / single))
+        (single,) = _walls(lambda: step_data(model, one, 20), 1)
+        steps = max(1, int(_ROUND * 20 / max(single, 20e-7)))
         rows = max(1, round(steps / n))
         walls = in_turns(
             {
@@ -185,10 +184,9 @@ def _cost(model: Model, one: Data, n: int, progress: Progress) -> WorldsCost:
         )
 
 
-def _wall(call: Any) -> float:
-    began = time.perf_counter()
-    call()
-    return time.perf_counter() - began
+def _walls(call: Callable[[], object], times: int) -> list[float]:
+    """What so many calls take, each [s]."""
+    return in_turns({"": call}, times)[""]
 
 
 def page(results: Mapping[str, WorldsSpeed], session: Session) -> Any:
@@ -220,7 +218,13 @@ def page(results: Mapping[str, WorldsSpeed], session: Session) -> Any:
             Table(
                 ("worlds", "workers", "to make them", "a step of one", "worlds to one Data"),
                 [
-                    (f"{c.n:,}", f"{c.workers}", duration(c.made), duration(c.step), _spread(c))
+                    (
+                        f"{c.n:,}",
+                        f"{c.workers}",
+                        duration(c.made),
+                        duration(c.step),
+                        c.faster.spread(" ×"),
+                    )
                     for c in result.costs
                 ],
                 title=f"Wall time with the number of worlds: {name}",
@@ -284,11 +288,6 @@ def _told(result: WorldsSpeed) -> str:
         f"is seen with {count(best.n, 'world')}: a step of one takes {duration(best.step)}, and "
         f"{best.faster.median:.2f} times as many steps are taken as with one Data in bulk."
     )
-
-
-def _spread(cost: WorldsCost) -> str:
-    ratio = cost.faster
-    return f"{ratio.median:.2f} ×  ({ratio.low:.2f} to {ratio.high:.2f})"
 
 
 def _memory(size: float | None) -> str:

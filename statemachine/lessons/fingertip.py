@@ -282,12 +282,10 @@ def _engine_poses(
         for k, qpos in enumerate(configurations):
             data.qpos = qpos
             forward(model, data)
-            if sites:
-                pos[k, sites] = data.site_xpos[site_ids]
-                mat[k, sites] = data.site_xmat[site_ids].reshape(-1, 3, 3)
-            if bodies:
-                pos[k, bodies] = data.xpos[body_ids]
-                mat[k, bodies] = matrix_from_quat(data.xquat[body_ids])
+            pos[k, sites] = data.site_xpos[site_ids]
+            mat[k, sites] = data.site_xmat[site_ids].reshape(-1, 3, 3)
+            pos[k, bodies] = data.xpos[body_ids]
+            mat[k, bodies] = matrix_from_quat(data.xquat[body_ids])
             if k % 100 == 0:
                 progress(k / len(configurations))
     return Pose(pos, mat)

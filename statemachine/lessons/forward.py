@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from ..measures.text import count, millimetres, vector
 from ..page import Page, Question, Table, Text, Verdict
 from ..runs.drive import Progress, steps_in
 from ..runs.provenance import Provenance, provenance
-from ._robot import ReadPlace, a_tip, coordinate, the_tip, tip_of, usual_tip, with_joint
+from ._robot import a_tip, coordinate, the_tip, tip_of, usual_tip, with_joint
 from ._stages import (
     Look,
     OwnAnswer,
@@ -28,7 +29,7 @@ from ._stages import (
 )
 from ._words import differences, emulation, page_of, sentence, typed, where
 from .records import Session
-from .session import CodeRun, CodeWatch
+from .session import CodeRun
 
 _SECONDS = 2.0  # under a command, long enough to touch something
 _INSIDE = 1e-3  # metres; less is how engines press things together
@@ -111,10 +112,19 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Forwar
     model, joint, value = play.model, options["joint"], options["value"]
     place, tip = coordinate(model, joint).place, tip_of(model, options["site"])
     arrays, steps = options["arrays"], _steps(model, options)
-    watch = _Readings(tip, arrays)
-    names = play(watch)
+    read: list[tuple[Array, float]] = []
+    looks: list[Look] = []
+
+    def look(source: str, names: Mapping[str, Any]) -> None:
+        if source.startswith("print("):
+            data: Data = names["data"]
+            read.append((tip.read(data), data.time))
+            if arrays:
+                looks.append(look_at(data))
+
+    names = play(line=look)
     labels = ("make_data", "forward", f"qpos[{place}] = {value:g}", "forward again")
-    tips = [fingertip for fingertip, _ in watch.read]
+    tips = [fingertip for fingertip, _ in read]
     found = names["data"].contacts
     itself = own_answers(model, "write") if arrays else ()
     if steps:
@@ -122,7 +132,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Forwar
     return Forward(
         joint=joint,
         value=value,
-        readings=tuple(Reading(label, *at) for label, at in zip(labels, watch.read, strict=True)),
+        readings=tuple(Reading(label, *at) for label, at in zip(labels, read, strict=True)),
         equal=tuple(
             (i, j)
             for i in range(len(tips))
@@ -133,7 +143,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Forwar
         contacts=len(found),
         deepest=max(0.0, -float(found.dist.min(initial=0.0))),
         itself=itself,
-        stages=find_stages(model, tip, place, value, watch.looks[1:], steps, progress),
+        stages=find_stages(model, tip, place, value, looks[1:], steps, progress),
         provenance=provenance(model),
     )
 
@@ -144,23 +154,6 @@ def _steps(model: Model, options: Mapping[str, Any]) -> int:
     if seconds is None:
         return steps_in(model, _SECONDS) if options["lag"] else 0
     return steps_in(model, seconds)
-
-
-class _Readings(CodeWatch):
-    """The fingertip and the time at each print, and, if wanted, every array."""
-
-    def __init__(self, tip: ReadPlace, arrays: bool) -> None:
-        self._tip, self._arrays = tip, arrays
-        self.read: list[tuple[Array, float]] = []
-        self.looks: list[Look] = []
-
-    def after_line(self, source: str, names: Mapping[str, Any]) -> None:
-        if not source.startswith("print("):
-            return
-        data: Data = names["data"]
-        self.read.append((self._tip.read(data), data.time))
-        if self._arrays:
-            self.looks.append(look_at(data))
 
 
 def page(results: Mapping[str, Forward], session: Session) -> Page:
@@ -195,7 +188,9 @@ def page(results: Mapping[str, Forward], session: Session) -> Page:
         blocks += _findings(results, name, result)
     promises = ["zeros when fresh", "stale after a write"]
     blocks += emulation(results, *promises, *["stale after a step"] * lag)
-    rows = [(f"{a_tip(tip)}, reading {i + 1}", _apart(i)) for i in range(len(first.readings))]
+    rows = [
+        (f"{a_tip(tip)}, reading {i + 1}", partial(_apart, i)) for i in range(len(first.readings))
+    ]
     blocks += differences(results, rows)
     if arrays:
         blocks += arrays_section(stages, _own(results, "write"))
@@ -293,9 +288,6 @@ def _own(results: Mapping[str, Forward], question: str) -> dict[str, list[OwnAns
     }
 
 
-def _apart(reading: int) -> Callable[[Forward, Forward], str]:
-    def say(one: Forward, two: Forward) -> str:
-        tips = [each.readings[reading].fingertip for each in (one, two)]
-        return f"{math.dist(*tips):.1e} m"
-
-    return say
+def _apart(reading: int, one: Forward, two: Forward) -> str:
+    tips = [each.readings[reading].fingertip for each in (one, two)]
+    return f"{math.dist(*tips):.1e} m"

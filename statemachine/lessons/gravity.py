@@ -10,13 +10,13 @@ import numpy as np
 
 from ..engines import part
 from ..engines.parts import AsItComes
-from ..errors import BadInputError, DivergedError, UnsupportedError
-from ..interface import Data, JointType, Model, make_data, reset, step
+from ..errors import BadInputError, UnsupportedError
+from ..interface import Data, JointType, Model, make_data, reset
 from ..measures import largest
 from ..measures.text import apart, short_time, signed
 from ..page import Page, Question, Table, Text
 from ..runs.commands import is_servo, load_at_start, start_keyframe
-from ..runs.drive import Progress, cost_of_a_second, part_of, steps_in
+from ..runs.drive import Progress, cost_of_a_second, drive, part_of, steps_in
 from ..runs.provenance import provenance
 from ..runs.robot import ARM, has_floor, is_the_arm
 from ..runs.scenarios import SCENARIOS, drives
@@ -25,7 +25,7 @@ from ._fall import BALANCE, Droop, Falling, Gravity, longer, longer_apart, miles
 from ._robot import USUAL, coordinate, start_line, with_joint
 from ._words import differences, emulation, page_of, spans, typed, where
 from .records import Session
-from .session import CodeRun, CodeWatch
+from .session import CodeRun
 
 _OURS = ("position servo", "joint damping", "dry friction", "joint limits", "forces by part")
 _FALLEN = 30  # degrees
@@ -104,9 +104,15 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Gravit
         with suppress(UnsupportedError):
             runs[f"no {touch}"] = model.replace(**SCENARIOS["fall"].options)
     total = 2 * seconds + len(runs) * options["longer"]
-    both = _Both(joint, seconds, part_of(progress, 0.0, 2 * seconds / total))
-    play(both)
-    ends = [both.falls[data].end() for _, data in play.worlds]
+    falls: dict[Data, Falling] = {}
+
+    def begin(_model: Model, data: Data) -> None:
+        if data not in falls:
+            share = part_of(progress, len(falls) * seconds / total, seconds / total)
+            falls[data] = Falling(data, joint, seconds, share)
+
+    play(before=begin, after=lambda _model, data: falls[data].note(contacts=True))
+    ends = [falls[data].end() for _, data in play.worlds]
     fallen = {}
     for number, (name, each) in enumerate(runs.items()):
         start = 2 * seconds + number * options["longer"]
@@ -131,33 +137,13 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Gravit
     )
 
 
-class _Both(CodeWatch):
-    """The joint in each Data, step by step, and what touches."""
-
-    def __init__(self, joint: str, seconds: float, progress: Progress) -> None:
-        self._joint, self._seconds, self._progress = joint, seconds, progress
-        self.falls: dict[Data, Falling] = {}
-
-    def before_step(self, model: Model, data: Data) -> None:
-        if data not in self.falls:
-            share = part_of(self._progress, len(self.falls) / 2, 1 / 2)
-            self.falls[data] = Falling(data, self._joint, self._seconds, share)
-
-    def after_step(self, model: Model, data: Data) -> None:
-        self.falls[data].note(contacts=True)
-
-
 def _left_alone(model: Model, joint: str, seconds: float, progress: Progress) -> Droop:
     with make_data(model) as data:
         reset(model, data, start_keyframe(model))
         fall = Falling(data, joint, seconds, progress)
-        try:
-            for _ in range(steps_in(model, seconds)):
-                step(model, data)
-                fall.note(contacts=False)
-            return fall.end()
-        except DivergedError as error:
-            return fall.gave_up(error.time)
+        steps = steps_in(model, seconds)
+        error = drive(model, data, None, steps, after=lambda _k, _time: fall.note(contacts=False))
+        return fall.end() if error is None else fall.gave_up(error.time)
 
 
 def page(results: Mapping[str, Gravity], session: Session) -> Page:
@@ -197,7 +183,7 @@ def page(results: Mapping[str, Gravity], session: Session) -> Page:
                     (label, *(signed(force(run, part)) for run in columns.values()))
                     for label, part in parts
                 ),
-                ("sum", *(signed(run.forces.total) for run in columns.values())),
+                ("sum", *(signed(run.forces["total"]) for run in columns.values())),
             ],
             title=f"Who holds {first.joint}, at {end:g} s [{unit_of(first)}]",
             emphasis=frozenset({len(parts)}),

@@ -19,7 +19,7 @@ from ._hold import Hold, apart_freely, apart_until, at, at_end, gap, question, r
 from ._robot import Coordinate, coordinate, start_line
 from ._words import differences, page_of, spans, typed, where
 from .records import Session
-from .session import CodeRun, CodeWatch
+from .session import CodeRun
 
 _TIMES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0)
 _PRINTED = (0.1, 0.2, 0.3, 0.4)  # s; and at the end
@@ -57,23 +57,42 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Hold:
     names = list(driven)
     addresses = np.array([(at.place, at.dof) for at, _ in driven.values()], dtype=np.int64)
     total = steps_in(model, options["seconds"])
-    way = _Way(model, addresses[:, 0], total, progress)
-    play(way)
+    robot = moved_by_actuators(model)
+    times: list[float] = []
+    poses: list[Array] = []
+    touches: list[tuple[float, tuple[str, ...]]] = []  # when, and what touches what
+
+    def note(_model: Model, data: Data) -> None:
+        times.append(data.time)
+        poses.append(data.qpos[addresses[:, 0]])
+
+    def look(_model: Model, data: Data) -> None:
+        # The contacts of a step are those of the state that it started from.
+        if found := touching(model, data.contacts, robot):
+            touches.append((times[-1], found))
+        if len(times) % 100 == 0:
+            progress(len(times) / total)
+
+    play(before=note, after=look)
     _, data = play.worlds[0]
-    way.end(data)
+    note(model, data)
+    forward(model, data)
+    at_end = touching(model, data.contacts, robot)
+    last = [(data.time, at_end)] if at_end else []
+    first, touched = [*touches, *last, (None, ())][0]
     ctrl = data.ctrl.copy()
     servos = [servo for _, servo in driven.values()]
     return Hold(
         target=_goals(model, ctrl, servos),
         goal=_goals(model, np.clip(ctrl, *model.actuator_ctrlrange.T), servos),
-        time=np.array(way.times),
-        qpos=np.array(way.poses),
-        first_contact=way.first,
-        touched=way.touched,
-        contact_steps=way.contact_steps,
-        touching=way.touching,
+        time=np.array(times),
+        qpos=np.array(poses),
+        first_contact=first,
+        touched=touched,
+        contact_steps=len(touches),
+        touching=at_end,
         speed=data.qvel[addresses[:, 1]].copy(),
-        without_contacts=None if way.first is None else _freely(model, ctrl, total, addresses),
+        without_contacts=None if first is None else _freely(model, ctrl, total, addresses),
         joints=tuple(names),
         slides=tuple(at.slide for at, _ in driven.values()),
         servo=bool(is_servo(model).all()),
@@ -103,44 +122,6 @@ def _driven(model: Model) -> dict[str, tuple[Coordinate, int | None]]:
 def _goals(model: Model, ctrl: Array, servos: list[int | None]) -> Array:
     """What ctrl says to each joint; NaN where it is no target."""
     return np.array([np.nan if i is None else ctrl[i] / model.actuator_gear[i] for i in servos])
-
-
-class _Way(CodeWatch):
-    """Where the joints are after each step, and what the robot touched."""
-
-    def __init__(self, model: Model, places: Ints, total: int, progress: Progress) -> None:
-        self.robot, self.places = moved_by_actuators(model), places
-        self.total, self.progress = total, progress
-        self.times: list[float] = []
-        self.poses: list[Array] = []
-        self.first: float | None = None
-        self.touched: tuple[str, ...] = ()
-        self.touching: tuple[str, ...] = ()
-        self.contact_steps = 0
-
-    def before_step(self, model: Model, data: Data) -> None:
-        self._note(data)
-
-    def after_step(self, model: Model, data: Data) -> None:
-        # The contacts of a step are those of the state that it started from.
-        found = touching(model, data.contacts, self.robot)
-        self.contact_steps += bool(found)
-        if found and self.first is None:
-            self.first, self.touched = self.times[-1], found
-        if len(self.times) % 100 == 0:
-            self.progress(len(self.times) / self.total)
-
-    def end(self, data: Data) -> None:
-        """Look at the state after the last step."""
-        self._note(data)
-        forward(data.model, data)
-        self.touching = touching(data.model, data.contacts, self.robot)
-        if self.first is None and self.touching:
-            self.first, self.touched = data.time, self.touching
-
-    def _note(self, data: Data) -> None:
-        self.times.append(data.time)
-        self.poses.append(data.qpos[self.places])
 
 
 def _freely(model: Model, ctrl: Array, steps: int, addresses: Ints) -> Array | None:

@@ -35,6 +35,11 @@ class Ratio:
         low, median, high = statistics.quantiles(ratios * 2 if len(ratios) < 2 else ratios, n=4)
         return cls(name, median, low, high, len(ratios))
 
+    def spread(self, sign: str = "", decimals: int = 2) -> str:
+        """The median, and the middle half, as text."""
+        middle, low, high = (f"{x:.{decimals}f}" for x in (self.median, self.low, self.high))
+        return f"{middle}{sign}  ({low} to {high})"
+
     def differs_from(self, null: Ratio) -> bool:
         """Whether the middle halves of the rounds lie apart."""
         if min(self.rounds, null.rounds) < FEWEST:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import statistics
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from ..backends import load
 from ..errors import BadInputError
-from ..interface import Array, Data, Model, make_data, step
+from ..interface import Array, Model, make_data, step
 from ..interface.checks import as_count
 from ..measures.text import count, duration
 from ..page import Page, Question, Table, Text, Verdict
@@ -20,6 +20,7 @@ from ..runs.drive import Progress, part_of
 from ..runs.provenance import Provenance, provenance
 from ._robot import is_of_the_arm
 from ._words import differences, page_of, sentence, typed, where, words
+from .in_turns import in_turns
 from .records import Session
 from .session import CodeRun
 
@@ -94,28 +95,24 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Object
     before = _arrays(model)
     play()
     made = [data for _, data in play.worlds]
-    loading = _median(lambda: load(model.path, backend=model.backend))
-    progress(0.3)
-    making = _median(lambda: made.append(make_data(model)))
-    stepping = _median(lambda: step(model, made[0], _STEPS)) / _STEPS
+    ways: dict[str, Callable[[], object]] = {
+        "load": lambda: load(model.path, backend=model.backend),
+        "make": lambda: made.append(make_data(model)),
+        "step": lambda: step(model, made[0], _STEPS),
+    }
+    walls = in_turns(ways, _TIMES, part_of(progress, 0.0, 0.5))
+    costs = {name: statistics.median(times) for name, times in walls.items()}
     shared = all(getattr(data.raw, "model", None) is model.raw for data in made)
     for data in made[len(play.worlds) :]:
         data.close()
-    progress(0.5)
-    singly: list[Array] = []
-    for k in range(worlds):
-        with make_data(model) as data:
-            _command(model, data, k, worlds)
-            for _ in range(_STEPS):
-                step(model, data)
-            singly.append(data.qpos.copy())
-        progress(0.5 + 0.25 * (k + 1) / worlds)
-    together = _in_turn(model, worlds, part_of(progress, 0.75, 0.25))
+    shares = [part_of(progress, 0.5 + 0.25 * k / worlds, 0.25 / worlds) for k in range(worlds)]
+    singly = [_in_turn(model, [k], worlds, shares[k])[0] for k in range(worlds)]
+    together = _in_turn(model, range(worlds), worlds, part_of(progress, 0.75, 0.25))
     after = _arrays(model)
     return Objects(
-        loading=loading,
-        making=making,
-        stepping=stepping,
+        loading=costs["load"],
+        making=costs["make"],
+        stepping=costs["step"] / _STEPS,
         worlds=worlds,
         nstep=_STEPS,
         alone=all(np.array_equal(a, b) for a, b in zip(singly, together, strict=True)),
@@ -128,27 +125,22 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Object
     )
 
 
-def _in_turn(model: Model, count: int, progress: Progress) -> list[Array]:
-    """Where each of several Data ends if they take their steps in turn."""
-    worlds = [make_data(model) for _ in range(count)]
-    try:
-        for k, data in enumerate(worlds):
-            _command(model, data, k, count)
+def _in_turn(model: Model, numbers: Sequence[int], count: int, progress: Progress) -> list[Array]:
+    """Where some of `count` Data end if they take their steps in turn, each under its command.
+
+    Another one for each: of the first actuator, over a part of its range.
+    """
+    with ExitStack() as stack:
+        worlds = [stack.enter_context(make_data(model)) for _ in numbers]
+        for k, data in zip(numbers, worlds, strict=True):
+            if model.nu:
+                low, high = np.clip(model.actuator_ctrlrange[0], -1.0, 1.0)
+                data.ctrl[0] = low + (high - low) * (k + 1) / (count + 1)
         for number in range(_STEPS):
             for data in worlds:
                 step(model, data)
             progress((number + 1) / _STEPS)
         return [data.qpos.copy() for data in worlds]
-    finally:
-        for data in worlds:
-            data.close()
-
-
-def _command(model: Model, data: Data, k: int, count: int) -> None:
-    """Another command for each world: the first actuator, over a part of its range."""
-    if model.nu:
-        low, high = np.clip(model.actuator_ctrlrange[0], -1.0, 1.0)
-        data.ctrl[0] = low + (high - low) * (k + 1) / (count + 1)
 
 
 def _arrays(model: Model) -> dict[str, bytes]:
@@ -158,15 +150,6 @@ def _arrays(model: Model) -> dict[str, bytes]:
         if not name.startswith("_"):
             found[f"raw.{name}"] = getattr(model.raw, name)
     return {name: each.tobytes() for name, each in found.items() if isinstance(each, np.ndarray)}
-
-
-def _median(action: Callable[[], object]) -> float:
-    times = []
-    for _ in range(_TIMES):
-        began = time.perf_counter()
-        action()
-        times.append(time.perf_counter() - began)
-    return statistics.median(times)
 
 
 def page(results: Mapping[str, Objects], session: Session) -> Page:
@@ -201,7 +184,7 @@ def page(results: Mapping[str, Objects], session: Session) -> Page:
                 ("load: the file, once", *(duration(r.loading) for r in results.values())),
                 ("make_data", *(duration(r.making) for r in results.values())),
                 ("step: one timestep", *(duration(r.stepping) for r in results.values())),
-                ("a load costs as much as", *(_steps(r) for r in results.values())),
+                ("a load costs as much as", *(f"{r.ratio:,.0f} steps" for r in results.values())),
             ],
             title="What each costs on this machine, now (median of five)",
         ),
@@ -256,7 +239,3 @@ def _commands(result: Objects) -> str:
     ends = result.different
     apart = "no two of them ended alike" if ends == result.worlds else f"they had {ends} ends"
     return f", each with its own ctrl, and {apart}"
-
-
-def _steps(result: Objects) -> str:
-    return f"{result.ratio:,.0f} steps"

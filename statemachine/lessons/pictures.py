@@ -16,7 +16,8 @@ import numpy as np
 from ..backends import load
 from ..interface import Array, Data, Model, forward, make_data, reset, step
 from ..page import Page, Printed, RobotPicture
-from ..runs.scenarios import SCENARIOS, TARGET
+from ..runs.commands import TARGET
+from ..runs.scenarios import SCENARIOS
 
 _ARM, _BOX = "so101/scene", "so101/scene_box"
 _EVERY = 16  # steps of 5 ms from one picture of a film to the next, which is shown 0.08 s later

@@ -104,7 +104,7 @@ def _fits(ask: Any, answers: Answers) -> bool:
 def _is_held(found: gravity.Gravity) -> bool:
     """Whether a position servo holds the joint against gravity, without which it falls."""
     on, off = found.servos_on, found.servos_off
-    servo, load = on.forces.actuator or 0.0, on.forces.bias or 0.0
+    servo, load = on.forces["actuator"] or 0.0, on.forces["bias"] or 0.0
     held = abs(servo - load) < 1e-3 < abs(load)
     return held and abs(off.position[-1]) > abs(on.position[-1])
 
@@ -200,7 +200,7 @@ def _held(answers: Answers) -> _Answered:
     )
     found = answers.gravity
     on, off = found.servos_on, found.servos_off
-    servo, load = on.forces.actuator or 0.0, on.forces.bias or 0.0
+    servo, load = on.forces["actuator"] or 0.0, on.forces["bias"] or 0.0
     text = (
         f"gravity pulls with {abs(load):.4f} N·m, the servo holds with {abs(servo):.4f} N·m and "
         f"lets {found.joint} sag by {degrees(on.position[-1], 3)}; with the servos off it is at "

@@ -1,12 +1,10 @@
-"""What a lesson is: its entry in the table, its module, and the code that was run for it."""
+"""What a lesson is: its entry in the table, and the code that was run for it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
-
-from ..page import Page
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -53,30 +51,3 @@ class Session:
 
     code: str
     printed: Mapping[str, str]
-
-
-class Module(Protocol):
-    """What a lesson's module offers, in the order in which one reads it.
-
-    One whose options depend on the robot also has `fit(model, options)`, which gives them back
-    with nothing left open; `code` and `run` are called with these.
-    """
-
-    def code(self, model: Any, options: Mapping[str, Any], load: str) -> str:
-        """What is typed: the code for this Model; `load` is the call that loads it.
-
-        Raises:
-            StateMachineError: The Model has not what the lesson is about, or an option is wrong.
-        """
-        ...
-
-    def run(self, play: Any, options: Mapping[str, Any], progress: Any) -> Any:
-        """What is run: `play` (a `session.CodeRun`) is called once, and is the code's own run.
-
-        What else the lesson compares that run with is run here, too.
-        """
-        ...
-
-    def page(self, results: Mapping[str, Any], session: Session) -> Page:
-        """What is said: the results by backend; `session` is the code and what it printed."""
-        ...

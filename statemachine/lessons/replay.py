@@ -10,7 +10,7 @@ import numpy as np
 
 from ..engines import part
 from ..engines.parts import AsItComes, WayBack
-from ..errors import UnsupportedError, unknown_name
+from ..errors import UnsupportedError, check_name
 from ..interface import Array, Ints, JointType, Model, get_state
 from ..interface.checks import as_count
 from ..measures import largest
@@ -33,8 +33,8 @@ def code(model: Model, options: Mapping[str, Any], load: str) -> str:
     With a way to break them, the second run differs: "extra-step" takes one step more before
     the count begins, "late-ctrl" writes the command one step late.
     """
-    if options["break"] is not None and options["break"] not in BREAKS:
-        raise unknown_name("way to break a replay", options["break"], BREAKS)
+    if options["break"] is not None:
+        check_name("way to break a replay", options["break"], BREAKS)
     steps = as_count(options["steps"], "steps")
     write, said = (
         "data.ctrl[:2] += np.array((0.4, -0.2))[: model.nu]",
@@ -137,14 +137,14 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Replay
     model, nstep, way = play.model, options["steps"], options["break"]
     shares = [part_of(progress, k / 3, 1 / 3) for k in range(3)]
     paths = Paths(nstep, progress if way else shares[0])
-    play(paths)
+    play(before=paths.before, after=paths.after)
     first, second = paths.both()
     broken, finer = [], None
     if way is None:
         for each, share in zip(BREAKS, shares[1:], strict=True):
             watch = Paths(nstep, share)
             with CodeRun(code(model, {**options, "break": each}, "sm.load()"), model) as other:
-                other(watch)
+                other(before=watch.before, after=watch.after)
             broken.append(Broken.of(each, *watch.both()))
         finer = _finer(model, options, first[-1])
     gap = first - second

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from ..runs.robot import body_pairs, carried_by, moved_by_actuators
 from ._bytes import read_derived, read_stored
 from ._words import differences, emulation, page_of, sentence, typed, where
 from .records import Session
-from .session import CodeRun, CodeWatch
+from .session import CodeRun
 
 _STEPS = 100  # before the reset, and after it
 _WATCHED = 600  # steps under the keyframe's own ctrl
@@ -108,11 +109,16 @@ class Reset:
 def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Reset:
     """Look at the Data after each line; go on with it from each keyframe, and after a reset."""
     model = play.model
-    lines = _Lines()
-    play(lines)
-    start, blank = lines.after["data = sm.make_data(model)"]
-    changed, _ = lines.after[f"sm.step(model, data, {_STEPS})"]
-    again, derived = lines.after["sm.reset(model, data)"]
+    lines: dict[str, tuple[dict[str, bytes], dict[str, bytes]]] = {}  # stored, derived; after each
+
+    def look(source: str, names: Mapping[str, Any]) -> None:
+        if "data" in names:
+            lines[source] = read_stored(names["data"]), read_derived(names["data"])
+
+    play(line=look)
+    start, blank = lines["data = sm.make_data(model)"]
+    changed, _ = lines[f"sm.step(model, data, {_STEPS})"]
+    again, derived = lines["sm.reset(model, data)"]
     _, data = play.worlds[0]
     scenes = []
     for key in range(len(model.keyframes)):
@@ -138,17 +144,6 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Reset:
         scenes=tuple(scenes),
         provenance=provenance(model),
     )
-
-
-class _Lines(CodeWatch):
-    """The bytes of the Data after each line, stored and derived."""
-
-    def __init__(self) -> None:
-        self.after: dict[str, tuple[dict[str, bytes], dict[str, bytes]]] = {}
-
-    def after_line(self, source: str, names: Mapping[str, Any]) -> None:
-        if "data" in names:
-            self.after[source] = read_stored(names["data"]), read_derived(names["data"])
 
 
 def _scene(model: Model, data: Data, key: int) -> KeyframeScene:
@@ -236,7 +231,7 @@ def page(results: Mapping[str, Reset], session: Session) -> Page:
     blocks += differences(
         results,
         [
-            (f"rise of the {scene.body}, {scene.name}", _rise(k))
+            (f"rise of the {scene.body}, {scene.name}", partial(_rise, k))
             for k, scene in enumerate(first.scenes)
             if scene.body
         ],
@@ -305,9 +300,6 @@ def _finding(results: Mapping[str, Reset], name: str, number: int, file: str) ->
     )
 
 
-def _rise(number: int) -> Any:
-    def say(one: Reset, two: Reset) -> str:
-        rises = millimetres(two.scenes[number].rise, 3), millimetres(one.scenes[number].rise, 3)
-        return f"{rises[0]} instead of {rises[1]}"
-
-    return say
+def _rise(number: int, one: Reset, two: Reset) -> str:
+    rises = [millimetres(each.scenes[number].rise, 3) for each in (two, one)]
+    return " instead of ".join(rises)

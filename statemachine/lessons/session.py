@@ -21,24 +21,11 @@ from . import module
 from .records import Lesson, Session
 
 
-class CodeWatch:
-    """What looks on while the code of a lesson runs; a lesson overrides what it needs."""
-
-    def before_step(self, model: Model, data: Data) -> None:
-        """A timestep is about to begin; one of several if the code asks for several."""
-
-    def after_step(self, model: Model, data: Data) -> None:
-        """A timestep is over."""
-
-    def after_line(self, source: str, names: Mapping[str, Any]) -> None:
-        """A statement of the code is over; `names` are the variables of the code."""
-
-
 class CodeRun:
     """The code of a lesson on one Model, to be run once.
 
         with CodeRun(code, model) as play:
-            play(watch)
+            play()
             play.worlds[0]  # the first Data that the code made; open until the end of the block
 
     Attributes:
@@ -67,18 +54,46 @@ class CodeRun:
         """What the code printed."""
         return self._out.getvalue()
 
-    def __call__(self, watch: CodeWatch | None = None) -> Mapping[str, Any]:
+    def __call__(
+        self,
+        *,
+        before: Callable[[Model, Data], object] | None = None,
+        after: Callable[[Model, Data], object] | None = None,
+        line: Callable[[str, Mapping[str, Any]], object] | None = None,
+    ) -> Mapping[str, Any]:
         """Run the code; its variables.
 
         Args:
-            watch: Looks on. If it looks at steps, `sm.step(model, data, n)` is taken as n steps,
-                which end in the same bits.
+            before: Called before each timestep, one of several if the code asks for several.
+            after: Called after each. With one of these `sm.step(model, data, n)` is taken as n
+                steps, which end in the same bits.
+            line: Called after each statement, with it and with the variables of the code.
 
         Raises:
             Exception: Whatever the code raised.
         """
-        watch = watch or CodeWatch()
-        facade = self._facade(watch)
+
+        def make(model: Model) -> Data:
+            data = make_data(model)
+            self.worlds.append((model, data))
+            return data
+
+        def watched(model: Model, data: Data, nstep: int = 1) -> None:
+            for _ in range(nstep):
+                if before is not None:
+                    before(model, data)
+                step(model, data)
+                if after is not None:
+                    after(model, data)
+
+        # The package as the code imports it: its Model is given, its steps are looked at.
+        facade = ModuleType(statemachine.__name__)
+        vars(facade).update(vars(statemachine))
+        vars(facade).update(
+            load=lambda *_args, **_options: self.model,
+            make_data=make,
+            step=step if before is after is None else watched,
+        )
 
         def imported(name: str, *args: Any, **kwargs: Any) -> Any:
             return facade if name == statemachine.__name__ else __import__(name, *args, **kwargs)
@@ -90,33 +105,9 @@ class CodeRun:
         with redirect_stdout(self._out):
             for source, _, run in statements(self._code):
                 run(self.names)
-                watch.after_line(source, self.names)
+                if line is not None:
+                    line(source, self.names)
         return self.names
-
-    def _facade(self, watch: CodeWatch) -> ModuleType:
-        """The package as the code imports it: its Model is given, its steps are looked at."""
-
-        def make(model: Model) -> Data:
-            data = make_data(model)
-            self.worlds.append((model, data))
-            return data
-
-        def watched(model: Model, data: Data, nstep: int = 1) -> None:
-            for _ in range(nstep):
-                watch.before_step(model, data)
-                step(model, data)
-                watch.after_step(model, data)
-
-        looks = type(watch).before_step, type(watch).after_step
-        one_call = looks == (CodeWatch.before_step, CodeWatch.after_step)
-        facade = ModuleType(statemachine.__name__)
-        vars(facade).update(vars(statemachine))
-        vars(facade).update(
-            load=lambda *_args, **_options: self.model,
-            make_data=make,
-            step=step if one_call else watched,
-        )
-        return facade
 
 
 @dataclass(frozen=True)

@@ -181,8 +181,8 @@ def page(results: Mapping[str, Any], session: Session) -> Page:
         Table(
             ("", *results),
             [
-                ("step by step", *(_spread(r.loop) for r in results.values())),
-                ("in bulk again", *(_spread(r.null) for r in results.values())),
+                ("step by step", *(r.loop.spread() for r in results.values())),
+                ("in bulk again", *(r.null.spread() for r in results.values())),
             ],
             title="Cost relative to bulk: median of the rounds, and their middle half",
         ),
@@ -223,16 +223,12 @@ def _told(result: Speed) -> str:
     return f"{text}. In bulk, a step takes {duration(result.bulk / result.nstep)}."
 
 
-def _spread(ratio: Ratio) -> str:
-    return f"{ratio.median:.2f}  ({ratio.low:.2f} to {ratio.high:.2f})"
-
-
 def _against(one: Speed, two: Speed) -> str:
     """How much longer a step takes on another engine; the engines were measured one by one."""
     ratio = Ratio.of("", two.bulk_rounds, one.bulk_rounds)
     if not (ratio.differs_from(one.null) and ratio.differs_from(two.null)):
         return "cannot be told apart here"
-    return f"{ratio.median:.1f} ×  ({ratio.low:.1f} to {ratio.high:.1f})"
+    return ratio.spread(" ×", 1)
 
 
 def _own(result: Speed) -> str:

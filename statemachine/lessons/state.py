@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ from ..interface import JointType, Model, make_data, reset
 from ..page import Page, Question, Slots, Table, Text
 from ..runs.drive import Progress
 from ..runs.provenance import Provenance, provenance
-from ._words import differences, page_of, typed
+from ._words import alike, differences, page_of, typed
 from .records import Session
 from .session import CodeRun
 
@@ -127,7 +127,7 @@ def page(results: Mapping[str, Layout], session: Session) -> Page:
             title="Lengths of qpos, qvel and ctrl; number of bodies, the world included",
         ),
     ]
-    for names, layout in _alike(results, lambda each: each.joints):
+    for names, layout in alike(results, lambda each: each.joints):
         blocks.append(
             Table(
                 ("joint", "type", "qpos", "qvel"),
@@ -185,17 +185,6 @@ def page(results: Mapping[str, Layout], session: Session) -> Page:
             )
     blocks += differences(results, [("names, sizes and slots", _layouts)])
     return page_of("Positions and velocities do not line up", results, blocks)
-
-
-def _alike(results: Mapping[str, Layout], of: Callable[[Layout], Any]) -> list[tuple[str, Layout]]:
-    """Engines that say the same are shown once: the prefix "a, b: " and one's result."""
-    groups: dict[Any, list[str]] = {}
-    for name, layout in results.items():
-        groups.setdefault(of(layout), []).append(name)
-    several = len(results) > 1
-    return [
-        (f"{', '.join(names)}: " if several else "", results[names[0]]) for names in groups.values()
-    ]
 
 
 def _layouts(one: Layout, two: Layout) -> str:

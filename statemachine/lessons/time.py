@@ -17,7 +17,7 @@ from ..runs.drive import Progress, steps_in
 from ..runs.provenance import Provenance, provenance
 from ._words import page_of, typed, where
 from .records import Session
-from .session import CodeRun, CodeWatch
+from .session import CodeRun
 
 _BEFORE = "A simulation, a pause of the program, and the time on the simulator's own clock."
 _NAP = 0.2  # s
@@ -119,8 +119,11 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Pace:
     with CodeRun(also, model) as second:
         free, paced = (second, play) if options["realtime"] else (play, second)
         nap, waiting = _Nap(), _Waiting(paced.names, total, progress)
-        play(waiting if play is paced else nap)
-        second(nap if play is paced else waiting)
+        for loop in (play, second):
+            if loop is paced:
+                loop(before=waiting.before, after=waiting.after, line=waiting.line)
+            else:
+                loop(line=nap.line)
         (_, data), (_, other) = free.worlds[0], paced.worlds[0]
         return Pace(
             nstep=total,
@@ -139,7 +142,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Pace:
         )
 
 
-class _Nap(CodeWatch):
+class _Nap:
     """What the steps of the code that does not wait take, and what happens while it sleeps."""
 
     stepping = length = passed = 0.0
@@ -148,7 +151,7 @@ class _Nap(CodeWatch):
     def __init__(self) -> None:
         self._line_over, self._before = 0.0, (0.0, b"")
 
-    def after_line(self, source: str, names: Mapping[str, Any]) -> None:
+    def line(self, source: str, names: Mapping[str, Any]) -> None:
         took = time.perf_counter() - self._line_over
         if "data" in names:
             data: Data = names["data"]
@@ -162,7 +165,7 @@ class _Nap(CodeWatch):
         self._line_over = time.perf_counter()
 
 
-class _Waiting(CodeWatch):
+class _Waiting:
     """How long the loop that waits does so, and how late its steps are."""
 
     def __init__(self, names: Mapping[str, Any], total: int, progress: Progress) -> None:
@@ -170,17 +173,17 @@ class _Waiting(CodeWatch):
         self._names, self._total, self._progress = names, total, progress
         self._steps = 0
 
-    def before_step(self, model: Model, data: Data) -> None:
+    def before(self, _model: Model, data: Data) -> None:
         if self._steps:
             self._look(data)
 
-    def after_step(self, model: Model, data: Data) -> None:
+    def after(self, model: Model, _data: Data) -> None:
         self.added += model.timestep
         if self._steps % 20 == 0:
             self._progress(self._steps / self._total)
         self._steps += 1
 
-    def after_line(self, source: str, names: Mapping[str, Any]) -> None:
+    def line(self, source: str, names: Mapping[str, Any]) -> None:
         if source.startswith("for"):
             self._look(names["data"])
 

@@ -30,12 +30,9 @@ from ._bytes import read_derived
 from ._robot import coordinate, with_joint
 from ._words import emulation, page_of, sentence, typed, where
 from .records import Session
-from .session import CodeRun, CodeWatch
+from .session import CodeRun
 
-
-def fit(model: Model, options: Mapping[str, Any]) -> dict[str, Any]:
-    """A joint of this robot, and a value in its range."""
-    return with_joint(model, options)
+fit = with_joint  # a joint of this robot, and a value in its range
 
 
 def code(model: Model, options: Mapping[str, Any], load: str) -> str:
@@ -99,10 +96,15 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Write:
     model, joint = play.model, options["joint"]
     at = coordinate(model, joint)
     place, dof = at.place, at.dof
-    looks = _Looks()
-    names = play(looks)
+    looks: list[dict[str, bytes]] = []  # after the copy, the write and the print
+
+    def look(_source: str, names: Mapping[str, Any]) -> None:
+        if "copy" in names:
+            looks.append(read_derived(names["data"]))
+
+    names = play(line=look)
     data, copy = names["data"], names["copy"]
-    before, after, *_ = looks.derived
+    before, after, *_ = looks
     view, in_engine = float(data.qpos[place]), _in_engine(data, place)
     step(model, data)
     found = len(data.contacts)
@@ -140,17 +142,6 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Write:
         otherwise=otherwise,
         provenance=provenance(model),
     )
-
-
-class _Looks(CodeWatch):
-    """The derived arrays after each line from the copy on: that, the write, the print."""
-
-    def __init__(self) -> None:
-        self.derived: list[dict[str, bytes]] = []
-
-    def after_line(self, source: str, names: Mapping[str, Any]) -> None:
-        if "copy" in names:
-            self.derived.append(read_derived(names["data"]))
 
 
 def _in_engine(data: Data, place: int) -> float | None:

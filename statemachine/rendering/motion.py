@@ -10,7 +10,8 @@ import numpy as np
 from ..backends import load, on_default
 from ..drawing import drawing_of
 from ..errors import TraceError
-from ..interface import Array, Ints, Model, forward, make_data
+from ..interface import Array, Model, forward, make_data
+from ..measures import nearest
 from ..rotations import matrix_from_quat
 from ..runs import Trace
 
@@ -57,7 +58,7 @@ def motion_of(trace: Trace, model: Model, times: Array) -> Motion:
             f"{model.path.name} has other bodies than the trace of {trace.header.experiment}: "
             "it cannot be drawn with it"
         )
-    rows = rows_at(trace, times)
+    rows = nearest(trace.time - trace.time[0], times)
     if "xpos" in trace and "xquat" in trace:
         xpos, xquat = trace["xpos"][rows], trace["xquat"][rows]
         strange = ~(np.isfinite(xpos).all((1, 2)) & np.isfinite(xquat).all((1, 2)))
@@ -80,13 +81,6 @@ def motion_through(model: Model, qpos: Array) -> Motion:
             forward(reader, data)
             xpos[k], xquat[k] = data.xpos, data.xquat
     return Motion(model.path, xpos, xquat)
-
-
-def rows_at(trace: Trace, times: Array) -> Ints:
-    """The row of a trace that is nearest to each time (n,), counted from its start."""
-    since = trace.time - trace.time[0]
-    middles = (since[1:] + since[:-1]) / 2
-    return np.searchsorted(middles, times)
 
 
 def corners(motion: Motion, model: Model, most: int = 60) -> Array:

@@ -1,19 +1,19 @@
 """One model, examined: what it does on each engine that is here.
 
-It runs in a process of its own. What is known is told before each part, so that a part that
-crashes leaves what was found before it.
+It runs in a process of its own: `python -m statemachine.robots.examine JOB ANSWER`. What is known
+is told before each part, so that a part that crashes leaves what was found before it.
 """
 
 from __future__ import annotations
 
+import json
+import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from ..backends import backend_names, load
 from ..engines import part
@@ -28,18 +28,21 @@ from ..errors import (
     UnsupportedError,
 )
 from ..installed import DEFAULT, WITNESS, require
-from ..interface import Model, get_state, make_data, reset, set_state, step
+from ..interface import Array, Data, Model, get_state, make_data, reset, set_state, step
+from ..lessons.fingertip import certify
 from ..lessons.in_turns import Ratio, in_turns
 from ..runs import record_scenario
+from ..runs.drive import drive
 from ..runs.scenarios import scenario
+from ..runs.whole import replace_text
 from . import gaps
-from .places import witness_row
-from .records import RUNS, BackendRow, ExaminedModel
+from .records import RUNS, BackendRow, ExaminedModel, WitnessRow
 
 TRIED = ("hold", "gravity", "droop", "waves")
 _SHORT = 40  # steps of a scenario
 _SAME = 200  # steps of the run that is compared with the engine without us
 _FUTURE = 60  # steps of each future of a State
+_POSES = 20  # of the witness
 _ROUNDS, _TURN = 15, 0.005  # of the costs; a turn takes about so long [s]
 
 Tell = Callable[[ExaminedModel, str], object]  # what is known, and which part begins
@@ -79,7 +82,7 @@ class _Examination:
             require(WITNESS)
             model = self._any().get(DEFAULT)
             if model is not None and model.nv:
-                self.row = replace(self.row, witness=witness_row(model, self.seed))
+                self.row = replace(self.row, witness=_witness_row(model, self.seed))
         self._gaps()
         if not quick:
             for backend, model in self._any().items():
@@ -166,12 +169,9 @@ class _Examination:
         if plain is None:
             return None
         orders = gaps.commands(model, _SAME, self.seed)
-        ours = gaps.run(model, orders)
-        theirs = plain.run(self.path, orders[: len(ours.qpos) - 1], gaps.keyframe_of(model))
-        if theirs is None:
-            return None
-        rows = np.hstack((ours.qpos, ours.qvel))
-        return rows.tobytes() == theirs[: len(rows)].tobytes()
+        rows, _ = gaps.run(model, orders)
+        theirs = plain.run(self.path, orders[: len(rows) - 1], gaps.keyframe_of(model))
+        return None if theirs is None else rows.tobytes() == theirs[: len(rows)].tobytes()
 
     def _restores(self, model: Model) -> bool | None:
         """Whether two futures of a State are one, and that of the run itself if promised."""
@@ -179,16 +179,12 @@ class _Examination:
         ends = []
         with make_data(model) as data:
             reset(model, data, gaps.keyframe_of(model))
-            for ctrl in orders[:_FUTURE]:
-                data.ctrl[:] = ctrl
-                step(model, data)
+            _follow(model, data, orders[:_FUTURE])
             state = get_state(model, data)
             for again in range(3):
                 if again:
                     set_state(model, data, state)
-                for ctrl in orders[_FUTURE:]:
-                    data.ctrl[:] = ctrl
-                    step(model, data)
+                _follow(model, data, orders[_FUTURE:])
                 ends.append(get_state(model, data))
         if model.capabilities.exact_restore and ends[0] != ends[1]:
             return False
@@ -241,8 +237,47 @@ class _Examination:
         return round(Ratio.of("", times["ours"], times["alone"]).median, 3)
 
 
+def _witness_row(model: Model, seed: int) -> WitnessRow:
+    """Compare every end of the robot at random poses.
+
+    Raises:
+        MissingEngineError: The witness is not installed here.
+    """
+    try:
+        found = certify(model, poses=_POSES, seed=seed)
+    except MissingEngineError:
+        raise
+    except StateMachineError as error:
+        return WitnessRow(refusal=" ".join(str(error).split()))
+    gap = found.position_worst
+    if gap is None:  # its frame is another one than the engine's
+        gap = float("inf") if found.frames is None else found.frames.distance
+    return WitnessRow(found.grade, found.reason, len(found.tips), gap)
+
+
+def _follow(model: Model, data: Data, orders: Array) -> None:
+    error = drive(model, data, gaps.in_order(orders), len(orders))
+    if error is not None:
+        raise error
+
+
 def _features(error: StateMachineError) -> tuple[str, ...]:
     """What of a model is refused, in a few words each."""
     if isinstance(error, UnsupportedError):
         return error.features or (error.feature,)
     return ("not read",) if isinstance(error, ModelError) else (type(error).__name__,)
+
+
+def main(job: str, answer: str) -> None:
+    """Examine, and keep what is known in the file `answer`, whole at any moment."""
+    asked = json.loads(Path(job).read_text(encoding="utf-8"))
+
+    def tell(row: ExaminedModel, part: str) -> None:
+        replace_text(Path(answer), json.dumps({"part": part, "row": asdict(row)}))
+
+    row = ExaminedModel(asked["file"], asked["sha256"], asked["made_with"])
+    tell(examine(Path(asked["path"]), row, asked["quick"], asked["seed"], tell), "")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from ..engines.futures import Coordinates, gap
 from ..errors import StateMachineError
-from ..interface import Array, JointType, Model, make_data, reset, step
+from ..interface import Array, JointType, Model, make_data, reset
 from ..runs.commands import start_keyframe
+from ..runs.drive import Controller, drive
 from .records import TOLERANCE, RunGap
 
 STEPS = 400
@@ -19,14 +19,6 @@ _HOLDS = 50  # steps that a command stays
 # else there is, as a motor that drives a joint without end.
 _SHARE, _SHARE_OF_MOTOR = 0.5, 0.1
 _WIDE = 1e3  # a range beyond this says nothing of where an actuator works
-
-
-class Run(NamedTuple):
-    """A run: positions (n + 1, nq), velocities (n + 1, nv), and why it ended early, or ""."""
-
-    qpos: Array
-    qvel: Array
-    ended: str
 
 
 def commands(model: Model, steps: int, seed: int) -> Array:
@@ -46,29 +38,39 @@ def commands(model: Model, steps: int, seed: int) -> Array:
     return np.repeat(middle + half * drawn, _HOLDS, axis=0)[:steps]
 
 
+def in_order(orders: Array) -> Controller:
+    """The controller that gives each row of `orders` (n, nu) in turn."""
+    rows = iter(orders)
+    return lambda _time, _data: next(rows)
+
+
 def keyframe_of(model: Model) -> int | None:
     """Where a run of a model starts, as in the experiments; None for the default state."""
     name = start_keyframe(model)
     return None if name is None else model.key_id(name)
 
 
-def run(model: Model, orders: Array) -> Run:
-    """Run a model from its start; `orders` (n, nu) is the ctrl of each step."""
-    qpos, qvel, ended = [], [], ""
+def run(model: Model, orders: Array) -> tuple[Array, str]:
+    """Run a model from its start; `orders` (n, nu) is the ctrl of each step.
+
+    Returns:
+        Positions and velocities (n + 1, nq + nv), and why it ended early, or "".
+    """
+    rows, ended = [], ""
     with make_data(model) as data:
         reset(model, data, keyframe_of(model))
-        qpos.append(data.qpos.copy())
-        qvel.append(data.qvel.copy())
-        for ctrl in orders:
-            data.ctrl[:] = ctrl
-            try:
-                step(model, data)
-            except StateMachineError as error:
-                ended = f"{model.backend} stopped: {error}"
-                break
-            qpos.append(data.qpos.copy())
-            qvel.append(data.qvel.copy())
-    return Run(np.array(qpos), np.array(qvel), ended)
+
+        def keep(_k: int, _time: float) -> None:
+            rows.append(np.concatenate((data.qpos, data.qvel)))
+
+        keep(0, 0.0)
+        try:
+            error = drive(model, data, in_order(orders), len(orders), after=keep)
+        except StateMachineError as refusal:
+            error = refusal
+        if error is not None:
+            ended = f"{model.backend} stopped: {error}"
+    return np.array(rows), ended
 
 
 def run_gap(one: Model, other: Model, seed: int, halve: bool = False) -> RunGap:
@@ -96,31 +98,24 @@ def run_gap(one: Model, other: Model, seed: int, halve: bool = False) -> RunGap:
 
 
 def _gap(one: Model, other: Model, orders: Array) -> RunGap:
-    first, second = run(one, orders), run(other, orders)
-    rows = min(len(first.qpos), len(second.qpos))
-    a, b = first.qpos[:rows], second.qpos[:rows]
-    places: dict[JointType, list[int]] = {kind: [] for kind in JointType}
-    for kind, start in zip(one.jnt_type.tolist(), one.jnt_qposadr.tolist(), strict=True):
-        places[JointType(kind)].append(start)
-    free = [start + k for start in places[JointType.FREE] for k in range(3)]
-    quats = [*places[JointType.BALL], *(start + 3 for start in places[JointType.FREE])]
-    hinges, slides = places[JointType.HINGE], places[JointType.SLIDE]
-
-    def angle(joints: list[int], turns: list[int]) -> float | None:
-        used = Coordinates(tuple(joints), (), tuple(turns))
-        return gap(a, b, used).angle if joints or turns else None
-
-    def length(coordinates: list[int]) -> float | None:
-        used = Coordinates((), tuple(coordinates), ())
-        return gap(a, b, used).length if coordinates else None
-
+    (first, ended), (second, also_ended) = run(one, orders), run(other, orders)
+    rows = min(len(first), len(second))
+    a, b = first[:rows, : one.nq], second[:rows, : one.nq]
+    hinges, slides, balls, frees = (
+        one.jnt_qposadr[one.jnt_type == int(kind)].tolist()
+        for kind in (JointType.HINGE, JointType.SLIDE, JointType.BALL, JointType.FREE)
+    )
+    positions = tuple(start + k for start in frees for k in range(3))
+    parts = {
+        "hinge": Coordinates(tuple(hinges), (), ()),
+        "slide": Coordinates((), tuple(slides), ()),
+        "position": Coordinates((), positions, ()),
+        "turn": Coordinates((), (), (*balls, *(start + 3 for start in frees))),
+    }
     return RunGap(
         steps=rows - 1,
-        hinge=angle(hinges, []),
-        slide=length(slides),
-        position=length(free),
-        turn=angle([], quats),
+        **{name: gap(a, b, part).size for name, part in parts.items() if part.width},
         moved=float(np.abs(a - a[0]).max(initial=0.0)),
-        fastest=float(np.abs(second.qvel[:rows]).max(initial=0.0)),
-        ended=first.ended or second.ended,
+        fastest=float(np.abs(second[:rows, one.nq :]).max(initial=0.0)),
+        ended=ended or also_ended,
     )

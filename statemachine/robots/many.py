@@ -138,7 +138,7 @@ def _examined(
         }
         job.write_text(json.dumps(asked), encoding="utf-8")
         files = os.fspath(job), os.fspath(answer)
-        command, environment = fresh_python(f"{__package__}._child", *files)
+        command, environment = fresh_python(f"{__package__}.examine", *files)
         outcome = sandbox.run(
             command,
             cpu=4 * seconds + 60,

@@ -10,11 +10,9 @@ A recorder stands on the public face of the core; a file is npz, or parquet with
 from __future__ import annotations
 
 from .csv_files import export_csv
-from .files import read, write
+from .files import model_file, read, shipped, shipped_names, write
 from .header import COLUMNS, CONTACTS, Header
-from .models import model_file
 from .recorder import play, record, record_scenario
-from .shipped import shipped, shipped_names
 from .trace import Trace
 
 __all__ = [

@@ -65,14 +65,15 @@ def hold_ctrl(model: Model) -> Array:
     ctrl, servos, key = start_ctrl(model), is_servo(model), home(model)
     for i in range(model.nu):
         low, high = model.actuator_ctrlrange[i]
+        joint, gear = model.actuator_jntid[i], float(model.actuator_gear[i])
         if servos[i]:
-            begin = ctrl[i] if key else _length(model, i, qpos)
-            ctrl[i] = _farther(begin, _reachable(model, i), _farthest(model, i))
+            begin = ctrl[i] if key else float(qpos[model.jnt_qposadr[joint]] * gear)
+            most = _FARTHEST[JointType(int(model.jnt_type[joint]))] * abs(gear)
+            ctrl[i] = _farther(begin, _reachable(model, i), most)
         elif load is not None and _holds(model, i):
-            joint = model.actuator_jntid[i]
             force = load[model.jnt_dofadr[joint]] / np.count_nonzero(model.actuator_jntid == joint)
             if abs(force) > _NO_FORCE:
-                factor = model.actuator_gain[i] * model.actuator_gear[i]
+                factor = model.actuator_gain[i] * gear
                 ctrl[i] = np.clip(force / factor, low, high)
     return np.array([float(f"{value:.{_DIGITS}g}") + 0.0 for value in ctrl])
 
@@ -96,12 +97,6 @@ def load_at_start(model: Model) -> Array:
     return np.zeros(model.nv) if load is None else np.abs(load)
 
 
-def _length(model: Model, i: int, qpos: Array) -> float:
-    """Where the joint of a servo is, in the servo's own terms."""
-    place = model.jnt_qposadr[model.actuator_jntid[i]]
-    return float(qpos[place] * model.actuator_gear[i])
-
-
 def _reachable(model: Model, i: int) -> tuple[float, float]:
     """What a servo may be told: its ctrlrange, within what its joint can reach."""
     low, high = (float(end) for end in model.actuator_ctrlrange[i])
@@ -111,11 +106,6 @@ def _reachable(model: Model, i: int) -> tuple[float, float]:
         if max(low, ends[0]) < min(high, ends[1]):
             low, high = max(low, float(ends[0])), min(high, float(ends[1]))
     return low, high
-
-
-def _farthest(model: Model, i: int) -> float:
-    kind = JointType(int(model.jnt_type[model.actuator_jntid[i]]))
-    return _FARTHEST[kind] * abs(float(model.actuator_gear[i]))
 
 
 def _farther(begin: float, ends: tuple[float, float], most: float) -> float:

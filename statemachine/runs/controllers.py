@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib.util
 import inspect
+import itertools
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping
@@ -12,11 +12,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInputError, StateMachineError
+from ..errors import BadInputError, StateMachineError, did_you_mean
 from ..interface import Data, Model
 from ..interface.checks import as_vector
 from ..measures.text import count
-from .scenarios import Controller, Scenario
+from .drive import Controller
+from .scenarios import Scenario
 
 Function = Callable[..., Any]
 _TAKES = ("model", "data")
@@ -54,6 +55,8 @@ def function_scenario(
 ) -> Scenario:
     """What the function (model, data) that "FILE.py:NAME" says does on any robot.
 
+    Each controller has the file's names to itself: it is run anew for each.
+
     Args:
         spec: A file and a function of it; without a name, `controller`.
         every: The function is called at the first of so many steps, and its ctrl holds.
@@ -61,22 +64,39 @@ def function_scenario(
         parameters: Further keyword arguments of the function.
 
     Raises:
-        BadInputError: As `command_function` does.
+        BadInputError: There is no such file or function, or the file fails; the controller
+            raises it where the function fails, or returns what is no ctrl.
     """
-    controller_of = command_function(spec, every, parameters)
-    path, name = _place(spec, "")
-    called = f"{path.name}:{name}" if name else path.name
+    path, name = _place(spec, "controller")
+    given = dict(parameters or {})
+    _imported(path, name, _TAKES, given)  # that it fails is said before anything is loaded
+
+    def controller_of(model: Model, _seed: int) -> Controller:
+        function = _imported(path, name, _TAKES, given)
+        numbers = itertools.count()
+
+        def controller(time: float, data: Data) -> Any:
+            if next(numbers) % every:
+                return None
+            with _errors_of(path, time):
+                ctrl = function(model, data, **given)
+            if ctrl is None:
+                return None
+            try:
+                return as_vector(ctrl, (model.nu,), "ctrl")
+            except StateMachineError as error:
+                raise BadInputError(
+                    f"what {name} of {path.name} returned at {time:.3f} s is no ctrl of "
+                    f"{model.path.name}: {error}"
+                ) from None
+
+        return controller
+
+    called = ":".join(filter(None, (path.name, _place(spec, "")[1])))
     steps = "every step" if every == 1 else f"every {count(every, 'step')}"
     says = f"{called} is asked for ctrl at {steps}, on each side for its own."
     return Scenario(
-        called,
-        says,
-        "",
-        2.0,
-        lambda model, _seed: controller_of(model),
-        lambda _model: says,
-        keyframe=keyframe,
-        own=True,
+        called, says, "", 2.0, controller_of, lambda _model: says, keyframe=keyframe, own=True
     )
 
 
@@ -100,52 +120,6 @@ def parameters_of(spec: str) -> tuple[str, ...]:
 def function_file(spec: str) -> Path:
     """The file that "FILE.py:NAME" names."""
     return _place(spec, "controller")[0]
-
-
-def command_function(
-    spec: str, every: int = 1, parameters: Mapping[str, Any] | None = None
-) -> Callable[[Model], Controller]:
-    """What makes a controller of the function (model, data) that "FILE.py:NAME" says.
-
-    Each controller has the file's names to itself: it is run anew for each.
-
-    Args:
-        spec: A file and a function of it; without a name, `controller`.
-        every: The function is called at the first of so many steps, and its ctrl holds.
-        parameters: Further keyword arguments of the function.
-
-    Raises:
-        BadInputError: There is no such file or function, or the file fails; the controller
-            raises it where the function fails, or returns what is no ctrl.
-    """
-    path, name = _place(spec, "controller")
-    given = dict(parameters or {})
-    _imported(path, name, _TAKES, given)  # that it fails is said before anything is loaded
-
-    def controller_of(model: Model) -> Controller:
-        function = _imported(path, name, _TAKES, given)
-        steps = 0
-
-        def controller(time: float, data: Data) -> Any:
-            nonlocal steps
-            steps += 1
-            if (steps - 1) % every:
-                return None
-            with _errors_of(path, time):
-                ctrl = function(model, data, **given)
-            if ctrl is None:
-                return None
-            try:
-                return as_vector(ctrl, (model.nu,), "ctrl")
-            except StateMachineError as error:
-                raise BadInputError(
-                    f"what {name} of {path.name} returned at {time:.3f} s is no ctrl of "
-                    f"{model.path.name}: {error}"
-                ) from None
-
-        return controller
-
-    return controller_of
 
 
 def _place(spec: str, usual: str) -> tuple[Path, str]:
@@ -189,8 +163,7 @@ def _function(path: Path, name: str, takes: tuple[str, ...]) -> Function:
     listed = ", ".join(takes)
     if not callable(function):
         functions = [key for key, value in vars(module).items() if inspect.isfunction(value)]
-        close = difflib.get_close_matches(name, functions, n=1, cutoff=0.5)
-        hint = f". Did you mean {close[0]}?" if close else ""
+        hint = did_you_mean(name, functions)
         raise BadInputError(f"{path.name} has no function {name}({listed}){hint}")
     return function
 
@@ -199,8 +172,7 @@ def _missing(path: Path) -> BadInputError:
     if path.suffix != ".py":
         return BadInputError(f"a controller is given as FILE.py or FILE.py:NAME; got {str(path)!r}")
     beside = [f.name for f in path.parent.glob("*.py")] if path.parent.is_dir() else []
-    close = difflib.get_close_matches(path.name, beside, n=1, cutoff=0.6)
-    hint = f". Did you mean {close[0]}?" if close else ""
+    hint = did_you_mean(path.name, beside, 0.6)
     return BadInputError(f"there is no controller file {path}{hint}")
 
 

@@ -7,14 +7,14 @@ import itertools
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
 from ..interface import JointType
 from .header import COLUMNS, Header
 from .trace import Trace
-from .whole import beside, fill_file
+from .whole import beside
 
 
 def export_csv(trace: Trace, path: str | os.PathLike[str]) -> list[Path]:
@@ -29,24 +29,21 @@ def export_csv(trace: Trace, path: str | os.PathLike[str]) -> list[Path]:
     """
     target = Path(path)
     contacts = target.with_name(f"{target.stem}.contacts.csv")
-    if "contact_row" not in trace:
-        with beside(target) as (name,):
-            fill_file(name, lambda out: _write_columns(out, trace))
-        return [target]
-    with beside(target, contacts) as (name, other):
-        fill_file(name, lambda out: _write_columns(out, trace))
-        fill_file(other, lambda out: _write_contacts(out, trace))
-    return [target, contacts]
+    targets = [target, contacts] if "contact_row" in trace else [target]
+    with beside(*targets) as names:
+        for name, fill in zip(names, (_write_columns, _write_contacts), strict=False):
+            fill(name, trace)
+    return targets
 
 
-def _write_columns(out: BinaryIO, trace: Trace) -> None:
+def _write_columns(file: str, trace: Trace) -> None:
     names = [name for name in COLUMNS if name in trace]
     labels = list(itertools.chain.from_iterable(column_labels(trace.header, n) for n in names))
     flat = np.hstack([np.asarray(trace[n]).reshape(len(trace), -1) for n in names])
-    _write_rows(out, labels, flat.tolist())
+    _write_rows(file, labels, flat.tolist())
 
 
-def _write_contacts(out: BinaryIO, trace: Trace) -> None:
+def _write_contacts(file: str, trace: Trace) -> None:
     geoms, header = trace["contact_geom"].tolist(), trace.header
     labels = ["time", "geom_1", "geom_2", "body_1", "body_2", "dist"]
     labels += [f"pos.{axis}" for axis in "xyz"]
@@ -66,7 +63,7 @@ def _write_contacts(out: BinaryIO, trace: Trace) -> None:
                 *trace["contact_force"][k].tolist(),
             ]
 
-    _write_rows(out, labels, rows())
+    _write_rows(file, labels, rows())
 
 
 def column_labels(header: Header, column: str) -> list[str]:
@@ -97,24 +94,13 @@ def coordinate_labels(header: Header, positions: bool) -> list[str]:
         int(JointType.FREE): (*"xyz", *ball) if positions else ("vx", "vy", "vz", *ball),
         int(JointType.BALL): ball,
     }
-    for k, (name, kind) in enumerate(zip(header.joints, header.jnt_type, strict=True)):
-        label = name or f"joint {k}"
+    for label, kind in zip(header.joint_labels, header.jnt_type, strict=True):
         found += [f"{label}.{part}" for part in parts.get(kind, ())] or [label]
     return found
 
 
-def _write_rows(out: BinaryIO, labels: list[str], rows: Iterable[list[Any]]) -> None:
-    lines = _Lines(out)
-    writer = csv.writer(lines, lineterminator="\n")
-    writer.writerow(labels)
-    writer.writerows(rows)
-
-
-class _Lines:
-    """What csv writes its text into."""
-
-    def __init__(self, out: BinaryIO) -> None:
-        self._out = out
-
-    def write(self, text: str) -> None:
-        self._out.write(text.encode())
+def _write_rows(name: str, labels: list[str], rows: Iterable[list[Any]]) -> None:
+    with open(name, "w", encoding="utf-8", newline="") as out:
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow(labels)
+        writer.writerows(rows)

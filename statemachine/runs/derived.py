@@ -65,7 +65,8 @@ def derived(
     columns: dict[str, Any] = {name: np.array(values) for name, values in kept.items()}
     for name, width in CONTACTS.items():
         kind = np.int64 if name in ("contact_row", "contact_geom") else np.float64
-        columns[name] = np.array(contacts[name], dtype=kind).reshape(-1, *width)
+        rows_of = [np.reshape(part, (-1, *width)) for part in contacts[name]]
+        columns[name] = np.concatenate([np.empty((0, *width), kind), *rows_of], dtype=kind)
     return columns, rewritten
 
 
@@ -94,9 +95,6 @@ def _read(
             values.append(np.full(shape, np.nan))
     found = data.contacts
     if len(found):
-        contacts["contact_row"] += [row] * len(found)
-        contacts["contact_geom"] += found.geom.tolist()
-        contacts["contact_dist"] += found.dist.tolist()
-        contacts["contact_pos"] += found.pos.tolist()
-        contacts["contact_frame"] += found.frame.reshape(-1, 9).tolist()
-        contacts["contact_force"] += found.force.tolist()
+        contacts["contact_row"].append(np.full(len(found), row))
+        for name in ("geom", "dist", "pos", "frame", "force"):
+            contacts[f"contact_{name}"].append(np.array(getattr(found, name)))

@@ -1,4 +1,4 @@
-"""How long a run is, and who is told how far it got."""
+"""The loop of every run: how long it is, who commands it, who looks on."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from ..errors import BadInputError, DivergedError
 from ..interface import Data, Model, make_data, step
 
 Progress = Callable[[float], None]  # told the fraction that is done
+Controller = Callable[[float, Data], Any]  # (time, data) -> ctrl, or None to leave it
 
 
 def silent(_fraction: float) -> None:
@@ -61,12 +62,60 @@ def check_length(model: Model, seconds: float) -> None:
         )
 
 
-def write_ctrl(data: Data, wanted: Any, time: float) -> None:
-    """Write what a controller gave at a time [s].
+def drive(
+    model: Model,
+    data: Data,
+    controller: Controller | None,
+    steps: int,
+    *,
+    before: Callable[[int, float], object] | None = None,
+    after: Callable[[int, float], object] | None = None,
+    once_more: bool = False,
+) -> DivergedError | None:
+    """Run a Data under the commands of a controller.
+
+    Args:
+        model: The Model of the Data.
+        data: Advanced in place.
+        controller: Asked for ctrl (nu,) before each step; None where nobody writes ctrl.
+        steps: Number of timesteps.
+        before: Called with the number of the step, from 0, and the time [s], when the
+            controller has written.
+        after: Called with how many steps are over, and the time at which the last one began [s].
+        once_more: Whether the controller is asked, and `before` called, after the last step, too.
+
+    Returns:
+        The error with which the engine diverged in a step; None if it did not.
 
     Raises:
-        BadInputError: It is no ctrl.
+        BadInputError: The controller gave what is no ctrl.
     """
+    ctrl = data.ctrl
+    plain, shape, real = np.ndarray, ctrl.shape, ctrl.dtype
+    for k in range(steps + once_more):
+        now = data.time
+        if controller is not None:
+            wanted = controller(now, data)
+            if wanted is not None:
+                # The fast way for what is an array already; the other one checks.
+                if wanted.__class__ is plain and wanted.dtype is real and wanted.shape == shape:
+                    ctrl[:] = wanted
+                else:
+                    _write_ctrl(data, wanted, now)
+        if before is not None:
+            before(k, now)
+        if k == steps:
+            break
+        try:
+            step(model, data)
+        except DivergedError as error:  # a controller's own, of another Data, is not meant
+            return error
+        if after is not None:
+            after(k + 1, now)
+    return None
+
+
+def _write_ctrl(data: Data, wanted: Any, time: float) -> None:
     try:
         data.ctrl = wanted
     except BadInputError as error:

@@ -1,20 +1,34 @@
-"""Traces in files: npz, which NumPy reads, or parquet, which tables read."""
+"""Traces in files: npz, which NumPy reads, or parquet, which tables read; and their models."""
 
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import os
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
-from ..errors import BadInputError, MissingEngineError, TraceError
+from ..errors import (
+    BadInputError,
+    MissingEngineError,
+    ModelFileError,
+    StateMachineError,
+    TraceError,
+    check_name,
+    did_you_mean,
+)
+from ..models import resolve
 from .header import Header
 from .npz_files import read_npz, write_npz
 from .parquet_files import read_parquet, require_pyarrow, write_parquet
+from .provenance import model_digest
 from .trace import Trace
 from .whole import replace_file
 
 SUFFIXES = (".npz", ".parquet")
+# Recorded traces that come with the package, for where an engine has no wheel.
+_FOLDER = Path(__file__).resolve().parent / "recorded"
 
 
 def write(trace: Trace, path: str | os.PathLike[str]) -> Path:
@@ -34,11 +48,10 @@ def write(trace: Trace, path: str | os.PathLike[str]) -> Path:
     """
     target = _known(path)
     Header.from_json(trace.header.as_json())
-    if target.suffix.lower() == ".parquet":
+    parquet = target.suffix.lower() == ".parquet"
+    if parquet:
         require_pyarrow()
-        replace_file(target, lambda out: write_parquet(trace, out))
-    else:
-        replace_file(target, lambda out: write_npz(trace, out))
+    replace_file(target, partial(write_parquet if parquet else write_npz, trace))
     return target
 
 
@@ -46,8 +59,8 @@ def read(path: str | os.PathLike[str]) -> Trace:
     """Open a trace. No engine is needed; nothing in the file is run.
 
     A file is not trusted: it may unfold into 256 MB or into a hundred times its size, and
-    into 4 GB at most. A parquet file carries a digest of its numbers, which is verified (one
-    of an earlier version has none, and opens); an npz file has a checksum of each array.
+    into 4 GB at most. A parquet file carries a digest of its numbers, which is verified; an npz
+    file has a checksum of each array.
 
     Raises:
         TraceError: The file is not there, or is no trace, or is damaged.
@@ -71,6 +84,53 @@ def read(path: str | os.PathLike[str]) -> Trace:
         raise TraceError(f"{source.name} is no trace: {reason}") from None
 
 
+def shipped_names() -> list[str]:
+    """Names as EXPERIMENT.BACKEND, and EXPERIMENT.BACKEND.engine for the engine's defaults."""
+    return sorted(path.stem for path in _FOLDER.glob("*.npz"))
+
+
+def shipped(experiment: str, backend: str, defaults: str = "model") -> Trace:
+    """A trace that was recorded elsewhere; its header says on what.
+
+    Raises:
+        UnknownNameError: None was recorded of this.
+    """
+    name = f"{experiment}.{backend}" + (".engine" if defaults == "engine" else "")
+    check_name("recorded trace", name, shipped_names())
+    return read(_FOLDER / f"{name}.npz")
+
+
+def model_file(
+    header: Header,
+    menagerie: str | os.PathLike[str] | None = None,
+    beside: str | os.PathLike[str] | None = None,
+) -> tuple[Path, bool]:
+    """The file of the model that a trace is of, and whether it has the digest of that one.
+
+    A header says folder and name and no machine's path. So the file is looked for under that
+    name from here, among the models of the library and in the menagerie, then by its name
+    alone here and beside the trace. One with the digest that the header has is preferred.
+
+    Args:
+        header: Of the trace.
+        menagerie: A menagerie folder; $MENAGERIE if it is not given.
+        beside: The trace's own file.
+
+    Raises:
+        ModelFileError: It is nowhere.
+    """
+    known = header.provenance
+    found = list(dict.fromkeys(_candidates(known.model_file, menagerie, beside)))
+    for path in found:
+        if model_digest(path) == known.model_sha256:
+            return path, True
+    if not found:
+        raise ModelFileError(
+            f"the trace's model {known.model_file} is not here: say which it is with --model"
+        )
+    return found[0], False
+
+
 def _known(path: str | os.PathLike[str]) -> Path:
     found = Path(path)
     if found.suffix.lower() not in SUFFIXES:
@@ -85,6 +145,18 @@ def _missing(path: Path) -> TraceError:
         message = f"{path} is a folder, not a trace"
     elif path.parent.is_dir():
         names = [file.name for file in path.parent.iterdir() if file.suffix in SUFFIXES]
-        close = difflib.get_close_matches(path.name, names, n=1, cutoff=0.6)
-        message += f". Did you mean {close[0]}?" if close else ""
+        message += did_you_mean(path.name, names, 0.6)
     return TraceError(message)
+
+
+def _candidates(
+    name: str, menagerie: str | os.PathLike[str] | None, beside: str | os.PathLike[str] | None
+) -> Iterator[Path]:
+    folder = menagerie or os.environ.get("MENAGERIE") or None
+    for where in (None, folder) if folder else (None,):
+        with suppress(StateMachineError):
+            yield resolve(name, where)
+    last = Path(name).name
+    for place in (Path(), Path(beside).parent) if beside is not None else (Path(),):
+        with suppress(StateMachineError):
+            yield resolve(place.absolute() / last)

@@ -6,7 +6,7 @@ import dataclasses
 import json
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -153,11 +153,9 @@ class Header:
             if facts.get("schema") != SCHEMA:
                 given = repr(facts.get("schema"))[:20]
                 raise TraceError(f"this trace has schema {given}; this version reads {SCHEMA}")
-            known = {field.name for field in dataclasses.fields(Provenance)}
-            by = {key: _frozen(value) for key, value in _known(facts["provenance"], known).items()}
-            facts["provenance"] = Provenance(**by)
-            known = {field.name for field in dataclasses.fields(cls)}
-            header = cls(**{name: _frozen(value) for name, value in _known(facts, known).items()})
+            by = {name: _frozen(value) for name, value in facts.pop("provenance").items()}
+            frozen = {name: _frozen(value) for name, value in facts.items()}
+            header = cls(provenance=Provenance(**by), **frozen)
             header._check()
         except TraceError:
             raise
@@ -197,10 +195,6 @@ class Header:
             if len(getattr(self, name)) != length:
                 raise TraceError(f"{name} of the trace has {len(getattr(self, name))} entries")
         _check_places(self)
-
-
-def _known(facts: Mapping[str, Any], names: set[str]) -> dict[str, Any]:
-    return {name: value for name, value in facts.items() if name in names}
 
 
 def _frozen(value: Any) -> Any:

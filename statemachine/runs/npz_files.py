@@ -10,9 +10,8 @@ import numpy as np
 from numpy.lib import format as npy
 
 from ..errors import TraceError
-from .checked import WHOLE, as_column, check_size
 from .header import INPUTS, Header
-from .trace import Trace, check_shapes
+from .trace import WHOLE, Trace, as_column, check_shapes, check_size
 
 _HEADER_MOST = 2**24  # bytes of a header
 

@@ -11,14 +11,12 @@ import numpy as np
 
 from ..errors import TraceError
 from ..installed import require_extra
-from .checked import as_column, check_size
 from .header import COLUMNS, CONTACTS, Header
-from .trace import Trace
+from .trace import Trace, as_column, check_size
 
 # Of the header in the metadata: a digest of header and columns, then the header. Parquet
 # has no checksum of its own that every reader looks at.
 _KEY = b"statemachine.trace.sha256"
-_OLD_KEY = b"statemachine.trace"  # the header alone, of earlier versions
 _DIGITS = hashlib.sha256().digest_size * 2
 
 
@@ -42,11 +40,14 @@ def read_parquet(path: Path) -> tuple[Header, dict[str, Any]]:
     require_pyarrow()
     parquet = importlib.import_module("pyarrow.parquet")
     with parquet.ParquetFile(path) as file:
-        digest, text = _header_text(file.metadata.metadata or {})
+        known = (file.metadata.metadata or {}).get(_KEY)
+        if known is None:
+            raise TraceError("has no header: it is no trace")
+        digest, text = known[:_DIGITS].decode(), known[_DIGITS:].decode()
         header = Header.from_json(text)
         check_size(_unfolded(file.metadata, header), path)
         columns = _columns(file.read(), header)
-    if digest and digest != _digest(text, columns):
+    if digest != _digest(text, columns):
         raise TraceError("is damaged: its numbers are not those that were written")
     return header, columns
 
@@ -59,16 +60,6 @@ def require_pyarrow() -> Any:
     """
     require_extra("pyarrow.parquet", "parquet", "pyarrow", "parquet", "npz needs nothing more")
     return importlib.import_module("pyarrow")
-
-
-def _header_text(known: dict[bytes, bytes]) -> tuple[str, str]:
-    """Digest and header from the metadata of a file; no digest in an old one."""
-    if _KEY in known:
-        text = known[_KEY].decode()
-        return text[:_DIGITS], text[_DIGITS:]
-    if _OLD_KEY in known:
-        return "", known[_OLD_KEY].decode()
-    raise TraceError("has no header: it is no trace")
 
 
 def _digest(text: str, columns: dict[str, Any]) -> str:

@@ -12,15 +12,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..errors import BadInputError, DivergedError, EngineError, TraceError
-from ..interface import Array, Data, Model, State, make_data, reset, set_state, step
+from ..errors import BadInputError, EngineError, TraceError
+from ..interface import Array, Data, Model, State, make_data, reset, set_state
 from ..interface.checks import HUGE
 from .derived import derived
-from .drive import Progress, check_length, part_of, silent, steps_in, write_ctrl
+from .drive import Controller, Progress, check_length, drive, part_of, silent, steps_in
 from .energy import energies
 from .header import Header
 from .provenance import provenance
-from .scenarios import Controller, Scenario
+from .scenarios import Scenario
 from .trace import Trace
 
 
@@ -259,36 +259,22 @@ def _run(
     model: Model, data: Data, controller: Controller | None, total: int, progress: Progress
 ) -> tuple[dict[str, Array], str]:
     """The inputs of each row, as they are when the step begins, and why it ended early."""
-    qpos, qvel, ctrl = data.qpos, data.qvel, data.ctrl
-    plain, shape, real, times = np.ndarray, ctrl.shape, ctrl.dtype, [0.0] * 0
+    times: list[float] = []
     kept: tuple[list[bytes], ...] = ([], [], [])
-    keep_qpos, keep_qvel, keep_ctrl = (rows.append for rows in kept)
-    keep_time = times.append
-    qpos_bytes, qvel_bytes, ctrl_bytes = qpos.tobytes, qvel.tobytes, ctrl.tobytes
-    ended = ""
-    for k in range(total + 1):
-        now = data.time
-        if controller is not None:
-            wanted = controller(now, data)
-            if wanted is not None:
-                # The fast way for what is an array already; the other one checks.
-                if wanted.__class__ is plain and wanted.dtype is real and wanted.shape == shape:
-                    ctrl[:] = wanted
-                else:
-                    write_ctrl(data, wanted, now)
+    keep_time, (keep_qpos, keep_qvel, keep_ctrl) = times.append, (rows.append for rows in kept)
+    qpos, qvel, ctrl = data.qpos.tobytes, data.qvel.tobytes, data.ctrl.tobytes
+
+    def keep(k: int, now: float) -> None:
         keep_time(now)
-        keep_qpos(qpos_bytes())
-        keep_qvel(qvel_bytes())
-        keep_ctrl(ctrl_bytes())
-        if k == total:
-            break
-        try:
-            step(model, data)
-        except DivergedError as error:
-            ended = str(error).partition(". This Data")[0]  # whose advice is of no use here
-            break
+        keep_qpos(qpos())
+        keep_qvel(qvel())
+        keep_ctrl(ctrl())
         if k % 256 == 0:
             progress(k / total)
+
+    error = drive(model, data, controller, total, before=keep, once_more=True)
+    # Without its advice, which is of no use here.
+    ended = "" if error is None else str(error).partition(". This Data")[0]
     while len(times) > 1 and not all(_stands(rows[-1]) for rows in kept[:2]):
         ended = ended or f"a coordinate left every bound at {times[-1]:g} s"
         for rows in (times, *kept):  # numbers that no trace holds

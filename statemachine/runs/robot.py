@@ -32,11 +32,6 @@ def has_floor(model: Model) -> bool:
     return bool((static & touches & np.isin(compiled.geom_type, (_PLANE, _HFIELD))).any())
 
 
-def is_slide(model: Model, joint: str) -> bool:
-    """Whether a joint is a slide: its position is in metres."""
-    return int(model.jnt_type[model.joint_id(joint)]) == int(JointType.SLIDE)
-
-
 def scalar_joint(model: Model, name: str) -> tuple[int, int]:
     """Addresses in qpos and qvel of a joint that must be a hinge or a slide."""
     joint = model.joint_id(name)

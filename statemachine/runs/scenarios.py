@@ -8,19 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ..errors import BadInputError, unknown_name
+from ..errors import BadInputError, check_name
 from ..interface import Array, Data, Model
 from ..measures.text import count, listed
-from .commands import TARGET, hold_ctrl, home, is_servo, waves
+from .commands import hold_ctrl, home, is_servo, waves
+from .drive import Controller
 from .robot import has_floor, is_the_arm
 
-__all__ = ["MOVING", "SCENARIOS", "TARGET", "Controller", "Scenario", "fitting", "scenario"]
-
-Controller = Callable[[float, Data], Any]  # (time, data) -> ctrl, or None to leave it
 # Swings the arm with the box in its jaws by 23 degrees.
 MOVING = (0.4, -0.8, 0.5, 1.6, 1.57, 0.28)
 
@@ -164,14 +163,6 @@ def drives(model: Model) -> str:
     return "servos" if is_servo(model).any() else "actuators"
 
 
-def _gravity_says(model: Model) -> str:
-    return _falls(model, onto=True)
-
-
-def _fall_says(model: Model) -> str:
-    return _falls(model, onto=False)
-
-
 def _droop_says(model: Model) -> str:
     _need_actuators(model)
     where = "at zero" if home(model) is None else "where the keyframe's ctrl says"
@@ -218,7 +209,7 @@ SCENARIOS = {
             "so101/scene",
             4.0,
             _untouched,
-            _gravity_says,
+            partial(_falls, onto=True),
             options={"actuation": False},
         ),
         Scenario(
@@ -235,7 +226,7 @@ SCENARIOS = {
             "so101/scene",
             2.0,
             _untouched,
-            _fall_says,
+            partial(_falls, onto=False),
             options={"actuation": False, "contacts": False},
         ),
         Scenario(
@@ -266,6 +257,5 @@ def scenario(name: str) -> Scenario:
     Raises:
         UnknownNameError: There is none of this name.
     """
-    if name not in SCENARIOS:
-        raise unknown_name("experiment", name, SCENARIOS)
+    check_name("experiment", name, SCENARIOS)
     return SCENARIOS[name]

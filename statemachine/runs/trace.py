@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,14 @@ from ..errors import TraceError
 from ..interface import Array, Ints
 from ..interface.checks import HUGE, index_of
 from ..measures import ContactNames
-from .checked import LARGEST
 from .header import COLUMNS, CONTACTS, INPUTS, Header
+
+# Bytes that a trace may unfold into: this many, or so many times the size of its file.
+# Recorded runs are 2 to 3 times as large as their files.
+_UNFOLDED, _TIMES, _MOST = 2**28, 100, 2**32
+WHOLE = ("contact_row", "contact_geom")  # columns of whole numbers
+# No number of a run is larger, and what is computed from smaller ones stays finite.
+LARGEST = 1e100
 
 
 def check_shapes(header: Header, shapes: Mapping[str, tuple[int, ...]]) -> None:
@@ -48,6 +55,25 @@ def _check_entries(name: str, array: NDArray[Any]) -> None:
     ends = np.fmin.reduce(array, None, initial=0), np.fmax.reduce(array, None, initial=0)
     if not -most <= ends[0] <= ends[1] <= most:
         raise TraceError(f"column {name!r} has an entry beyond {most:g}")
+
+
+def check_size(unfolded: int, path: Path) -> None:
+    """Refuse a file that unfolds into more than a recorded run would.
+
+    Raises:
+        TraceError: It does.
+    """
+    most = min(max(_UNFOLDED, _TIMES * path.stat().st_size), _MOST)
+    if unfolded > most:
+        raise TraceError(
+            f"unfolds into {unfolded / 2**20:,.0f} MB; a file of this size may into "
+            f"{most / 2**20:,.0f}"
+        )
+
+
+def as_column(name: str, array: Any) -> Any:
+    """An array of a file as a column: int64, or float64."""
+    return np.asarray(array, dtype=np.int64 if name in WHOLE else np.float64)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

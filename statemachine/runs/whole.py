@@ -85,8 +85,8 @@ def _special(target: Path) -> bool:
 
 def replace_file(target: Path, fill: Callable[[BinaryIO], object]) -> None:
     """Write a file beside its place and rename it: whole or not at all."""
-    with beside(target) as (name,):
-        fill_file(name, fill)
+    with beside(target) as (name,), open(name, "wb") as out:
+        fill(out)
 
 
 def replace_bytes(target: Path, content: bytes) -> int:
@@ -98,12 +98,6 @@ def replace_bytes(target: Path, content: bytes) -> int:
 def replace_text(target: Path, text: str, encoding: str = "utf-8") -> None:
     """The same of text; what the encoding lacks, as half of a pair of characters, is a "?"."""
     replace_bytes(target, text.encode(encoding, errors="replace"))
-
-
-def fill_file(name: str, fill: Callable[[BinaryIO], object]) -> None:
-    """Open a file that `beside` named, let it be filled, and close it."""
-    with open(name, "wb") as out:
-        fill(out)
 
 
 @contextmanager

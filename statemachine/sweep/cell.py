@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -11,13 +11,13 @@ import numpy as np
 
 from ..compare.perturbed import Uncertainty, nudged_controller, nudged_start
 from ..errors import TimedOutError
-from ..interface import Array, Data, Model, forward, make_data, reset, step
+from ..interface import Array, Data, Model, forward, make_data, reset
 from ..interface.records import usual_site
 from ..measures import ContactNames
 from ..runs.controllers import function_scenario, is_function
-from ..runs.drive import check_length, steps_in, write_ctrl
+from ..runs.drive import check_length, drive, steps_in
 from ..runs.energy import energies
-from ..runs.scenarios import Controller, Scenario, scenario
+from ..runs.scenarios import Scenario, scenario
 from .factors import Value, Vary
 from .settings import drawn_start, start_at
 
@@ -138,6 +138,7 @@ def run_cell(
     total = steps_in(model, seconds)
     controller = doing.controller(model, cell.seed)
     rows: list[Array] = []
+    fastest = np.zeros(model.nv)
     with make_data(model) as data:
         _begin(rules, cell, model, data, doing.keyframe)
         if cell.nudge:
@@ -145,9 +146,13 @@ def run_cell(
             data.qpos, data.qvel = nudged_start(model, data.qpos, data.qvel, draw)
             controller = nudged_controller(controller, draw)
         begun = data.qpos.copy(), data.qvel.copy()
+        look = _look(rules, data, total, deadline, row, rows, fastest)
         try:
-            _advance(rules, model, data, controller, total, deadline, row, rows)
+            error = drive(model, data, controller, total, after=look)
+            if error is not None:
+                raise error
         finally:
+            row["max_qvel"] = float(np.nan_to_num(fastest).max(initial=0.0))
             row["qpos"], row["qvel"] = data.qpos.tolist(), data.qvel.tolist()
             row["time"] = float(data.time)
             row["sample_qpos"] = [each.tolist() for each in rows]
@@ -172,54 +177,36 @@ def _begin(
     data.qpos = drawn_start(model, data.qpos, rules.spread, cell.seed)
 
 
-def _advance(
+def _look(
     rules: CellRules,
-    model: Model,
     data: Data,
-    controller: Controller,
     total: int,
     deadline: float,
     row: dict[str, Any],
     rows: list[Array],
-) -> None:
-    """The run: what is looked at in each step, and the rows of the moments that are kept."""
+    fastest: Array,
+) -> Callable[[int, float], None]:
+    """What looks on after each step: speeds, the first touch, moments that are kept, the clock."""
     moments = np.round(np.arange(1, rules.moments + 1) * total / rules.moments).astype(int)
     keep = dict.fromkeys(moments[moments > 0].tolist())
-    row["sample_time"], row["max_qvel"] = [], 0.0
-    qvel, ctrl, touched = data.qvel, data.ctrl, False
-    shape = ctrl.shape
-    fastest = np.zeros(model.nv)
-    try:
-        for k in range(1, total + 1):
-            now = data.time
-            wanted = controller(now, data)
-            if wanted is not None:
-                # The fast way for what is an array already; the other one checks.
-                if (
-                    wanted.__class__ is np.ndarray
-                    and wanted.dtype == float
-                    and wanted.shape == shape
-                ):
-                    ctrl[:] = wanted
-                else:
-                    write_ctrl(data, wanted, now)
-            step(model, data)
-            row["steps"] = k
-            np.maximum(fastest, np.abs(qvel), out=fastest)
-            if not touched and len(contacts := data.contacts):
-                # As derived arrays are: of the state in which the step began.
-                touched, row["first_touch"] = True, now
-                names = ContactNames.of(model)
-                pairs = {names.pair(*geoms) for geoms in contacts.geom.tolist()}
-                row["touch"] = ", ".join(sorted(pairs))
-            if k in keep:
-                rows.append(data.qpos.copy())
-                row["sample_time"].append(float(data.time))
-            if not k % _LOOKED and time.monotonic() > deadline:
-                raise timed_out(rules.timeout)
-    finally:
-        if model.nv:
-            row["max_qvel"] = float(np.nan_to_num(fastest).max())
+    row["sample_time"], qvel = [], data.qvel
+
+    def look(k: int, began: float) -> None:
+        row["steps"] = k
+        np.maximum(fastest, np.abs(qvel), out=fastest)
+        if "touch" not in row and len(contacts := data.contacts):
+            # As derived arrays are: of the state in which the step began.
+            row["first_touch"] = began
+            names = ContactNames.of(data.model)
+            pairs = {names.pair(*geoms) for geoms in contacts.geom.tolist()}
+            row["touch"] = ", ".join(sorted(pairs))
+        if k in keep:
+            rows.append(data.qpos.copy())
+            row["sample_time"].append(float(data.time))
+        if not k % _LOOKED and time.monotonic() > deadline:
+            raise timed_out(rules.timeout)
+
+    return look
 
 
 def timed_out(seconds: float) -> TimedOutError:

@@ -15,7 +15,7 @@ from typing import Any
 
 from ..errors import EngineError
 from ..processes import fresh_python
-from ._protocol import ANSWER, ANSWER_MOST, COMMAND, Verb
+from ._protocol import ANSWER, ANSWER_MOST, COMMAND, VERBS
 from ._shared import SharedBlock
 
 _ENDS_IN = 3.0  # seconds in which a process ends by itself when it is left alone
@@ -68,13 +68,15 @@ class WorldsProcess:
         return self._process.pid
 
     def send(
-        self, number: int, verb: Verb, argument: int = 0, size: int = 0, of_ids: bool = False
+        self, number: int, verb: str, argument: int = 0, size: int = 0, of_ids: bool = False
     ) -> None:
         """Tell it something; one that has ended does not hear it."""
         if self.lost:
             return
         try:
-            os.write(self._to.fileno(), COMMAND.pack(number, verb, argument, size, of_ids))
+            os.write(
+                self._to.fileno(), COMMAND.pack(number, VERBS.index(verb), argument, size, of_ids)
+            )
         except OSError:
             self.lost = True
 
@@ -106,7 +108,7 @@ class WorldsProcess:
             elif time.monotonic() > deadline:
                 self.give_up("it did not end its step when it was interrupted")
             else:  # what it is at may have swallowed the interrupt
-                self.send(number, Verb.STOP)
+                self.send(number, "stop")
 
     def _told(self) -> bool:
         """Whether an answer is there, or comes soon; where that cannot be known, True."""

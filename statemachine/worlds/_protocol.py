@@ -9,29 +9,22 @@ from __future__ import annotations
 
 import pickle
 import struct
-from enum import IntEnum
 from typing import Any
 
 from ..errors import EngineError, shown
 
-COMMAND = struct.Struct("<qqqqq")  # number of the command, `Verb`, argument, bytes, whether of ids
+# Number of the command, place in `VERBS`, argument, bytes, whether of ids.
+COMMAND = struct.Struct("<qqqqq")
 ANSWER = struct.Struct("<qq")  # number of the command, bytes
 ANSWER_MOST = 1 << 22  # bytes of an answer
 
 
-class Verb(IntEnum):
-    """What a process is asked for."""
-
-    START = 0  # take the Model, and make two Data
-    FILL = 1  # make the others
-    STEP = 2
-    FORWARD = 3
-    RESET = 4
-    GET_STATE = 5
-    SET_STATE = 6
-    RECORD = 7
-    DERIVE = 8
-    STOP = 9  # end what was asked before
+# What a process is asked for, by the methods of its `Holder`: to take the Model and make two Data,
+# to make the others, …; and to end what was asked before.
+VERBS = (
+    "start", "fill", "step", "forward", "reset", "get_state", "set_state", "record", "derive",
+    "stop",
+)  # fmt: skip
 
 
 def packed(answer: dict[str, Any]) -> bytes:

@@ -25,7 +25,7 @@ import numpy as np
 from .. import backends
 from ..interface import INPUTS, Data, Model, forward, get_state, make_data, reset, set_state, step
 from ..processes import resident_memory
-from ._protocol import ANSWER, ANSWER_MOST, COMMAND, Verb, packed, portable
+from ._protocol import ANSWER, ANSWER_MOST, COMMAND, VERBS, packed, portable
 from ._shared import arrays_in, open_block
 
 _ENDS_IN = 1.0  # seconds in which Python code may clean up
@@ -63,7 +63,7 @@ class Inbox:
     def _read(self) -> None:
         while len(frame := os.read(0, COMMAND.size)) == COMMAND.size:
             command = COMMAND.unpack(frame)
-            if command[1] == Verb.STOP:
+            if VERBS[command[1]] == "stop":
                 self._stop = command[0]
                 interrupt_main()
             self.commands.put(command)
@@ -91,17 +91,6 @@ class Holder:
         self._made: dict[bytes, Model] = {}  # by the options that they differ in
         self._data: list[Data] = []
         self._told: list[tuple[type[Warning], str]] = []
-        self._verbs: dict[int, Callable[[int, Any, Sequence[int]], Any]] = {
-            Verb.START: self._start,
-            Verb.FILL: self._fill,
-            Verb.STEP: self._step,
-            Verb.FORWARD: self._forward,
-            Verb.RESET: self._reset,
-            Verb.GET_STATE: self._get_state,
-            Verb.SET_STATE: self._set_state,
-            Verb.RECORD: self._record,
-            Verb.DERIVE: self._derive,
-        }
 
     def answer(self, command: Command) -> dict[str, Any]:
         """Do what was asked; what came of it, without what is nothing."""
@@ -113,7 +102,7 @@ class Holder:
             places: Sequence[int] = range(len(self._data))
             if of_ids:
                 places = np.flatnonzero(self._chosen[self._number :: self._stride]).tolist()
-            value = self._verbs[verb](argument, payload, places)
+            value = getattr(self, f"_{VERBS[verb]}")(argument, payload, places)
             if value is not None:
                 answer["value"] = value
         except StepStopped:
@@ -293,9 +282,9 @@ def main(handle: str, size: str, number: str) -> None:
     warnings.showwarning = holder.warn
     while (command := inbox.commands.get()) is not None:
         inbox.number = command[0]
-        answer = {} if command[1] == Verb.STOP else holder.answer(command)
+        answer = {} if VERBS[command[1]] == "stop" else holder.answer(command)
         os.write(out, ANSWER.pack(command[0], holder.write(answer)))
-        if command[1] == Verb.FILL:
+        if VERBS[command[1]] == "fill":
             os.dup2(nothing, 2)  # until now somebody read what was said there
 
 

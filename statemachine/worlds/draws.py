@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInputError, shown, unknown_name
+from ..errors import BadInputError, check_name, shown
 from ..interface import Array, Model
 from ..interface.checks import as_count, as_scalar, kind_of, whole_number
 
@@ -105,8 +105,7 @@ def draw(
         raise BadInputError(f"seed must be a whole number of at least 0; got {shown(seed)}")
     found: dict[str, Any] = {}  # of arrays; typed so that make_worlds takes it by **
     for name, given in ranges.items():
-        if name not in _NOMINAL:
-            raise unknown_name("option to draw", name, _NOMINAL)
+        check_name("option to draw", name, _NOMINAL)
         of = _range(name, given)
         value = _NOMINAL[name]
         nominal = np.ones(model.nu) if value is None else value(model)

@@ -24,7 +24,7 @@ from ..interface import Array, Ints, Model, State
 from ..interface.turns import alone
 from ..interface.worlds import Worlds, check_memory
 from ._process import WorldsProcess, end_all, lost_worlds
-from ._protocol import ANSWER_MOST, Verb
+from ._protocol import ANSWER_MOST
 from ._shared import SharedBlock, arrays_in, laid_out, shapes_of
 
 _PATIENCE = 2.0  # seconds in which a process has to end a step that was interrupted
@@ -115,12 +115,12 @@ class PoolWorlds(Worlds):
 
     def _fill(self, processes: list[WorldsProcess]) -> None:
         """Let processes that have just been started make their Data."""
-        answers = self._exchange(processes, Verb.START, self._answers, self._job)
+        answers = self._exchange(processes, "start", self._answers, self._job)
         self._check(processes, answers)
         told = [answer["value"] for answer in answers]
         left = sum(process["left"] for process in told)
         check_memory(self.n, max(process["each"] for process in told), self.n - left)
-        answers = self._exchange(processes, Verb.FILL)
+        answers = self._exchange(processes, "fill")
         self._check(processes, answers)
         for process, answer in zip(processes, answers, strict=True):
             self._layouts[process.worlds[0]] = answer["value"]
@@ -146,7 +146,7 @@ class PoolWorlds(Worlds):
     def _exchange(
         self,
         processes: list[WorldsProcess],
-        verb: Verb,
+        verb: str,
         argument: int = 0,
         payload: Any = None,
         of_ids: bool = False,
@@ -164,7 +164,7 @@ class PoolWorlds(Worlds):
                 process.send(number, verb, argument, size, of_ids)
             return [process.receive(number) or {} for process in processes]
         except BaseException:  # Ctrl-C, mostly
-            if verb > Verb.FILL:  # who starts is closed
+            if verb not in ("start", "fill"):  # who starts is closed
                 self._halt(processes)
             raise
 
@@ -177,7 +177,7 @@ class PoolWorlds(Worlds):
                 with suppress(KeyboardInterrupt):  # one is on its way already
                     self._count += 1
                     for process in processes:
-                        process.send(self._count, Verb.STOP)
+                        process.send(self._count, "stop")
                     for process in processes:
                         process.stop(self._count, deadline)
                     ended = True
@@ -199,7 +199,7 @@ class PoolWorlds(Worlds):
         return error
 
     def _ask(
-        self, ids: Ints, verb: Verb, argument: int = 0, payload: Any = None
+        self, ids: Ints, verb: str, argument: int = 0, payload: Any = None
     ) -> tuple[dict[int, Exception], Any]:
         """Let the processes of some worlds do something; the errors, and the last value."""
         processes, of_ids = self._processes, len(ids) < self.n
@@ -265,31 +265,31 @@ class PoolWorlds(Worlds):
         if self._errors:
             ids = ids[~np.isin(ids, list(self._errors))]
         if len(ids):
-            self._ask(ids, Verb.DERIVE, payload=name)
+            self._ask(ids, "derive", payload=name)
         vars(self)[name] = self._kept[name]
         return self._kept[name]
 
     def _step(self, ids: Ints, nstep: int) -> Mapping[int, Exception]:
         self._forget()
-        return self._ask(ids, Verb.STEP, nstep)[0]
+        return self._ask(ids, "step", nstep)[0]
 
     def _forward(self, ids: Ints) -> Mapping[int, Exception]:
         self._forget()
-        return self._ask(ids, Verb.FORWARD)[0]
+        return self._ask(ids, "forward")[0]
 
     def _reset(self, ids: Ints, key: int | None) -> None:
         self._forget()
         self._renew(ids)
-        self._ask(ids, Verb.RESET, -1 if key is None else key)
+        self._ask(ids, "reset", -1 if key is None else key)
 
     def _get_state(self, world: int) -> State:
-        return self._ask(self._numbers[world : world + 1], Verb.GET_STATE, world)[1]
+        return self._ask(self._numbers[world : world + 1], "get_state", world)[1]
 
     def _set_state(self, world: int, state: State) -> None:
         ids = self._numbers[world : world + 1]
         self._forget()
         self._renew(ids)
-        self._ask(ids, Verb.SET_STATE, world, state)
+        self._ask(ids, "set_state", world, state)
 
     def _state_layout(self, world: int) -> tuple[str, tuple[tuple[str, int], ...]]:
         own = self._layouts[world % len(self._processes)]
@@ -313,7 +313,7 @@ class PoolWorlds(Worlds):
             if ctrl is not None:
                 shared["commands"][:] = ctrl[:, part]
             self._rows[ids] = 0
-            ended = self._ask(ids, Verb.RECORD, every, layout)[0]
+            ended = self._ask(ids, "record", every, layout)[0]
             done = self._rows[ids]
             for name, array in arrays.items():
                 array[ids[done == count], part] = shared[name][ids[done == count]]

@@ -16,8 +16,8 @@ from ..errors import (
     BusyDataError,
     DivergedError,
     DivergedWarning,
+    check_name,
     shown,
-    unknown_name,
 )
 from ..interface import Array, Ints, Model, State
 from ..interface.checks import as_count, as_vector, check_state, kind_of
@@ -317,8 +317,7 @@ def _names(names: Sequence[str], kind: str, known: tuple[str, ...]) -> tuple[str
         )
     listed = (names,) if isinstance(names, str) else tuple(names)
     for name in listed:
-        if not isinstance(name, str) or name not in known:
-            raise unknown_name(kind, name, known)
+        check_name(kind, name, known)
     return tuple(dict.fromkeys(listed))
 
 

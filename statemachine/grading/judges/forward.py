@@ -11,7 +11,7 @@ import numpy as np
 from ...interface import Array, Data, Model, forward, make_data
 from ...measures.text import rounded, vector
 from ..answers import Answer
-from ..calls import Remark, reason
+from ..calls import reason
 from ..watch import Inputs
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from ._values import (
@@ -82,7 +82,7 @@ def _places(model: Model, data: Data) -> dict[str, Array]:
     return sites | {f"body {n!r}": data.xpos[k].copy() for k, n in enumerate(model.body_names)}
 
 
-def judge(answer: Answer, world: ExerciseWorld, right: Tips) -> list[Remark]:
+def judge(answer: Answer, world: ExerciseWorld, right: Tips) -> list[str] | str:
     """The four readings, and that no time passed."""
     short = short_float(answer.result)
     tolerance = _SINGLE if short == "float32" else TOLERANCE
@@ -94,7 +94,7 @@ def judge(answer: Answer, world: ExerciseWorld, right: Tips) -> list[Remark]:
     )
     if passed := [run.end_time - run.time for run in answer.runs]:
         remarks = [
-            Remark(
+            (
                 f"{passed[0]:g} s passed: step was called. forward recomputes what is derived "
                 "and takes no time"
             )
@@ -106,18 +106,14 @@ def judge(answer: Answer, world: ExerciseWorld, right: Tips) -> list[Remark]:
         # A first fault explains what comes after it, more often than not.
         why = _why(wrong[0], given, world, right, answer)
         more = f"; {short} keeps few digits, leave the conversion out" if short else ""
-        remarks.append(Remark(f"reading {_READINGS[wrong[0]]}: {why}{more}"))
+        remarks.append(f"reading {_READINGS[wrong[0]]}: {why}{more}")
     if remarks:
         return remarks
     moved = float(np.linalg.norm(right.readings[3] - right.readings[2]))
-    return [
-        Remark(
-            f"a write changed nothing derived; forward moved the tip by {rounded(moved, 'm')}", True
-        )
-    ]
+    return f"a write changed nothing derived; forward moved the tip by {rounded(moved, 'm')}"
 
 
-def _all_at_once(given: Array, answer: Answer, tips: Tips, tolerance: float) -> list[Remark]:
+def _all_at_once(given: Array, answer: Answer, tips: Tips, tolerance: float) -> list[str]:
     """One mistake that gives all four readings."""
     if near(given, tips.readings, tolerance):
         return []
@@ -142,7 +138,7 @@ def _all_at_once(given: Array, answer: Answer, tips: Tips, tolerance: float) -> 
         ),
         (names, f"that is the place of {' and '.join(names[:3])}; site {TIP!r} is asked for"),
     )
-    return [Remark(text)] if text else []
+    return [text] if text else []
 
 
 def _why(k: int, given: Array, world: ExerciseWorld, tips: Tips, answer: Answer) -> str:

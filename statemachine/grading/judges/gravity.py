@@ -9,7 +9,7 @@ import numpy as np
 
 from ...interface import Array, Ints, Model, make_data, step
 from ..answers import Answer
-from ..calls import Remark, reason
+from ..calls import reason
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from ._values import (
     LIFT,
@@ -105,7 +105,7 @@ def _fall(world: ExerciseWorld, course: Array | None = None) -> Fall:
     return Fall(traces[0], traces[1], np.arange(seconds + 1) * each, course)
 
 
-def judge(answer: Answer, world: ExerciseWorld, right: Fall) -> list[Remark]:
+def judge(answer: Answer, world: ExerciseWorld, right: Fall) -> list[str] | str:
     """Both traces in degrees; ctrl as a new Data has it; the Model as it was."""
     remarks = _left(answer)
     pair = parts(answer.result, 2, "(on, off), two lists of degrees,")
@@ -118,32 +118,26 @@ def judge(answer: Answer, world: ExerciseWorld, right: Fall) -> list[Remark]:
     place = address(world.model)
     falls = [right.degrees(limp, place) for limp in (False, True)]
     if near(given[0], falls[1], TOLERANCE) and near(given[1], falls[0], TOLERANCE):
-        return [*remarks, Remark("the two lists are swapped: (on, off) is the order")]
+        return [*remarks, "the two lists are swapped: (on, off) is the order"]
     for limp, name in enumerate(_NAMES):
         if not near(given[limp], falls[limp], TOLERANCE):
             text = _why(given, bool(limp), world, right, answer)
-            remarks.append(Remark(f"{name}: {text}"))
+            remarks.append(f"{name}: {text}")
         elif text := _by_the_clock(given[limp], bool(limp), world, right):
-            remarks.append(Remark(f"{name}: {text}"))
+            remarks.append(f"{name}: {text}")
     if not answer.runs:
-        remarks.append(Remark(_NO_STEP))
+        remarks.append(_NO_STEP)
     elif not remarks and sum(run.nstep >= right.marks[-1] for run in answer.runs) < 2:
         steps = ", ".join(count(run.nstep, "step") for run in answer.runs[:4])
         remarks.append(
-            Remark(
-                f"your runs took {steps}; {size - 1} s are {right.marks[-1]} steps of "
-                f"{world.model.timestep:g} s, with the servos on and again with them off"
-            )
+            f"your runs took {steps}; {size - 1} s are {right.marks[-1]} steps of "
+            f"{world.model.timestep:g} s, with the servos on and again with them off"
         )
     if remarks:
         return remarks
-    return [
-        Remark(
-            f"{LIFT} after {size - 1} s: {falls[0][-1]:.3f}° with servos, {falls[1][-1]:.2f}° "
-            "without",
-            True,
-        )
-    ]
+    return (
+        f"{LIFT} after {size - 1} s: {falls[0][-1]:.3f}° with servos, {falls[1][-1]:.2f}° without"
+    )
 
 
 def _why(given: list[Array], limp: bool, world: ExerciseWorld, fall: Fall, answer: Answer) -> str:
@@ -274,10 +268,10 @@ def _by_the_clock(given: Array, limp: bool, world: ExerciseWorld, fall: Fall) ->
     )
 
 
-def _command(answer: Answer) -> list[Remark]:
+def _command(answer: Answer) -> list[str]:
     """Whether ctrl was written, to anything but what a new Data has."""
     return [
-        Remark(
+        (
             f"ctrl was written ({listed(answer.ends[run.data].ctrl)}): here it must stay as a new "
             "Data has it"
         )
@@ -286,18 +280,18 @@ def _command(answer: Answer) -> list[Remark]:
     ][:1]
 
 
-def _left(answer: Answer) -> list[Remark]:
+def _left(answer: Answer) -> list[str]:
     """Whether the Model was given back as it was."""
     flags = [int(values[0]) for values in answer.changed.get("opt.disableflags", ())]
     if flags:
         return [
-            Remark(
+            (
                 "the model was given back with its servos off (model.raw.opt.disableflags is "
                 f"{flags[1]}, it was {flags[0]}): switch the bit back, or use "
                 "model.replace(actuation=False)"
             )
         ]
     return [
-        Remark(f"the model was given back with another model.raw.{name}: a Model never changes")
+        f"the model was given back with another model.raw.{name}: a Model never changes"
         for name in answer.changed
     ]

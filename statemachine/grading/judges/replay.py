@@ -8,7 +8,7 @@ import numpy as np
 
 from ...interface import Array, Model, make_data, reset
 from ..answers import Answer, kind
-from ..calls import Remark, reason
+from ..calls import reason
 from ..watch import EngineRun, Nudge
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from ._values import (
@@ -76,16 +76,16 @@ def _start(model: Model) -> Start:
         return Start(data.qpos.copy(), data.qvel.copy(), data.time, data.ctrl.copy())
 
 
-def judge(answer: Answer, world: ExerciseWorld, right: Start) -> list[Remark]:
+def judge(answer: Answer, world: ExerciseWorld, right: Start) -> list[str] | str:
     """Two runs as asked for, what they ended in, and whether that is equal."""
     _, nstep = world.arguments
     same, *copies = parts(answer.result, 3, "(same, first, second)")
     if not isinstance(same, bool):
-        return [Remark(f"same: True or False is asked for; got {kind(same)}")]
+        return [f"same: True or False is asked for; got {kind(same)}"]
     remarks = _memory(answer)
     shorts = [(name, short_float(each)) for name, each in zip(_COUNT, copies, strict=True)]
     remarks += [
-        Remark(
+        (
             f"{name} is {short}, which forgets digits: qpos is float64, and every bit counts "
             "here. Leave the conversion out"
         )
@@ -102,7 +102,7 @@ def judge(answer: Answer, world: ExerciseWorld, right: Start) -> list[Remark]:
     apart = float(abs(one.end - two.end).max())
     if apart and world.nudge is None:
         return [
-            Remark(
+            (
                 f"the two runs ended {apart:.1e} apart though both began at keyframe 0: something "
                 "of the first was left over. sm.reset clears all, or use a new Data"
             )
@@ -114,13 +114,13 @@ def judge(answer: Answer, world: ExerciseWorld, right: Start) -> list[Remark]:
             "of a run with itself do not"
         )
         alike = "both runs ended in the same bits and you call them different"
-        return [Remark(unlike if same else alike)]
+        return [unlike if same else alike]
     if remarks := _ends(ends, (one, two)):
         return remarks
-    return [Remark(f"two runs of {nstep} steps end in the same bits", True)]
+    return f"two runs of {nstep} steps end in the same bits"
 
 
-def _memory(answer: Answer) -> list[Remark]:
+def _memory(answer: Answer) -> list[str]:
     """Whether what was returned is the simulator's own memory, or one array twice."""
     first, second = answer.live[1:]
     name, live = ("first", first) if first else ("second", second)
@@ -140,10 +140,10 @@ def _memory(answer: Answer) -> list[Remark]:
             f"return a copy, data.{live}.copy()",
         ),
     )
-    return [Remark(text)] if text else []
+    return [text] if text else []
 
 
-def _runs(runs: tuple[EngineRun, ...], world: ExerciseWorld, start: Start) -> list[Remark]:
+def _runs(runs: tuple[EngineRun, ...], world: ExerciseWorld, start: Start) -> list[str]:
     """Whether there were two runs, each as it was asked for; the first fault of each kind."""
     _, nstep = world.arguments
     text = reason(
@@ -169,13 +169,13 @@ def _runs(runs: tuple[EngineRun, ...], world: ExerciseWorld, start: Start) -> li
         ),
     )
     if text:
-        return [Remark(text)]
+        return [text]
     found: dict[str, str] = {}
     for name, run in zip(_COUNT, runs, strict=True):
         for concept, text in _faults(run, world, start).items():
             if text:
                 found.setdefault(concept, f"{name} run: {text}")
-    return [Remark(text) for text in found.values()]
+    return list(found.values())
 
 
 def _faults(run: EngineRun, world: ExerciseWorld, start: Start) -> dict[str, str]:
@@ -242,7 +242,7 @@ def _command(run: EngineRun, ctrl: Array, start: Start) -> str:
     return f"at its first step ctrl was {had}{after}; {listed(ctrl)} is asked for{why}"
 
 
-def _ends(ends: list[Array], runs: tuple[EngineRun, ...]) -> list[Remark]:
+def _ends(ends: list[Array], runs: tuple[EngineRun, ...]) -> list[str]:
     """Whether what was returned is what the runs ended in; the first that is not."""
     for name, given, run in zip(_COUNT, ends, runs, strict=True):
         away, rounding = float(abs(given - run.end).max()), grain(given)
@@ -259,5 +259,5 @@ def _ends(ends: list[Array], runs: tuple[EngineRun, ...]) -> list[Remark]:
         )
         if not same_bits(given, run.end):
             text = f"{name} is up to {away:.1e} away from qpos at the end of its run: {why}"
-            return [Remark(text)]
+            return [text]
     return []

@@ -10,7 +10,7 @@ from typing import Any
 
 from ...interface import JointType, Model, make_data, reset
 from ..answers import Answer, kind
-from ..calls import FaultError, Remark, reason
+from ..calls import FaultError, reason
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from ._values import count, parts
 
@@ -60,7 +60,7 @@ def _time(model: Model) -> float:
         return data.time
 
 
-def judge(answer: Answer, world: ExerciseWorld, right: ExpectedState) -> list[Remark]:
+def judge(answer: Answer, world: ExerciseWorld, right: ExpectedState) -> list[str] | str:
     """A pair of slices for every joint, and the time."""
     slots, time = parts(answer.result, 2, "(slots, time)")
     remarks = [*_names(slots, right), *_first_wrong(slots, right, world.model)]
@@ -68,15 +68,10 @@ def judge(answer: Answer, world: ExerciseWorld, right: ExpectedState) -> list[Re
     if remarks:
         return remarks
     frees = [name for name, (one, two) in right.slots.items() if one[1] - one[0] != two[1] - two[0]]
-    return [
-        Remark(
-            f"all {len(right.slots)} joints, {', '.join(frees)} with 7 and 6 numbers",
-            True,
-        )
-    ]
+    return f"all {len(right.slots)} joints, {', '.join(frees)} with 7 and 6 numbers"
 
 
-def _names(slots: Any, layout: ExpectedState) -> list[Remark]:
+def _names(slots: Any, layout: ExpectedState) -> list[str]:
     if not isinstance(slots, dict):
         raise FaultError(
             "slots: a dict {joint: (slice of qpos, slice of qvel)} is asked for; "
@@ -92,10 +87,10 @@ def _names(slots: Any, layout: ExpectedState) -> list[Remark]:
         ),
         (unknown, f"slots: no joint is called {[*unknown, ''][0]!r}; see model.joint_names"),
     )
-    return [Remark(text)] if text else []
+    return [text] if text else []
 
 
-def _first_wrong(slots: dict[str, Any], layout: ExpectedState, model: Model) -> list[Remark]:
+def _first_wrong(slots: dict[str, Any], layout: ExpectedState, model: Model) -> list[str]:
     """The first joint with a wrong slot, and why it may be."""
     for name, right in layout.slots.items():
         if name not in slots:
@@ -110,7 +105,7 @@ def _first_wrong(slots: dict[str, Any], layout: ExpectedState, model: Model) -> 
                     f"{name}: you return {array}[{start}:{stop}] where "
                     f"{array}[{right[which][0]}:{right[which][1]}] is expected"
                 )
-                return [Remark(f"{text}: {_why(name, given, which, layout, model)}")]
+                return [f"{text}: {_why(name, given, which, layout, model)}"]
     return []
 
 
@@ -164,10 +159,10 @@ def _why(name: str, given: list[Slot], which: int, layout: ExpectedState, model:
     )
 
 
-def _clock(time: Any, layout: ExpectedState, model: Model, stepped: bool) -> list[Remark]:
+def _clock(time: Any, layout: ExpectedState, model: Model, stepped: bool) -> list[str]:
     right = layout.time
     if not isinstance(time, Real) or isinstance(time, bool):
-        return [Remark(f"time: a number of seconds is asked for; got {kind(time)}")]
+        return [f"time: a number of seconds is asked for; got {kind(time)}"]
     if float(time) == right:
         return []
     others = [k for k, frame in enumerate(model.keyframes) if k and frame.time == time]
@@ -181,4 +176,4 @@ def _clock(time: Any, layout: ExpectedState, model: Model, stepped: bool) -> lis
         (stepped, ": read it right after the reset, before any step"),
     )
     text = f"time after the reset to keyframe 0 should be {right:g} s, you return {float(time):g}"
-    return [Remark(text + why)]
+    return [text + why]

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from types import ModuleType
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -22,14 +22,7 @@ from ...installed import require
 from ...interface import INPUTS, Array, Data, JointType, read_only
 from ...rotations import matrix_from_quat, xyzw_from_wxyz
 
-
-class Patcher(Protocol):
-    """What puts one attribute in the place of another."""
-
-    def setattr(self, target: object, name: str, value: object) -> None:
-        """Replace an attribute."""
-
-
+Patcher = Any  # what has setattr(target, name, value), as pytest's MonkeyPatch
 Fault = Callable[[Patcher], None]
 # (data, the right function, its arguments); what a fault does in its place.
 Instead = Callable[..., Any]

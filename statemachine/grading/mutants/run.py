@@ -13,17 +13,26 @@ import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ...backends import backend_names
 from ...engines import rooms_with
-from ...errors import BadInputError, EngineError, MissingEngineError, ModelFileError, unknown_name
+from ...errors import (
+    BadInputError,
+    EngineError,
+    MissingEngineError,
+    ModelFileError,
+    check_name,
+    unknown_name,
+)
 from ...installed import DEFAULT, engine_version, require
+from ...processes import checked_jobs
 from .. import sandbox
 from ..calls import reason
+from ..parallel import in_parallel
 from ..recording import content
 from ..unwinding import unwinding
 from . import FAULT, MUTANTS, Mutant
@@ -127,7 +136,9 @@ def examine(
         EngineError: pytest did not come as far as the tests.
     """
     path = _test_file(file)
-    mutants = [_mutant(name) for name in dict.fromkeys(only or MUTANTS)]
+    for name in only:
+        check_name("mutant", name, MUTANTS)
+    mutants = [MUTANTS[name] for name in dict.fromkeys(only or MUTANTS)]
     version = _ready(backend)
     with unwinding():
         return _examine(path, backend, version, mutants, seconds, clock, progress)
@@ -148,30 +159,25 @@ def _examine(
     if not healthy.tests:
         reason = "each was skipped" if healthy.skipped else "a test is a function test_…"
         raise BadInputError(f"there are no tests in {path.name}: {reason}")
-    trials: dict[str, MutantTrial] = {}
+    records: dict[str, _Record] = {}
     if not healthy.failures:
-        progress(1 / (len(mutants) + 1))
         patience = _TIMES * healthy.cpu + _AND, _TIMES * healthy.wall + _CLOCK_AND
-        stop = threading.Event()
-        pool = ThreadPoolExecutor(os.cpu_count() or 1)
-        try:
-            running = {
-                pool.submit(_run, path, backend, m.name, *patience, stop): m for m in mutants
-            }
-            for done in as_completed(running):
-                mutant = running[done]
-                trials[mutant.name] = MutantTrial(mutant, done.result().failures)
-                progress((len(trials) + 1) / (len(mutants) + 1))
-        finally:  # after an interrupt nothing goes on
-            stop.set()
-            pool.shutdown(cancel_futures=True)
+        stop, total = threading.Event(), len(mutants) + 1
+        work = {m.name: partial(_run, path, backend, m.name, *patience, stop) for m in mutants}
+        in_parallel(
+            work,
+            checked_jobs(None),
+            records.__setitem__,
+            stop.set,
+            lambda left: progress((total - left) / total),
+        )
     return Examination(
         file=path.name,
         backend=backend,
         engine_version=version,
         tests=healthy.tests,
         failures=healthy.failures,
-        trials=tuple(trials[mutant.name] for mutant in mutants if trials),
+        trials=tuple(MutantTrial(m, records[m.name].failures) for m in mutants if records),
     )
 
 
@@ -182,12 +188,6 @@ def _test_file(file: str | os.PathLike[str]) -> Path:
     if path.suffix != ".py":
         raise BadInputError(f"{path.name} is no Python file: --mutants takes a file of tests")
     return path
-
-
-def _mutant(name: str) -> Mutant:
-    if name not in MUTANTS:
-        raise unknown_name("mutant", name, MUTANTS)
-    return MUTANTS[name]
 
 
 def _ready(backend: str) -> str:
