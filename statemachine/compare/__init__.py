@@ -21,10 +21,9 @@ from .labels import Labels, labels_of
 from .one_step import StepComparison, one_step
 from .perturbed import Rerun, Uncertainty, perturbed_runs, rerun_of
 from .request import Request, split_words
-from .series import Series, default_tip, series
+from .series import Contact, Series, Touch, default_tip, series, touches
 from .side import Side, parse_sides
 from .sides import sides_of
-from .touches import Contact, Touch, touches
 from .two_sides import SidesRun, run_sides
 from .witness import Witness, witness
 

@@ -68,3 +68,17 @@ def nearest(time: Array, wanted: Array) -> Ints:
     near = np.clip(np.searchsorted(time, wanted), 0, len(time) - 1)
     near -= (near > 0) & (np.abs(time[near - 1] - wanted) < np.abs(time[near] - wanted))
     return near
+
+
+def at_moments(time: Array, values: Array, wanted: Array, slack: float) -> Array:
+    """Values (n, k) of ascending moments (n,) at others (m,).
+
+    Those of the run itself where it has the moment, to within `slack` [s]; else on the line
+    between two of them.
+    """
+    near = nearest(time, wanted)
+    rows = values[near].copy()
+    off = np.flatnonzero(np.abs(time[near] - wanted) > slack)
+    if len(off):
+        rows[off] = np.column_stack([np.interp(wanted[off], time, column) for column in values.T])
+    return rows
