@@ -6,12 +6,11 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from ..interface import JointType
 from ..measures import SAME, Common
 from ..measures.text import milliseconds, numbers, significant
-from ..runs import Header, Trace
+from ..runs import Trace
 from .labels import labels_of
-from .series import tell
+from .series import joint_columns, tell
 
 # Columns that are compared, and what a page calls them.
 _COMPARED = {
@@ -73,18 +72,27 @@ def notes_on(one: Trace, two: Trace, common: Common, of_quantities: Iterable[str
 def _of_joints(one: Trace, two: Trace) -> Iterator[str]:
     a, b = one.header, two.header
     labels = labels_of(a, b).long
-    only = [*_lacking(a, b, labels[0]), *_lacking(b, a, labels[1])]
+    only = [
+        f"{name} ({label})"
+        for header, other, label in ((a, b, labels[0]), (b, a, labels[1]))
+        for name in header.joint_labels
+        if name not in other.joint_labels
+    ]
     if only:
         yield f"compared is what both have; missing on one side: {', '.join(only)}"
-    shared = [name for name in a.joint_labels if name in b.joint_labels]
-    other = [name for name in shared if len({_place(header, name)[0] for header in (a, b)}) > 1]
+    shared = {
+        name: [joint_columns(header, name) for header in (a, b)]
+        for name in a.joint_labels
+        if name in b.joint_labels
+    }
+    other = [name for name, (x, y) in shared.items() if x.kind is not y.kind]
     if other:
         yield f"not compared, for they are joints of another kind: {', '.join(other)}"
     if any(
-        not np.array_equal(_start(one, name, column), _start(two, name, column))
-        for name in shared
-        if name not in other
-        for column in ("qpos", "qvel")
+        not np.array_equal(one.qpos[0, x.qpos], two.qpos[0, y.qpos])
+        or not np.array_equal(one.qvel[0, x.qvel], two.qvel[0, y.qvel])
+        for x, y in shared.values()
+        if x.kind is y.kind
     ):
         yield "the runs do not start in the same state"
 
@@ -121,20 +129,3 @@ def _commands_differ(one: Trace, two: Trace, common: Common) -> bool:
     # The command of a last row is never carried out.
     used = (common.one < len(one) - 1) & (common.two < len(two) - 1)
     return not np.array_equal(one.ctrl[common.one[used]], two.ctrl[common.two[used]])
-
-
-def _place(header: Header, name: str) -> tuple[int, int, int]:
-    """Kind of a joint, and its places in qpos and qvel."""
-    number = header.joint_labels.index(name)
-    return header.jnt_type[number], header.jnt_qposadr[number], header.jnt_dofadr[number]
-
-
-def _start(trace: Trace, name: str, column: str) -> np.ndarray:
-    """Where a joint is in the first row, or how fast."""
-    kind, qpos, dof = _place(trace.header, name)
-    start, width = (qpos, JointType(kind).nq) if column == "qpos" else (dof, JointType(kind).nv)
-    return trace[column][0, start : start + width]
-
-
-def _lacking(a: Header, b: Header, label: str) -> list[str]:
-    return [f"{name} ({label})" for name in a.joint_labels if name not in b.joint_labels]

@@ -83,7 +83,7 @@ def series(one: Trace, two: Trace, tip: str | None = None) -> list[Series]:
             found += _joint(name, time, sides)
     site = default_tip(one.header, two.header) if tip is None else tip
     if site and tell(one, two, "site_xpos") and tell(one, two, "site_xmat"):
-        (p, r), (q, s) = ((part[rows] for part in trace.site(site)) for trace, rows in sides)
+        (p, r), (q, s) = ([part[rows] for part in trace.site(site)] for trace, rows in sides)
         found.append(_curve(f"{site}, position", "tip", time, p, q))
         found.append(_turned(f"{site}, rotation", "tip rotation", time, r, s))
     if tell(one, two, "energy"):

@@ -78,7 +78,7 @@ class StepSpike:
     where: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class StageMeasure:
     """What was read of one group, at n moments.
 
@@ -86,16 +86,14 @@ class StageMeasure:
         group: Its k elements.
         apart: (n, k) how far the two sides are apart.
         null: (n, k) how far the left side is from itself.
-        sizes: (n,) its largest entry on either side.
-        scale: Its usual size.
+        scale: Its usual size, on either side.
         tolerance: What does not count.
     """
 
     group: StageGroup
     apart: Array
     null: Array
-    sizes: Array
-    scale: float = 0.0
+    scale: float
     tolerance: float = 0.0
 
     @property
@@ -114,9 +112,9 @@ class StepSamples:
         self._apart: list[list[Array]] = [[] for _ in reader.groups]
         self._null: list[list[Array]] = [[] for _ in reader.groups]
         self._size: list[list[float]] = [[] for _ in reader.groups]
-        self._touch: list[tuple[dict[str, float], ...]] = []  # depth and force, each with its null
-        self._depth: list[float] = []
-        self._force: list[float] = []
+        # For each moment by pair how far apart depth and force are, and the null; the largest.
+        self._touch: list[tuple[Touching, Touching]] = []
+        self._most: list[Array] = []
 
     def add(
         self,
@@ -134,19 +132,16 @@ class StepSamples:
             self._apart[g].append(group.apart(back, other))
             self._size[g].append(group.largest(back, other))
         (_, a), (_, b), (_, c) = running[0], left[0], right[0]
-        self._touch.append((_deep(b, c), _deep(a, b), _pushed(b, c), _pushed(a, b)))
-        self._depth.append(max((abs(d) for d, _ in (*b.values(), *c.values())), default=0.0))
-        pushes = (float(np.linalg.norm(f)) for _, f in (*b.values(), *c.values()))
-        self._force.append(max(pushes, default=0.0))
+        self._touch.append((_between(b, c), _between(a, b)))
+        self._most.append(np.max([np.zeros(2), *map(_sizes, (*b.values(), *c.values()))], axis=0))
 
     def measures(self, relative: float) -> list[StageMeasure]:
         """What both sides tell, each group with its scale and tolerance."""
         found = [
             *self._of_groups(),
-            *self._of_pairs(FOUND, 0, "m", self._depth),
-            *self._of_pairs(FORCE, 2, "N", self._force),
+            *self._of_pairs(FOUND, 0, "m"),
+            *self._of_pairs(FORCE, 1, "N"),
         ]
-        found = [replace(each, scale=_usual(each.sizes)) for each in found]
         # What is nothing but rounding, as the contact force of a run in which nothing touches,
         # is held against the other forces, and accelerations against what forces give.
         pushed = {unit: _largest(found, _FORCES, unit) for unit in ("N·m", "N")}
@@ -155,13 +150,11 @@ class StepSamples:
         for unit, force, mass in (("rad/s²", "N·m", "kg·m²"), ("m/s²", "N", "kg")):
             if masses[mass]:
                 least[unit] = pushed[force] / masses[mass]
-        scaled = []
         for each in found:
-            scale = each.scale
             if each.group.stage in (*_FORCES, AFTER):
-                scale = max(scale, _LEAST * least[each.group.unit])
-            scaled.append(replace(each, scale=scale, tolerance=relative * scale))
-        return scaled
+                each.scale = max(each.scale, _LEAST * least[each.group.unit])
+            each.tolerance = relative * each.scale
+        return found
 
     def _of_groups(self) -> Iterator[StageMeasure]:
         for g, group in enumerate(self._reader.groups):
@@ -173,18 +166,18 @@ class StepSamples:
                 names = tuple(np.array(group.names, dtype=object)[told])
                 null = np.nan_to_num(np.array(self._null[g])[:, told])
                 own = replace(group, names=names)
-                yield StageMeasure(own, apart[:, told], null, np.array(self._size[g]))
+                yield StageMeasure(own, apart[:, told], null, _usual(np.array(self._size[g])))
 
-    def _of_pairs(
-        self, stage: str, place: int, unit: str, sizes: list[float]
-    ) -> Iterator[StageMeasure]:
-        pairs = tuple(dict.fromkeys(p for t in self._touch for k in (0, 1) for p in t[place + k]))
+    def _of_pairs(self, stage: str, place: int, unit: str) -> Iterator[StageMeasure]:
+        """Depths (0) or forces (1) of the pairs that touch at any moment."""
+        pairs = tuple(dict.fromkeys(p for touch in self._touch for side in touch for p in side))
         if pairs:
             apart, null = (
-                np.array([[t[place + k].get(p, 0.0) for p in pairs] for t in self._touch])
+                np.array([[t[k].get(p, np.zeros(2))[place] for p in pairs] for t in self._touch])
                 for k in (0, 1)
             )
-            yield StageMeasure(StageGroup(stage, unit, pairs), apart, null, np.array(sizes))
+            scale = _usual(np.array(self._most)[:, place])
+            yield StageMeasure(StageGroup(stage, unit, pairs), apart, null, scale)
 
     def gaps(self, measures: Sequence[StageMeasure]) -> tuple[StageGap, ...]:
         """Each stage, by that of its units that is farthest beyond its tolerance."""
@@ -282,24 +275,13 @@ def _how_far(gap: StageGap) -> tuple[bool, float]:
     return gap.beyond > 0, gap.worst / gap.tolerance if gap.tolerance else np.inf
 
 
-def _deep(one: Touching, two: Touching) -> dict[str, float]:
-    """How far apart the depths of each pair are [m]; of one that only one side finds, its depth."""
-    found = {}
-    for pair in dict.fromkeys([*one, *two]):
-        depths = [side[pair][0] if pair in side else 0.0 for side in (one, two)]
-        found[pair] = abs(depths[0] - depths[1])
-    return found
+def _between(one: Touching, two: Touching) -> Touching:
+    """How far apart each pair's depth and force (2,) are [m, N]; what is not found is zero."""
+    nothing = np.zeros(4)
+    pairs = dict.fromkeys([*one, *two])
+    return {pair: _sizes(one.get(pair, nothing) - two.get(pair, nothing)) for pair in pairs}
 
 
-def _pushed(one: Touching, two: Touching) -> dict[str, float]:
-    """How far apart the forces of each pair are [N], as vectors."""
-    nothing = np.zeros(3)
-    return {
-        pair: float(
-            np.linalg.norm(
-                (one[pair][1] if pair in one else nothing)
-                - (two[pair][1] if pair in two else nothing)
-            )
-        )
-        for pair in dict.fromkeys([*one, *two])
-    }
+def _sizes(touch: Array) -> Array:
+    """How deep, and how long the force is (2,) [m, N], of depth and force (4,)."""
+    return np.array([abs(touch[0]), np.linalg.norm(touch[1:])])
