@@ -14,8 +14,7 @@ from ..measures import QUANTITIES, Deviation, Tolerance, common_moments, same_pa
 from ..measures.text import on
 from ..runs import Trace
 from ..runs.provenance import Provenance
-from .labels import labels_of
-from .notes import notes_on
+from .labels import labels_of, notes_on
 from .series import Series, at_the_end, series, touches
 
 Verdict = Literal["agrees", "settles", "differs"]
