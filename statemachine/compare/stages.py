@@ -47,19 +47,20 @@ class StageGroup:
     size: int = 1
 
     def apart(self, one: Array, two: Array) -> Array:
-        """How far apart the elements (k,) are; NaN where one of them is not told."""
+        """How far apart the elements (n, k) are at n moments; NaN where one is not told."""
+        shape = len(one), len(self.names), self.size
         if self.size == 9:
-            return angle_between(one.reshape(-1, 3, 3), two.reshape(-1, 3, 3))
-        return np.linalg.norm((one - two).reshape(-1, self.size), axis=1)
+            return angle_between(one.reshape(*shape[:2], 3, 3), two.reshape(*shape[:2], 3, 3))
+        return np.linalg.norm((one - two).reshape(shape), axis=2)
 
-    def largest(self, one: Array, two: Array) -> float:
-        """The largest of all elements; of places how far they reach, of rotations one radian."""
+    def largest(self, one: Array, two: Array) -> Array:
+        """The largest of all elements (n,); of places their reach, of rotations one radian."""
         if self.size == 9:
-            return 1.0
-        both = np.concatenate([one, two]).reshape(-1, self.size)
+            return np.ones(len(one))
+        both = np.concatenate([one, two], axis=1).reshape(len(one), -1, self.size)
         if self.size == 3:
-            return float(np.linalg.norm(np.ptp(both, axis=0))) if len(both) else 0.0
-        return float(np.nanmax(np.abs(both), initial=0.0))
+            return np.array([np.linalg.norm(reach) for reach in np.ptp(both, axis=1)])
+        return np.nanmax(np.abs(both[:, :, 0]), axis=1, initial=0.0)
 
 
 Touching = dict[str, Array]  # by pair (4,): how deep [m], and the force [N]

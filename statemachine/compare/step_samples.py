@@ -108,40 +108,40 @@ class StepSamples:
     def __init__(self, reader: StageReader) -> None:
         self._reader, self.failed = reader, 0
         self.times: list[float] = []
-        # For each group and moment: differences, those of the null, and the largest entry.
-        self._apart: list[list[Array]] = [[] for _ in reader.groups]
-        self._null: list[list[Array]] = [[] for _ in reader.groups]
-        self._size: list[list[float]] = [[] for _ in reader.groups]
-        # For each moment by pair how far apart depth and force are, and the null; the largest.
-        self._touch: list[tuple[Touching, Touching]] = []
-        self._most: list[Array] = []
+        # At each moment the numbers of the groups and the contacts, as of each `add`.
+        self._read: list[list[tuple[list[Array], Touching]]] = []
 
-    def add(
-        self,
-        time: float,
-        running: tuple[Reading, Array],
-        left: tuple[Reading, Array],
-        right: tuple[Reading, Array],
-    ) -> None:
+    def add(self, time: float, *readings: tuple[Reading, Array]) -> None:
         """One moment: the left side as it runs, put back to its State, and the right side."""
         self.times.append(time)
-        rows = [self._reader.whole(k, *each) for k, each in ((0, running), (0, left), (1, right))]
-        for g, group in enumerate(self._reader.groups):
-            whole, back, other = (row[g] for row in rows)
-            self._null[g].append(group.apart(whole, back))
-            self._apart[g].append(group.apart(back, other))
-            self._size[g].append(group.largest(back, other))
-        (_, a), (_, b), (_, c) = running[0], left[0], right[0]
-        self._touch.append((_between(b, c), _between(a, b)))
-        self._most.append(np.max([np.zeros(2), *map(_sizes, (*b.values(), *c.values()))], axis=0))
+        self._read.append(
+            [
+                (self._reader.whole(side, *each), each[0][1])
+                for side, each in zip((0, 0, 1), readings, strict=True)
+            ]
+        )
 
     def measures(self, relative: float) -> list[StageMeasure]:
         """What both sides tell, each group with its scale and tolerance."""
-        found = [
-            *self._of_groups(),
-            *self._of_pairs(FOUND, 0, "m"),
-            *self._of_pairs(FORCE, 1, "N"),
-        ]
+        found: list[StageMeasure] = []
+        for g, group in enumerate(self._reader.groups if self._read else ()):
+            running, left, right = (np.array([m[k][0][g] for m in self._read]) for k in range(3))
+            if group.names:
+                sizes = group.largest(left, right)
+                found += _measure(
+                    group, group.apart(left, right), group.apart(running, left), sizes
+                )
+        pairs = tuple(dict.fromkeys(p for m in self._read for k in (1, 2, 0) for p in m[k][1]))
+        if pairs:
+            # Depth and force of each pair at each moment; what is not found is zero.
+            running, left, right = (
+                np.array([[m[k][1].get(pair, np.zeros(4)) for pair in pairs] for m in self._read])
+                for k in range(3)
+            )
+            for stage, unit, of in ((FOUND, "m", _depths), (FORCE, "N", _pushes)):
+                sizes = np.maximum(of(left), of(right)).max(axis=1)
+                group = StageGroup(stage, unit, pairs)
+                found += _measure(group, of(left - right), of(running - left), sizes)
         # What is nothing but rounding, as the contact force of a run in which nothing touches,
         # is held against the other forces, and accelerations against what forces give.
         pushed = {unit: _largest(found, _FORCES, unit) for unit in ("N·m", "N")}
@@ -155,29 +155,6 @@ class StepSamples:
                 each.scale = max(each.scale, _LEAST * least[each.group.unit])
             each.tolerance = relative * each.scale
         return found
-
-    def _of_groups(self) -> Iterator[StageMeasure]:
-        for g, group in enumerate(self._reader.groups):
-            apart = np.array(self._apart[g])
-            if not group.names or not apart.size:
-                continue
-            told = np.isfinite(apart).all(axis=0)
-            if told.any():
-                names = tuple(np.array(group.names, dtype=object)[told])
-                null = np.nan_to_num(np.array(self._null[g])[:, told])
-                own = replace(group, names=names)
-                yield StageMeasure(own, apart[:, told], null, _usual(np.array(self._size[g])))
-
-    def _of_pairs(self, stage: str, place: int, unit: str) -> Iterator[StageMeasure]:
-        """Depths (0) or forces (1) of the pairs that touch at any moment."""
-        pairs = tuple(dict.fromkeys(p for touch in self._touch for side in touch for p in side))
-        if pairs:
-            apart, null = (
-                np.array([[t[k].get(p, np.zeros(2))[place] for p in pairs] for t in self._touch])
-                for k in (0, 1)
-            )
-            scale = _usual(np.array(self._most)[:, place])
-            yield StageMeasure(StageGroup(stage, unit, pairs), apart, null, scale)
 
     def gaps(self, measures: Sequence[StageMeasure]) -> tuple[StageGap, ...]:
         """Each stage, by that of its units that is farthest beyond its tolerance."""
@@ -237,6 +214,14 @@ class StepSamples:
         return found
 
 
+def _measure(group: StageGroup, apart: Array, null: Array, sizes: Array) -> Iterator[StageMeasure]:
+    """That of the elements which both sides tell, if there are any."""
+    told = np.isfinite(apart).all(axis=0)
+    if told.any():
+        own = replace(group, names=tuple(np.array(group.names, dtype=object)[told]))
+        yield StageMeasure(own, apart[:, told], np.nan_to_num(null[:, told]), _usual(sizes))
+
+
 def _culprit(each: StageMeasure, row: int) -> str:
     """What to look at in a moment: the element that differs most, or where that comes from.
 
@@ -275,13 +260,11 @@ def _how_far(gap: StageGap) -> tuple[bool, float]:
     return gap.beyond > 0, gap.worst / gap.tolerance if gap.tolerance else np.inf
 
 
-def _between(one: Touching, two: Touching) -> Touching:
-    """How far apart each pair's depth and force (2,) are [m, N]; what is not found is zero."""
-    nothing = np.zeros(4)
-    pairs = dict.fromkeys([*one, *two])
-    return {pair: _sizes(one.get(pair, nothing) - two.get(pair, nothing)) for pair in pairs}
+def _depths(touches: Array) -> Array:
+    """How deep (n, p) [m], of depths and forces (n, p, 4)."""
+    return np.abs(touches[:, :, 0])
 
 
-def _sizes(touch: Array) -> Array:
-    """How deep, and how long the force is (2,) [m, N], of depth and force (4,)."""
-    return np.array([abs(touch[0]), np.linalg.norm(touch[1:])])
+def _pushes(touches: Array) -> Array:
+    """How long the forces are (n, p) [N], of depths and forces (n, p, 4)."""
+    return np.array([[np.linalg.norm(each[1:]) for each in moment] for moment in touches])
