@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import statemachine as sm
 from statemachine.compare import compare, touches
-from statemachine.measures import ContactNames, Gap, largest, nearest, same_pairs, text, together
+from statemachine.measures import (
+    ContactNames,
+    Gap,
+    joint_gap,
+    largest,
+    nearest,
+    same_pairs,
+    text,
+    together,
+)
 from statemachine.report.events import events_of
 from statemachine.report.plot_panels import of_trace
 from statemachine.runs import Trace, record, record_scenario, shipped
@@ -140,3 +150,17 @@ def test_the_nearest_row() -> None:
     time = np.array([0.0, 1.0, 2.0])
     assert nearest(time, np.array([-1.0, 0.4, 0.6, 5.0])).tolist() == [0, 0, 1, 2]
     assert nearest(time[:1], np.array([0.0, 3.0])).tolist() == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("types", "two", "expected"),
+    [
+        ([2, 2], [0.1, -0.2], Gap(0.2, "m", "b")),
+        ([2, 3], [0.3, -0.2], Gap(0.2, "rad", "b")),  # of a hinge if there is one
+        ([0], np.ones(7), None),
+    ],
+)
+def test_the_joint_that_differs_most(types: list[int], two: Any, expected: Gap | None) -> None:
+    assert (
+        joint_gap("ab", types, [0, 1][: len(types)], np.zeros(len(two)), np.array(two)) == expected
+    )

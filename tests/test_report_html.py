@@ -19,12 +19,12 @@ import pytest
 from PIL import Image
 
 import statemachine as sm
-from statemachine.compare import Comparison, compare, series, sides_of, touches
+from statemachine.compare import Comparison, Request, compare, series, sides_of, touches
 from statemachine.compare.series import total_forces
-from statemachine.compare.sides import Request
-from statemachine.compare.why import Attribution, Deviation, FactorTrial, FirstTouch
+from statemachine.compare.why import Attribution, FactorTrial, FirstTouch
 from statemachine.drawing import drawing_of
 from statemachine.errors import BadInputError
+from statemachine.measures import Deviation
 from statemachine.measures.text import quantity
 from statemachine.page import (
     Block,

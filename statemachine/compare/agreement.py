@@ -7,21 +7,17 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import TraceError
 from ..interface import Array
-from ..measures import QUANTITIES, SAME, common_moments, largest, same_pairs
+from ..measures import QUANTITIES, Deviation, Tolerance, common_moments, same_pairs, tolerance_of
 from ..measures.text import on
 from ..runs import Trace
 from ..runs.provenance import Provenance
-from .labels import labels_of
-from .notes import notes_on
-from .series import Series, series
-from .tolerances import tolerance_for
+from .labels import labels_of, notes_on
+from .series import Series, at_the_end, series, touches
 
 Verdict = Literal["agrees", "settles", "differs"]
-SETTLED = 0.1  # share of the common time, at its end, that "settled" is taken over
 
 
 @dataclass(frozen=True)
@@ -147,16 +143,22 @@ def compare(
     curves = series(one, two, tip)
     if not any(QUANTITIES[curve.kind].own for curve in curves):
         raise TraceError("the traces have no joint in common: nothing can be compared")
-    found = [_of_curve(curve, one, two, tolerances) for curve in curves]
-    common = common_moments(one, two)
-    if "contact_row" in one and "contact_row" in two:
-        found += _touches(one, two, float(common.time[-1]), tolerances)
+    longest = max(one.timestep, two.timestep)
+    found = []
+    for curve in curves:
+        reach = max(_reach(one, curve), _reach(two, curve)) if curve.kind == "tip" else 0.0
+        allowed = tolerance_of(curve.kind, curve.one, curve.two, reach, longest, tolerances)
+        found.append(_agreement(curve.name, curve.kind, curve.difference, curve.time,
+                                _settled(curve), allowed))  # fmt: skip
+    common = common_moments(one.time, two.time, (one.timestep, two.timestep))
+    labels = labels_of(one.header, two.header)
+    allowed = tolerance_of("contact", common.time, common.time, 0.0, longest, tolerances)
+    found += _first_touches(one, two, float(common.time[-1]), allowed, labels.short)
     strange = [
         f"{each.name}: {each.note}, so it cannot agree"
         for each in found
         if each.note.startswith("no number")
     ]
-    labels = labels_of(one.header, two.header)
     return Comparison(
         one=_side(one, labels.long[0], labels.short[0]),
         two=_side(two, labels.long[1], labels.short[1]),
@@ -167,93 +169,70 @@ def compare(
     )
 
 
-def _of_curve(
-    curve: Series, one: Trace, two: Trace, given: Mapping[str, float] | None
-) -> Agreement:
-    allowed = tolerance_for(curve, one, two, given)
-    apart, time = curve.difference, curve.time
-    strange = int(np.count_nonzero(~np.isfinite(apart)))
-    most, row = largest(apart)
-    tail = time >= time[-1] - SETTLED * (time[-1] - time[0])
+def _settled(curve: Series) -> float:
+    """How far apart they are in the end, on average."""
+    tail = at_the_end(curve.time)
     # Of a force the mean counts: stiff contacts ring from step to step.
     if curve.kind == "force":
-        settled = abs(float(curve.one[tail].mean()) - float(curve.two[tail].mean()))
-    else:
-        settled = float(apart[tail].mean())
-    beyond = np.flatnonzero(~(apart <= allowed.value))  # what is no number is not within
+        return abs(float(curve.one[tail].mean()) - float(curve.two[tail].mean()))
+    return float(curve.difference[tail].mean())
+
+
+def _reach(trace: Trace, curve: Series) -> float:
+    """How far a site gets from where the first jointed body has its origin [m]."""
+    positions, _ = trace.site(curve.name.partition(",")[0])
+    if "xpos" in trace and len(trace.header.bodies) > 1:
+        positions = positions - trace["xpos"][:, 1]
+    lengths = np.linalg.norm(positions, axis=1)
+    return float(lengths[np.isfinite(lengths)].max(initial=0.0))
+
+
+def _agreement(
+    name: str, kind: str, apart: Array, time: Array, settled: float, allowed: Tolerance,
+    note: str = "",
+) -> Agreement:  # fmt: skip
+    """What a difference (n,) over time (n,) comes to; what has a note differs at any size."""
+    beyond = np.flatnonzero(~(apart <= allowed.value) | bool(note))  # NaN is not within
+    strange = int(np.count_nonzero(~np.isfinite(apart)))
+    note = f"no number at {strange} of {len(apart)} moments" if strange else note
     verdict: Verdict = "agrees"
     if len(beyond):
-        verdict = "settles" if settled <= allowed.value and not strange else "differs"
+        verdict = "settles" if settled <= allowed.value and not note else "differs"
+    gap = Deviation.of(apart, time, QUANTITIES[kind].unit)
     return Agreement(
-        name=curve.name,
-        kind=curve.kind,
-        unit=curve.unit,
-        max=most,
-        at=float(time[row]),
-        rms=float(np.sqrt(np.mean(apart**2))),
+        name=name,
+        kind=kind,
+        unit=gap.unit,
+        max=gap.worst,
+        at=gap.at,
+        rms=gap.rms,
         settled=settled,
         since=float(time[beyond[0]]) if len(beyond) else None,
         tolerance=allowed.value,
         reason=allowed.reason,
         verdict=verdict,
-        note=f"no number at {strange} of {len(apart)} moments" if strange else "",
+        note=note,
     )
 
 
-def _touches(
-    one: Trace, two: Trace, until: float, given: Mapping[str, float] | None
+def _first_touches(
+    one: Trace, two: Trace, until: float, allowed: Tolerance, labels: tuple[str, str]
 ) -> list[Agreement]:
     """When each pair of bodies first touches, on either side."""
     found = []
-    touches = [one.touches(), two.touches()]
-    touches[1] = same_pairs(touches[0], touches[1])
-    for pair in dict.fromkeys([*touches[0], *touches[1]]):
-        first = [
-            _first(touch.get(pair), trace, until)
-            for touch, trace in zip(touches, (one, two), strict=True)
-        ]
-        if first[0] is None and first[1] is None:
-            continue
-        none: Array = np.empty(0)
-        curve = Series(f"{pair}, first touch", "contact", none, none, none, none)
-        allowed = tolerance_for(curve, one, two, given)
-        note = ""
-        if first[0] is None or first[1] is None:
-            missing, seen = (0, first[1]) if first[0] is None else (1, first[0])
-            # As late as can be: it had not touched when the comparison ended.
-            gap, at = until - float(seen or 0.0), float(seen or 0.0)
-            later = touches[missing].get(pair)
-            word = "never" if later is None or not later.any() else "later"
-            note = f"{word} {on(labels_of(one.header, two.header).short[missing])}"
-            verdict: Verdict = "differs"
-        else:
-            gap, at = abs(first[0] - first[1]), min(first[0], first[1])
-            verdict = "agrees" if gap <= allowed.value else "differs"
-        found.append(
-            Agreement(
-                name=curve.name,
-                kind="contact",
-                unit=curve.unit,
-                max=gap,
-                at=at,
-                rms=gap,
-                settled=gap,
-                since=at if verdict == "differs" else None,
-                tolerance=allowed.value,
-                reason=allowed.reason,
-                verdict=verdict,
-                note=note,
-            )
-        )
+    for touch in touches(one, two):
+        first, note = [touch.one.first, touch.two.first], ""
+        known = [time for time in first if time is not None]
+        if len(known) == 1:  # as late as can be: it had not touched when the comparison ended
+            side = first.index(None)
+            pairs = same_pairs({touch.pair: None}, dict.fromkeys((one, two)[side].touches()))
+            word = "later" if touch.pair in pairs else "never"
+            note = f"{word} {on(labels[side])}"
+            known.append(until)
+        gap = abs(known[0] - known[1])
+        name, at = f"{touch.pair}, first touch", np.array([min(known)])
+        found.append(_agreement(name, "contact", np.array([gap]), at, gap, allowed, note))
     return found
-
-
-def _first(touching: NDArray[np.bool_] | None, trace: Trace, until: float) -> float | None:
-    """When a pair first touches, from the start; None if not within the common time."""
-    if touching is None or not touching.any():
-        return None
-    time = float(trace.time[int(np.argmax(touching))] - trace.time[0])
-    return time if time <= until + SAME * trace.header.timestep else None
 
 
 def _side(trace: Trace, label: str, short: str) -> SideRun:

@@ -8,11 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from ..backends import load
+from ..errors import StateMachineError, TraceError
 from ..interface import Array, Data, Model
-from ..runs import Header, Trace
+from ..runs import Header, Trace, model_file
 from ..runs.recorder import layout_of
 from ..runs.scenarios import Controller
-from .matching import Matched, Pairs
+from .matching import Matched, Pairs, match_models, start_of
+from .sides import Request
 
 
 def told_alike(one: Trace, two: Trace, matched: Matched) -> tuple[Trace, Trace]:
@@ -69,6 +72,44 @@ def translated(trace: Trace, matched: Matched, start: tuple[Array, Array, Array]
         matched.qvel(trace.qvel, qvel),
         matched.ctrl(trace.ctrl, ctrl),
     )
+
+
+def for_left(trace: Trace, model: Model, request: Request) -> Trace:
+    """A trace as one of the left's Model; matched by the model that it was recorded with."""
+    header = trace.header
+    own = layout_of(model)
+    if all(getattr(header, name) == own[name] for name in ("joints", "actuators", "jnt_type")):
+        return replace_layout(trace, model, trace.qpos, trace.qvel, trace.ctrl)
+    try:
+        file, _ = model_file(header, request.menagerie, request.what[0])
+        matched = match_models(load(file), model, request.names)
+    except StateMachineError as error:
+        raise TraceError(
+            f"the trace has other joints or actuators than {model.path.name}, and what it was "
+            f"recorded with cannot be matched: {error}"
+        ) from None
+    return translated(trace, matched, start_of(model, None))
+
+
+def in_terms_of_right(left: Trace, right: Trace | None, matched: Matched | None) -> Trace:
+    """The left's run as one of the right's Model; what is the right's alone stays as it starts."""
+    if matched is None:
+        return left
+    start = start_of(matched.two, None)
+    if right is not None:
+        start = right.qpos[0], right.qvel[0], right.ctrl[0]
+    return translated(left, matched, start)
+
+
+def same_commands(theirs: Trace, right: Trace) -> bool:
+    """Whether the right was told at each of its moments what the left was, from the same start."""
+    if any(not np.array_equal(theirs[name][0], right[name][0]) for name in ("qpos", "qvel")):
+        return False
+    since, times = right.time - right.time[0], theirs.time - theirs.time[0]
+    early = 1e-6 * theirs.timestep  # as `play` has it
+    rows = np.searchsorted(times - early, since, side="right") - 1
+    used = since < times[-1] - early  # the command of a last row is never carried out
+    return np.array_equal(theirs.ctrl[rows[used]], right.ctrl[used])
 
 
 def replace_layout(trace: Trace, model: Model, qpos: Array, qvel: Array, ctrl: Array) -> Trace:

@@ -113,11 +113,31 @@ def convergence(
                 )
     one, two = runs[0]
     tip = default_tip(one.header, two.header) if tip is None else tip
-    time = common_moments(one, two).time
-    touch = _first_touch(runs, float(time[-1]))
-    before = time < (np.inf if touch is None else touch - 1e-9)
-    curves = _Curves(runs, tip)
-    whole = curves.limits(np.ones(len(time), dtype=bool))
+    common = common_moments(one.time, two.time, (one.timestep, two.timestep))
+    time = common.time
+    # Of the pairs of sides; then of each side's first runs and its finest.
+    between = [_gaps(a, b, tip) for a, b in runs]
+    own = [
+        [_gaps(pair[side], runs[-1][side], tip, rows) for pair in runs[:-1]]
+        for side, rows in ((0, common.one), (1, common.two))
+    ]
+    curves = [
+        curve
+        for curve in series(one, two, tip)
+        if curve.kind != "force" and all(curve.name in gaps for gaps in between)
+    ]
+    firsts = [
+        float(trace.time[trace["contact_row"][0]] - trace.time[0])
+        for pair in runs
+        for trace in pair
+        if "contact_row" in trace and len(trace["contact_row"])
+    ]
+    touch = min((first for first in firsts if first <= time[-1]), default=None)
+    early = time < (np.inf if touch is None else touch - 1e-9)
+    whole, before = (
+        tuple(_limit(curve, between, own, chosen) for curve in curves if chosen.any())
+        for chosen in (np.ones(len(time), dtype=bool), early)
+    )
     return TimestepConvergence(
         labels=labels_of(one.header, two.header).long,
         steps=(
@@ -126,67 +146,41 @@ def convergence(
         ),
         until=float(time[-1]),
         touch=touch,
-        before=whole if touch is None else curves.limits(before) if before.any() else (),
+        before=before,
         whole=whole,
     )
 
 
-def _first_touch(runs: list[tuple[Trace, Trace]], until: float) -> float | None:
-    found = []
-    for trace in (trace for pair in runs for trace in pair):
-        for touching in trace.touches().values():
-            time = float(trace.time[int(np.argmax(touching))] - trace.time[0])
-            if touching.any() and time <= until:
-                found.append(time)
-    return min(found, default=None)
+def _gaps(one: Trace, two: Trace, tip: str, rows: Ints | slice = slice(None)) -> dict[str, Array]:
+    return {curve.name: curve.difference[rows] for curve in series(one, two, tip)}
 
 
-class _Curves:
-    """The gaps of all pairs of runs that count, at the moments of the first pair."""
-
-    def __init__(self, runs: list[tuple[Trace, Trace]], tip: str) -> None:
-        common = common_moments(*runs[0])
-        self._first = series(*runs[0], tip)
-        self._between = [_gaps(series(*pair, tip), None) for pair in runs]
-        self._own = [
-            [_gaps(series(pair[side], runs[-1][side], tip), rows) for pair in runs[:-1]]
-            for side, rows in ((0, common.one), (1, common.two))
-        ]
-
-    def limits(self, chosen: NDArray[np.bool_]) -> tuple[QuantityLimit, ...]:
-        """Each quantity that every pair has, at some of the moments (n,)."""
-        found = []
-        for curve in self._first:
-            name = curve.name
-            if curve.kind == "force" or any(name not in each for each in self._between):
-                continue
-            gaps = [float(each[name][chosen].max()) for each in self._between]
-            own = [
-                [float(each[name][chosen].max()) if name in each else np.nan for each in side]
-                for side in self._own
-            ]
-            limit = max(0.0, 2 * gaps[2] - gaps[1])
-            values = curve.one[chosen] if curve.one.size else np.ones(1)
-            rounding = _ROUNDING * max(1.0, float(np.abs(values).max()))
-            found.append(
-                QuantityLimit(
-                    name=name,
-                    kind=curve.kind,
-                    unit=curve.unit,
-                    gaps=(gaps[0], gaps[1], gaps[2]),
-                    left=(own[0][0], own[0][1]),
-                    right=(own[1][0], own[1][1]),
-                    limit=limit,
-                    verdict=_verdict(gaps, limit, rounding),
-                )
-            )
-        return tuple(found)
-
-
-def _gaps(curves: list[Series], rows: Ints | None) -> dict[str, Array]:
-    return {
-        curve.name: curve.difference if rows is None else curve.difference[rows] for curve in curves
-    }
+def _limit(
+    curve: Series,
+    between: list[dict[str, Array]],
+    own: list[list[dict[str, Array]]],
+    chosen: NDArray[np.bool_],
+) -> QuantityLimit:
+    """One quantity at some of the moments (n,)."""
+    name = curve.name
+    gaps = [float(each[name][chosen].max()) for each in between]
+    left, right = (
+        [float(each[name][chosen].max()) if name in each else np.nan for each in side]
+        for side in own
+    )
+    values = curve.one[chosen] if curve.one.size else np.ones(1)
+    rounding = _ROUNDING * max(1.0, float(np.abs(values).max()))
+    limit = max(0.0, 2 * gaps[2] - gaps[1])
+    return QuantityLimit(
+        name=name,
+        kind=curve.kind,
+        unit=curve.unit,
+        gaps=(gaps[0], gaps[1], gaps[2]),
+        left=(left[0], left[1]),
+        right=(right[0], right[1]),
+        limit=limit,
+        verdict=_verdict(gaps, limit, rounding),
+    )
 
 
 def _verdict(gaps: list[float], limit: float, rounding: float) -> Limit:

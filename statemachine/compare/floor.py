@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import TraceError
-from ..interface import Array
+from ..interface import Array, Ints
 from ..measures import common_moments
 from ..runs import Trace
 from ..runs.drive import Progress, silent
-from .agreement import Agreement, Comparison, compare
+from .agreement import Agreement, Comparison
 from .perturbed import EXACT, ROUNDING, RUNS, Rerun, Uncertainty, perturbed_runs
-from .series import default_tip, series
+from .series import default_tip, series, touches
 
 _WINDOW = 0.025  # of the common time, to either side
 
@@ -107,64 +107,53 @@ def chaos_floor(
     Raises:
         BadInputError: As `perturbed_runs`.
     """
-    common = common_moments(one, two)
     tip = default_tip(one.header, two.header) if tip is None else tip
+    common = common_moments(one.time, two.time, (one.timestep, two.timestep))
     gaps = {curve.name: curve.difference for curve in series(one, two, tip)}
-    widths = {name: np.zeros(len(common.time)) for name in gaps}
-    touches = {each.name: 0.0 for each in comparison.agreements if each.kind == "contact"}
+    gaps |= {a.name: np.array([a.max]) for a in comparison.agreements if a.kind == "contact"}
+    widths = {name: np.zeros(len(gap)) for name, gap in gaps.items()}
     ended = 0
     for trace in perturbed_runs(
         rerun, runs=runs, seed=seed, uncertain=uncertain, progress=progress
     ):
         ended += bool(trace.header.ended)
-        for name, far in _distances(one, trace, tip).items():
+        for name, far in _distances(one, trace, tip, comparison.until, common.one).items():
             if name in widths:
-                widths[name] = np.maximum(widths[name], far[common.one])
-        for name, gap in _first_touches(one, trace, comparison.until).items():
-            if name in touches:
-                touches[name] = max(touches[name], gap)
+                widths[name] = np.maximum(widths[name], far)
     reach = round(_WINDOW * (len(common.time) - 1))
     bands = []
     for found in comparison.agreements:
+        width, time = widths[found.name], common.time
         if found.kind == "contact":
-            bands.append(_of_touch(found, touches[found.name]))
-        else:
-            width = _widened(widths[found.name], reach)
-            bands.append(_band(found, gaps[found.name], width, common.time))
+            time = np.zeros(1)
+        else:  # the largest within some rows to either side
+            padded = np.pad(width, reach, mode="edge")
+            width = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
+        bands.append(_band(found, gaps[found.name], width, time))
     return ChaosFloor(runs, seed, ROUNDING, uncertain, ended, tuple(bands), common.time)
 
 
-def _distances(one: Trace, perturbed: Trace, tip: str) -> dict[str, Array]:
-    """How far a run is from `one` (n,), row by row; infinite where it has ended."""
+def _distances(
+    one: Trace, perturbed: Trace, tip: str, until: float, rows: Ints
+) -> dict[str, Array]:
+    """How far a run is from `one` in some of its rows; infinite where it has ended.
+
+    Of a first touch it is one number [s]: a touch that does not come has no time.
+    """
     found: dict[str, Array] = {}
     try:
-        curves, rows = series(one, perturbed, tip), common_moments(one, perturbed).one
+        curves, count = series(one, perturbed, tip), len(perturbed)
+        for touch in touches(one, perturbed):
+            first, other = touch.one.first, touch.two.first
+            gap = until if first is None or other is None else abs(first - other)
+            found[f"{touch.pair}, first touch"] = np.array([gap])
     except TraceError:  # it ended at once
-        curves, rows = series(one, one, tip), np.empty(0, dtype=np.int64)
+        curves, count = series(one, one, tip), 0
     for curve in curves:
         far = np.full(len(one), np.inf)
-        far[rows] = np.nan_to_num(curve.difference[: len(rows)], nan=np.inf)
-        found[curve.name] = far
+        far[:count] = np.nan_to_num(curve.difference[:count], nan=np.inf)
+        found[curve.name] = far[rows]
     return found
-
-
-def _first_touches(one: Trace, perturbed: Trace, until: float) -> dict[str, float]:
-    """How far apart each pair's first touches are [s]; a touch that does not come has no time."""
-    try:
-        compared = compare(one, perturbed)
-    except TraceError:
-        return {}
-    return {
-        each.name: each.max if not each.note else until
-        for each in compared.agreements
-        if each.kind == "contact"
-    }
-
-
-def _widened(width: Array, reach: int) -> Array:
-    """The largest (n,) within some rows to either side."""
-    padded = np.pad(width, reach, mode="edge")
-    return np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
 
 
 def _band(found: Agreement, gap: Array, width: Array, time: Array) -> FloorBand:
@@ -179,18 +168,4 @@ def _band(found: Agreement, gap: Array, width: Array, time: Array) -> FloorBand:
         inside_from=float(time[last]) if last < len(time) else None,
         beyond=bool((~(gap <= np.maximum(width, found.tolerance))).any()),
         width=width,
-    )
-
-
-def _of_touch(found: Agreement, spread: float) -> FloorBand:
-    inside = found.max <= spread
-    return FloorBand(
-        name=found.name,
-        kind=found.kind,
-        unit=found.unit,
-        most=spread,
-        end=spread,
-        inside_from=0.0 if inside else None,
-        beyond=not found.max <= max(spread, found.tolerance),
-        width=np.array([spread]),
     )

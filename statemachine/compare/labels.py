@@ -1,46 +1,59 @@
-"""What two sides are called: what tells them apart, the engine first, then file and options."""
+"""What two sides are called, and what makes a comparison less than one of two engines.
+
+They are called by what tells them apart: the engine first, then file and options.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..runs import Header
+from ..measures import SAME, Common
+from ..measures.text import milliseconds, numbers, significant
+from ..runs import Header, Trace
+from .series import joint_columns, tell
 
 Two = tuple[str, str]
+# Columns that are compared, and what a page calls them.
+_COMPARED = {
+    "site_xpos": "fingertip",
+    "site_xmat": "fingertip",
+    "energy": "energy",
+    "contact_row": "contacts",
+    "contact_force": "contact forces",
+}
 
 
-@dataclass(frozen=True)
-class Labels:
+class Labels(NamedTuple):
     """Names of two sides; those of one kind are never the same.
 
     Attributes:
         long: For headings; engine and version where these differ.
         short: For tables and sentences.
-        told: Whether something tells them apart; else they are the first and the second.
     """
 
     long: Two
     short: Two
-    told: bool = True
 
 
 def labels_of(one: Header, two: Header) -> Labels:
     """The names of two runs."""
     engines = one.label, two.label
     others = list(_apart(one, two))
-    ways = one.backend + _way(one), two.backend + _way(two)
+    backends = one.backend, two.backend
+    own = [", engine defaults" * (header.defaults == "engine") for header in (one, two)]
+    ways = backends[0] + own[0], backends[1] + own[1]
     if one.backend != two.backend:
-        short = one.backend, two.backend
+        short = backends
     elif ways[0] != ways[1]:
         short = ways
     else:
         short = next(iter(others), engines if engines[0] != engines[1] else ways)
-    long = _joined([*([engines] if engines[0] != engines[1] or not others else []), *others])
-    return Labels(_numbered(long), _numbered(short), short[0] != short[1])
+    parts = [*([engines] if engines[0] != engines[1] or not others else []), *others]
+    long = ", ".join(part[0] for part in parts), ", ".join(part[1] for part in parts)
+    return Labels(_numbered(long), _numbered(short))
 
 
 def files_apart(one: Sequence[str], two: Sequence[str]) -> Two:
@@ -114,14 +127,115 @@ def _with_known(header: Header, other: Header) -> dict[str, Any]:
     return {**header.options, **{name: known[name] for name in missing}}
 
 
-def _way(header: Header) -> str:
-    return ", engine defaults" if header.defaults == "engine" else ""
-
-
-def _joined(parts: Sequence[Two]) -> Two:
-    return ", ".join(part[0] for part in parts), ", ".join(part[1] for part in parts)
-
-
 def _numbered(names: Two) -> Two:
     """Two that are alike, with their places."""
     return names if names[0] != names[1] else (f"{names[0]} (first)", f"{names[1]} (second)")
+
+
+def notes_on(one: Trace, two: Trace, common: Common, of_quantities: Iterable[str]) -> Iterator[str]:
+    """A line for each thing that a reader of the figures must know.
+
+    Args:
+        one: A trace.
+        two: The other.
+        common: The moments that they share.
+        of_quantities: What is to be said of single quantities.
+    """
+    a, b = one.header, two.header
+    labels = labels_of(a, b).long
+    if a.provenance.model_sha256 != b.provenance.model_sha256:
+        yield (
+            f"the models are two: {a.provenance.model_file} and {b.provenance.model_file} "
+            "have other digests"
+        )
+    yield from _of_joints(one, two)
+    yield from _of_columns(one, two)
+    yield from of_quantities
+    if a.experiment != b.experiment:
+        yield f"the experiments are two: {a.experiment} and {b.experiment}"
+    yield from _of_time(one, two, common)
+    if not np.allclose(a.gravity, b.gravity, rtol=0, atol=1e-12):
+        yield f"gravity differs: {numbers(a.gravity)} and {numbers(b.gravity)} m/s²"
+    if any(header.defaults == "engine" and header.energy_by for header in (a, b)):
+        yield (
+            "energy is measured by one yardstick on both sides, masses, armature and gravity of "
+            f"the model ({a.energy_by or b.energy_by}), whatever an engine itself has"
+        )
+    if a.actuators != b.actuators:
+        yield "the actuators differ, in name or in order"
+    elif _commands_differ(one, two, common):
+        yield "the commands differ: the controllers saw different states, or are two"
+    for header, label in zip((a, b), labels, strict=True):
+        if header.ended:
+            yield f"{label} ended early: {header.ended}"
+        if header.rewritten:
+            yield (
+                f"{label}: in {header.rewritten} rows the state was written, by the "
+                "controller; that is no part of the commands"
+            )
+        if header.single:
+            yield (
+                f"the recorded run of {header.backend} keeps all but its state in single precision"
+            )
+
+
+def _of_joints(one: Trace, two: Trace) -> Iterator[str]:
+    a, b = one.header, two.header
+    labels = labels_of(a, b).long
+    only = [
+        f"{name} ({label})"
+        for header, other, label in ((a, b, labels[0]), (b, a, labels[1]))
+        for name in header.joint_labels
+        if name not in other.joint_labels
+    ]
+    if only:
+        yield f"compared is what both have; missing on one side: {', '.join(only)}"
+    shared = {
+        name: [joint_columns(header, name) for header in (a, b)]
+        for name in a.joint_labels
+        if name in b.joint_labels
+    }
+    other = [name for name, (x, y) in shared.items() if x.kind is not y.kind]
+    if other:
+        yield f"not compared, for they are joints of another kind: {', '.join(other)}"
+    if any(
+        not np.array_equal(one.qpos[0, x.qpos], two.qpos[0, y.qpos])
+        or not np.array_equal(one.qvel[0, x.qvel], two.qvel[0, y.qvel])
+        for x, y in shared.values()
+        if x.kind is y.kind
+    ):
+        yield "the runs do not start in the same state"
+
+
+def _of_columns(one: Trace, two: Trace) -> Iterator[str]:
+    missing = dict.fromkeys(
+        what
+        for column, what in _COMPARED.items()
+        if not tell(one, two, column) and (column in one or column in two)
+    )
+    if missing:
+        yield f"not compared, for one side does not tell it: {', '.join(missing)}"
+
+
+def _of_time(one: Trace, two: Trace, common: Common) -> Iterator[str]:
+    steps = [trace.header.timestep for trace in (one, two)]
+    if steps[0] != steps[1]:
+        apart = float(common.time[-1]) / max(1, len(common.time) - 1)
+        yield (
+            f"timesteps differ, {significant(1000 * steps[0])} and {milliseconds(steps[1])}, and "
+            f"meet every {milliseconds(apart, 3)}: compared are these common moments alone, "
+            "nothing is interpolated, and a peak between two of them is not seen"
+        )
+    ends = [float(trace.time[-1] - trace.time[0]) for trace in (one, two)]
+    if abs(ends[0] - ends[1]) > max(steps) * (1 + SAME):
+        longer = labels_of(one.header, two.header).long[ends[1] > ends[0]]
+        yield (
+            f"the runs are {ends[0]:g} and {ends[1]:g} s long: what {longer} does after "
+            f"{common.time[-1]:g} s is not compared"
+        )
+
+
+def _commands_differ(one: Trace, two: Trace, common: Common) -> bool:
+    # The command of a last row is never carried out.
+    used = (common.one < len(one) - 1) & (common.two < len(two) - 1)
+    return not np.array_equal(one.ctrl[common.one[used]], two.ctrl[common.two[used]])

@@ -173,8 +173,7 @@ def _put(
     data.qvel[:] = matched.qvel(state["qvel"], data.qvel)
     data.ctrl[:] = matched.ctrl(state["ctrl"], data.ctrl)
     data.time = state.time
-    reader.prime(1, data, before)
-    return reader.primes(1)
+    return reader.prime(1, data, before)
 
 
 def _taken(

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..interface import Array, Data, JointType, Model
+from ..measures import amount
 from ..rotations import times
 from ..runs import Trace, record
 from ..runs.drive import Progress, part_of, silent
@@ -18,8 +19,6 @@ from .matching import start_of
 
 RUNS = 4
 ROUNDING = 1e-12  # of a value, or of 1 where it is less; some thousand times that of a float64
-_UNITS = {"mm": ("length", 1e-3), "cm": ("length", 1e-2), "m": ("length", 1.0)}
-_UNITS |= {"deg": ("angle", np.pi / 180), "rad": ("angle", 1.0)}
 
 
 @dataclass(frozen=True)
@@ -46,17 +45,10 @@ def parse_uncertainty(words: Iterable[str]) -> Uncertainty:
     """
     found: dict[str, float] = {}
     for word in words:
-        # The longer suffix first: "1mm" ends with "m", too.
-        suffix = next((s for s in sorted(_UNITS, key=len)[::-1] if word.endswith(s)), "")
-        kind, scale = _UNITS.get(suffix, ("", 0.0))
-        try:
-            value = float(word.removesuffix(suffix)) * scale
-        except ValueError:
-            value = float("nan")
-        if not suffix or not 0 < value < np.inf:
-            raise BadInputError(
-                f"an uncertainty reads like 0.1mm or 0.1deg ({', '.join(_UNITS)}); got {word!r}"
-            )
+        value, unit = amount(word)
+        kind = {"m": "length", "rad": "angle"}.get(unit)
+        if kind is None or np.isnan(value):
+            raise BadInputError(f"an uncertainty reads like 0.1mm or 0.1deg; got {word!r}")
         if kind in found:
             raise BadInputError(f"the {kind} that is uncertain is given twice: {word!r}")
         found[kind] = value

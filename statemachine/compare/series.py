@@ -1,17 +1,22 @@
-"""What two traces are compared by: curves of both sides over common time."""
+"""What two traces are compared by: curves of both sides over common time, and who touches whom."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..interface import Array, JointType, usual_site
-from ..measures import QUANTITIES, Common, common_moments, same_pairs
+from ..interface import Array, Ints, JointType, usual_site
+from ..measures import QUANTITIES, SAME, common_moments, distances, same_pairs
 from ..rotations import angle_between, matrix_from_quat
 from ..runs import Header, Trace
 
 NORMAL = ", normal force"  # after a pair of bodies: the sum over its contacts
+SETTLED = 0.1  # share of the common time, at its end, that "settled" is taken over
+Sides = Sequence[tuple[Trace, Ints]]  # each run, and its rows at the common moments
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +45,27 @@ class Series:
         return QUANTITIES[self.kind].unit
 
 
+class JointColumns(NamedTuple):
+    """What a joint is, and its columns in qpos and in qvel."""
+
+    kind: JointType
+    qpos: slice
+    qvel: slice
+
+
+def joint_columns(header: Header, name: str) -> JointColumns:
+    """Those of a joint that a run has, by its label."""
+    number = header.joint_labels.index(name)
+    kind = JointType(header.jnt_type[number])
+    qpos, dof = header.jnt_qposadr[number], header.jnt_dofadr[number]
+    return JointColumns(kind, slice(qpos, qpos + kind.nq), slice(dof, dof + kind.nv))
+
+
+def at_the_end(time: Array) -> NDArray[np.bool_]:
+    """Which moments (n,) are among the last tenth of the time."""
+    return time >= time[-1] - SETTLED * (time[-1] - time[0])
+
+
 def series(one: Trace, two: Trace, tip: str | None = None) -> list[Series]:
     """All curves that both traces have: joints, fingertip, free bodies, energy, forces.
 
@@ -48,31 +74,64 @@ def series(one: Trace, two: Trace, tip: str | None = None) -> list[Series]:
         two: Another, of a model with the same names.
         tip: The site to compare; by default `default_tip`.
     """
-    common = common_moments(one, two)
+    common = common_moments(one.time, two.time, (one.timestep, two.timestep))
+    time, sides = common.time, ((one, common.one), (two, common.two))
     found: list[Series] = []
     theirs = two.header.joint_labels
-    for place, name in enumerate(one.header.joint_labels):
+    for name in one.header.joint_labels:
         if name in theirs:
-            found += _joint(name, (place, theirs.index(name)), one, two, common)
+            found += _joint(name, time, sides)
     site = default_tip(one.header, two.header) if tip is None else tip
     if site and tell(one, two, "site_xpos") and tell(one, two, "site_xmat"):
-        found += _site(site, one, two, common)
+        (p, r), (q, s) = ([part[rows] for part in trace.site(site)] for trace, rows in sides)
+        found.append(_curve(f"{site}, position", "tip", time, p, q))
+        found.append(_turned(f"{site}, rotation", "tip rotation", time, r, s))
     if tell(one, two, "energy"):
-        totals = [
-            trace["energy"].sum(axis=1)[rows]
-            for trace, rows in ((one, common.one), (two, common.two))
-        ]
-        found.append(_scalar("energy", "energy", common, totals[0], totals[1]))
-    if not tell(one, two, "contact_force"):
-        return found
-    forces = [normal_forces(one), normal_forces(two)]
-    forces[1] = same_pairs(forces[0], forces[1])
-    for pair in dict.fromkeys([*forces[0], *forces[1]]):
-        values = [
-            force.get(pair, np.zeros(len(trace)))[rows]
-            for force, trace, rows in zip(forces, (one, two), (common.one, common.two), strict=True)
-        ]
-        found.append(_scalar(f"{pair}{NORMAL}", "force", common, values[0], values[1]))
+        totals = (trace["energy"].sum(axis=1)[rows] for trace, rows in sides)
+        found.append(_curve("energy", "energy", time, *totals))
+    if tell(one, two, "contact_force"):
+        forces = [normal_forces(one), normal_forces(two)]
+        forces[1] = same_pairs(forces[0], forces[1])
+        for pair in dict.fromkeys([*forces[0], *forces[1]]):
+            values = (
+                force.get(pair, np.zeros(len(trace)))[rows]
+                for force, (trace, rows) in zip(forces, sides, strict=True)
+            )
+            found.append(_curve(f"{pair}{NORMAL}", "force", time, *values))
+    return found
+
+
+def _curve(name: str, kind: str, time: Array, one: Array, two: Array) -> Series:
+    """Numbers (n,), or vectors (n, k)."""
+    apart = np.abs(one - two) if one.ndim == 1 else distances(one, two)
+    return Series(name, kind, time, one, two, apart)
+
+
+def _turned(name: str, kind: str, time: Array, one: Array, two: Array) -> Series:
+    """Rotation matrices (n, 3, 3)."""
+    none = np.empty(0)
+    return Series(name, kind, time, none, none, angle_between(one, two))
+
+
+def _joint(name: str, time: Array, sides: Sides) -> list[Series]:
+    """A number for a hinge or a slide; position and rotation for a free body."""
+    joints = [joint_columns(trace.header, name) for trace, _ in sides]
+    kind = joints[0].kind
+    if kind is not joints[1].kind:
+        return []
+    values = [t.qpos[rows, joint.qpos] for (t, rows), joint in zip(sides, joints, strict=True)]
+    if kind in (JointType.HINGE, JointType.SLIDE):
+        what = "joint" if kind is JointType.HINGE else "slide"
+        return [_curve(name, what, time, *(each[:, 0] for each in values))]
+    found = []
+    if kind is JointType.FREE:
+        found.append(_curve(f"{name}, position", "body", time, *(each[:, :3] for each in values)))
+    with np.errstate(invalid="ignore"):  # all zero is no rotation: NaN, which never agrees
+        turned = (
+            matrix_from_quat(q[:, -4:] / np.linalg.norm(q[:, -4:], axis=1, keepdims=True))
+            for q in values
+        )
+        found.append(_turned(f"{name}, rotation", "body rotation", time, *turned))
     return found
 
 
@@ -131,47 +190,76 @@ def tell(one: Trace, two: Trace, column: str) -> bool:
     return True
 
 
-def _scalar(name: str, kind: str, common: Common, one: Array, two: Array) -> Series:
-    return Series(name, kind, common.time, one, two, np.abs(one - two))
+@dataclass(frozen=True)
+class Contact:
+    """One pair of bodies on one side, over the time that both runs have.
+
+    Attributes:
+        first: When they first touch [s from the start]; None if never.
+        last: When they last touch.
+        share: Of the moments, in how many they touch, 0 to 1.
+        force: Mean of the summed normal forces over the last tenth of the run [N].
+        total: The same of the length of the whole force, friction and all, added as vectors.
+        ends: Whether they touch at the last moment.
+        deepest: How far one shape is in the other at most [m]; deepest_at: when [s].
+    """
+
+    first: float | None
+    last: float | None
+    share: float
+    force: float
+    ends: bool
+    total: float
+    deepest: float
+    deepest_at: float
 
 
-def _joint(
-    name: str, places: tuple[int, int], one: Trace, two: Trace, common: Common
-) -> list[Series]:
-    kinds = [trace.header.jnt_type[place] for trace, place in zip((one, two), places, strict=True)]
-    if kinds[0] != kinds[1]:
-        return []
-    kind = JointType(kinds[0])
-    values = []
-    for trace, place, rows in zip((one, two), places, (common.one, common.two), strict=True):
-        start = trace.header.jnt_qposadr[place]
-        values.append(trace.qpos[rows, start : start + kind.nq])
-    a, b = values
-    if kind in (JointType.HINGE, JointType.SLIDE):
-        what = "joint" if kind is JointType.HINGE else "slide"
-        return [_scalar(name, what, common, a[:, 0], b[:, 0])]
-    found = []
-    if kind is JointType.FREE:
-        apart = np.linalg.norm(a[:, :3] - b[:, :3], axis=1)
-        label = f"{name}, position"
-        found.append(Series(label, "body", common.time, a[:, :3], b[:, :3], apart))
-    with np.errstate(invalid="ignore"):  # all zero is no rotation: NaN, which never agrees
-        turned = [
-            matrix_from_quat(q[:, -4:] / np.linalg.norm(q[:, -4:], axis=1, keepdims=True))
-            for q in (a, b)
-        ]
-    angle = angle_between(*turned)
-    none = np.empty((0,))
-    found.append(Series(f"{name}, rotation", "body rotation", common.time, none, none, angle))
+@dataclass(frozen=True)
+class Touch:
+    """One pair of bodies on both sides."""
+
+    pair: str
+    one: Contact
+    two: Contact
+
+
+def touches(one: Trace, two: Trace) -> tuple[Touch, ...]:
+    """Every pair of bodies that touches on either side; none if a trace does not tell."""
+    if "contact_row" not in one or "contact_row" not in two:
+        return ()
+    until = float(common_moments(one.time, two.time, (one.timestep, two.timestep)).time[-1])
+    sides = [_of(trace, until) for trace in (one, two)]
+    sides[1] = same_pairs(*sides)
+    never = Contact(None, None, 0.0, 0.0, False, 0.0, 0.0, 0.0)
+    return tuple(
+        Touch(pair, sides[0].get(pair, never), sides[1].get(pair, never))
+        for pair in dict.fromkeys([*sides[0], *sides[1]])
+    )
+
+
+def _of(trace: Trace, until: float) -> dict[str, Contact]:
+    """Contacts by pair of bodies, up to a moment [s from the start]."""
+    time = trace.time - trace.time[0]
+    time = time[time <= until + SAME * trace.header.timestep]
+    tail = np.flatnonzero(time >= until * (1 - SETTLED) - SAME * trace.header.timestep)
+    forces, totals = normal_forces(trace), total_forces(trace)
+    found = {}
+    for pair, touching in trace.touches().items():
+        rows = touching[: len(time)].nonzero()[0]
+        if not len(rows):
+            continue
+        places = trace.contact_pairs[pair]
+        places = places[trace["contact_row"][places] < len(time)]
+        distance = np.nan_to_num(trace["contact_dist"][places])
+        deepest = int(np.argmin(distance))
+        found[pair] = Contact(
+            first=float(time[rows[0]]),
+            last=float(time[rows[-1]]),
+            share=len(rows) / len(time),
+            force=float(np.nan_to_num(forces[pair][tail]).mean()),
+            ends=bool(rows[-1] == len(time) - 1),
+            total=float(np.nan_to_num(totals[pair][tail]).mean()),
+            deepest=max(0.0, -float(distance[deepest])),
+            deepest_at=float(time[trace["contact_row"][places[deepest]]]),
+        )
     return found
-
-
-def _site(name: str, one: Trace, two: Trace, common: Common) -> list[Series]:
-    (p, r), (q, s) = one.site(name), two.site(name)
-    p, r, q, s = p[common.one], r[common.one], q[common.two], s[common.two]
-    none = np.empty((0,))
-    angle = angle_between(r, s)
-    return [
-        Series(f"{name}, position", "tip", common.time, p, q, np.linalg.norm(p - q, axis=1)),
-        Series(f"{name}, rotation", "tip rotation", common.time, none, none, angle),
-    ]

@@ -1,136 +1,300 @@
-"""From what was asked for to two traces: run, opened, or played on the other engine."""
+"""What to compare, as it was asked for: what is run, and the sides that it is run on.
+
+A side is a file, an engine, its defaults, and options.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, Literal
 
 from ..backends import backend_names, load
-from ..errors import BadInputError, MissingEngineError, StateMachineError, unknown_name
-from ..installed import DEFAULT
-from ..measures.text import command
-from ..runs import Trace, model_file, play, read, record_scenario, shipped
-from ..runs.drive import Progress, part_of, silent
-from ..runs.scenarios import SCENARIOS, scenario
-from .request import Request, is_trace
-from .two_sides import run_sides
+from ..errors import BadInputError, StateMachineError, shown, unknown_name
+from ..installed import DEFAULT, PAIR
+from ..interface import OPTIONS, Model
+from ..measures.text import listed
+from ..models import SUFFIXES as MODELS
+from ..models import resolve
+from ..runs.controllers import function_scenario, is_function
+from ..runs.files import SUFFIXES
+from ..runs.scenarios import SCENARIOS, Scenario, scenario
+from .labels import typed_option
+
+_OPTION = re.compile(r"[A-Za-z_]+=\S*")
+_LAST_OPTION = re.compile(rf"\s+({_OPTION.pattern})\s*$")
+_ENGINE = re.compile(r"[\w-]+(:\w*)?")
+_SWITCHES = {"on": True, "off": False, "true": True, "false": False}
 
 
-def sides_of(
-    request: Request | str, progress: Progress = silent
-) -> tuple[tuple[Trace, Trace], tuple[str, ...]]:
-    """The two traces that a request is about, and a line for each thing that stood in.
+@dataclass(frozen=True)
+class Side:
+    """What one side of a comparison is.
 
-    An experiment runs on both backends. Where one has no engine here, its recorded trace
-    takes its place, if the request is one that was recorded. Two traces are opened; the
-    ctrl of one is played on the other engine.
+    Attributes:
+        file: A name or a file, as `load` takes it.
+        engine: The backend to run it on.
+        defaults: "model", or "engine" for the engine as its own users meet it.
+        options: As `Model.replace` takes them.
+        menagerie: A menagerie folder to look the name up in.
+    """
+
+    file: str
+    engine: str = DEFAULT
+    defaults: Literal["model", "engine"] = "model"
+    options: Mapping[str, Any] = field(default_factory=dict)
+    menagerie: str | None = None
+
+    @property
+    def path(self) -> Path:
+        """Its file; raises as `models.resolve` does."""
+        return resolve(self.file, self.menagerie)
+
+    @property
+    def label(self) -> str:
+        """As one types it, without folders: "so101@mujoco timestep=0.002"."""
+        file = Path(self.file).name if Path(self.file).is_file() else self.file
+        way = ":engine" if self.defaults == "engine" else ""
+        options = (typed_option(name, value) for name, value in self.options.items())
+        return " ".join([f"{file}@{self.engine}{way}", *options])
+
+    def load(self, **options: Any) -> Model:
+        """The Model; `options` are those of an experiment, over which its own win.
+
+        Raises:
+            StateMachineError: As `load` does.
+        """
+        return load(
+            self.file,
+            backend=self.engine,
+            defaults=self.defaults,
+            menagerie=self.menagerie,
+            **{**options, **self.options},
+        )
+
+
+def parse_sides(words: Iterable[str], menagerie: str | None = None) -> list[Side]:
+    """Sides from words: FILE, FILE@ENGINE, FILE@ENGINE:engine, each with options behind it.
+
+    An option, such as timestep=0.002, stands in the word of its side or in one of its own
+    after it.
+
+    Args:
+        words: As typed.
+        menagerie: A menagerie folder to look names up in.
 
     Raises:
-        UnknownNameError: No such experiment or backend.
-        MissingEngineError: An engine is missing, and nothing was recorded of this.
-        TraceError: A file is no trace.
+        UnknownNameError: No such model, engine or option.
+        ModelFileError: A file is not there.
+        BadInputError: An option stands before any side, or has no value.
     """
-    if isinstance(request, str):
-        request = Request((request,))
-    if request.sides:
-        run = run_sides(request, progress)
-        return (run.left, run.right), run.said
-    if not 1 <= len(request.what) <= 2:
-        raise BadInputError("compare takes one experiment, or one or two traces")
-    if request.is_traces:
-        return _of_traces(request, progress)
-    if len(request.what) == 2:
-        raise BadInputError(
-            "compare takes one experiment: it runs on both engines; two traces are files"
-        )
-    what = request.what[0]
-    if what not in SCENARIOS and Path(what).is_file():
-        raise BadInputError(f"{what!r} is no trace: a trace ends in .npz or .parquet")
-    scenario(what)
-    for name in request.backends:
-        if name not in backend_names():
-            raise unknown_name("backend", name, backend_names())
-    said: list[str] = []
-    traces = [
-        _run(request, name, said, part_of(progress, 0.5 * k, 0.5))
-        for k, name in enumerate(request.backends)
-    ]
-    if all(trace.header.recorded for trace in traces):
-        raise MissingEngineError("no engine of the two is installed here", engine=DEFAULT)
-    return (traces[0], traces[1]), tuple(said)
+    sides: list[Side] = []
+    for word in words:
+        texts = [word]
+        if Path(word).exists() or not _OPTION.fullmatch(word):
+            name, texts = _split_options(word)
+            sides.append(_side(name, menagerie))
+        if not sides:
+            raise BadInputError(f"{word} stands before any side: type FILE@ENGINE {word}")
+        options = dict(sides[-1].options)
+        for text in texts:
+            name, value = _option(text)
+            if name in options:
+                raise BadInputError(f"{name} is given twice for {sides[-1].file}")
+            options[name] = value
+        sides[-1] = replace(sides[-1], options=options)
+    return sides
 
 
-def _run(request: Request, backend: str, said: list[str], progress: Progress) -> Trace:
-    asked = scenario(request.what[0])
+def _split_options(word: str) -> tuple[str, list[str]]:
+    """A side's word, and the options behind it; a file's name may have spaces."""
+    texts: list[str] = []
+    while not Path(word).exists() and (found := _LAST_OPTION.search(word)):
+        texts.insert(0, found[1])
+        word = word[: found.start()]
+    return word.strip(), texts
+
+
+def _side(word: str, menagerie: str | None) -> Side:
+    file, engine, defaults = word, DEFAULT, "model"
+    before, sign, after = word.rpartition("@")
+    if sign and before and _ENGINE.fullmatch(after) and not Path(word).exists():
+        file = before
+        engine, colon, defaults = after.partition(":")
+        if engine not in backend_names():
+            raise unknown_name("engine", engine, backend_names())
+        if colon and defaults != "engine":
+            raise unknown_name(f"way to load a file on {engine}", defaults, ("engine",))
+    elif not Path(word).exists():
+        _refuse_mistyped(word)
+    side = Side(file, engine, "engine" if defaults == "engine" else "model", {}, menagerie)
+    side.path  # noqa: B018  (raises for what is no file)
+    return side
+
+
+def _refuse_mistyped(word: str) -> None:
+    """Refuse a word of which it is plain what was meant.
+
+    Raises:
+        BadInputError: It reads as FILE@, FILE:ENGINE, FILE,FILE or the name of an option.
+    """
+    parts = word.split(",")
+    if word.endswith("@") and len(word) > 1:
+        raise BadInputError(f"{word} names no engine: type {word}{DEFAULT}, or {word[:-1]}")
+    before, _, after = word.rpartition(":")
+    if before and after in backend_names():
+        raise BadInputError(f"an engine stands behind an @: type {before}@{after}")
+    if len(parts) == 2 and all(parts) and not word.endswith(("/", "\\")):
+        raise BadInputError(f"two sides are two words: type {' '.join(parts)}")
+    if word in OPTIONS:
+        raise BadInputError(f"{word} is an option of a side: type {word}=VALUE")
+
+
+def _option(text: str) -> tuple[str, Any]:
+    name, _, given = text.partition("=")
+    if name not in OPTIONS:
+        raise unknown_name("option", name, OPTIONS)
+    if not given:
+        raise BadInputError(f"{name}= has no value")
+    if given.lower() in _SWITCHES:
+        return name, _SWITCHES[given.lower()]
+    if name == "integrator":
+        return name, given
     try:
-        model = load(
-            request.model or asked.model,
-            backend=backend,
-            defaults=request.defaults,
-            menagerie=request.menagerie,
+        numbers = [float(number) for number in given.split(",")]
+    except ValueError:
+        raise BadInputError(
+            f"{name}={shown(given)[1:-1]} is no value: numbers, with commas between, or on or off"
+        ) from None
+    if len(numbers) > 1:
+        return name, numbers
+    number = numbers[0]
+    return name, int(number) if name == "substeps" and number.is_integer() else number
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to compare.
+
+    Attributes:
+        what: Name of an experiment, FILE.py:FUNCTION, or one or two files of traces.
+        backends: The two engines; of one trace the second that is not its own.
+        defaults: What `load` is given.
+        model: Instead of the experiment's own; menagerie: where its name is looked up.
+        seconds: Instead of the experiment's own time [s].
+        seed: Of an experiment that draws something.
+        options: For `Model.replace`, on both sides.
+        sides: The two sides, instead of backends, defaults and model; empty for those.
+        names: Joints, bodies, sites and actuators of the left that go by other names on the
+            right.
+        every: Steps for which what a FUNCTION returns holds.
+        keyframe: Where a FUNCTION starts; None for the default state.
+    """
+
+    what: Sequence[str]
+    backends: tuple[str, str] = PAIR
+    defaults: Literal["model", "engine"] = "model"
+    model: str | None = None
+    menagerie: str | None = None
+    seconds: float | None = None
+    seed: int = 0
+    options: dict[str, Any] = field(default_factory=dict)
+    sides: tuple[Side, ...] = ()
+    names: Mapping[str, str] = field(default_factory=dict)
+    every: int = 1
+    keyframe: str | None = None
+
+    @property
+    def is_traces(self) -> bool:
+        """Whether files were named, not an experiment."""
+        return any(map(is_trace, self.what))
+
+    def scenario(self) -> Scenario:
+        """What is run: an experiment of ours, or the function of the user's.
+
+        Raises:
+            UnknownNameError: There is no such experiment.
+            BadInputError: There is no such function, or its file fails.
+        """
+        (what,) = self.what
+        if not is_function(what):
+            return scenario(what)
+        return function_scenario(what, self.every, self.keyframe)
+
+
+def is_trace(word: str) -> bool:
+    """Whether a word names a trace, by its suffix."""
+    return Path(word).suffix.lower() in SUFFIXES
+
+
+def split_words(
+    words: Sequence[str], menagerie: str | None = None
+) -> tuple[tuple[str, ...], tuple[Side, ...]]:
+    """What is to be run, and the two sides; no sides where only the first was said.
+
+    Args:
+        words: As typed behind `compare`.
+        menagerie: A menagerie folder to look names up in.
+
+    Raises:
+        BadInputError: Sides without an experiment, one side, or more than two.
+        StateMachineError: As `parse_sides` does.
+    """
+    what, rest = tuple(words[:1]), words[1:]
+    runs = bool(what) and (what[0] in SCENARIOS or is_trace(what[0]) or is_function(what[0]))
+    is_side = bool(what) and not runs and _is_side(what[0], menagerie)
+    files = [word for word in rest if _is_file(word)]
+    traces = [word for word in rest if is_trace(word)]
+    if files and traces:
+        raise BadInputError(
+            f"{traces[0]} is a recorded run, not a side; it is played on two sides as in: "
+            f"statemachine compare {traces[0]} {files[0]} {_another([Side(files[0])])}"
         )
-    except MissingEngineError as error:
-        if not request.plain:
-            raise
-        try:
-            trace = shipped(asked.name, backend, request.defaults)
-        except StateMachineError:
-            raise error from None
-        said.append(f"{error}; its side is the recorded run that comes with the package")
-        return trace
-    return record_scenario(
-        asked,
-        model,
-        seconds=request.seconds,
-        seed=request.seed,
-        command=request.typed(backend),
-        defaults=request.defaults,
-        options=request.options,
-        progress=progress,
-    )
+    if files and not runs and not is_side:
+        raise unknown_name("experiment", what[0] if what else "", SCENARIOS)
+    if traces or any(word in SCENARIOS for word in rest) or not (runs or is_side):
+        return tuple(words), ()  # two traces, or nothing that can be compared
+    if is_side:
+        typed = " ".join(f"'{word}'" if " " in word else word for word in words)
+        named = " ".join(word for word in words if "=" not in word)
+        raise BadInputError(
+            f"two sides need something to do first: statemachine compare hold {typed} runs an "
+            f"experiment ({', '.join(SCENARIOS)}) or FILE.py:FUNCTION on both; "
+            f"statemachine compare --models {named} lists what the files differ in"
+        )
+    sides = tuple(parse_sides(rest, menagerie))
+    if len(sides) == 2 or not (sides or is_function(what[0])):
+        return what, sides
+    typed = f"statemachine compare {what[0]} {sides[0].label if sides else 'so101@mujoco'}"
+    if len(sides) > 2:
+        raise BadInputError(
+            f"{len(sides)} sides, {listed([side.label for side in sides])}: compare takes two"
+        )
+    said = "one side only: name the other" if sides else f"{what[0]} runs on two sides"
+    raise BadInputError(f"{said}, as in: {typed} {_another(sides)}")
 
 
-def _of_traces(request: Request, progress: Progress) -> tuple[tuple[Trace, Trace], tuple[str, ...]]:
-    for word in request.what:
-        if not is_trace(word):
-            hint = " (an experiment runs on both engines alone)" if word in SCENARIOS else ""
-            raise BadInputError(f"{word!r} is no trace{hint}: a trace ends in .npz or .parquet")
-    opened = [read(word) for word in request.what]
-    refused = {
-        "seconds": request.seconds is not None,
-        "seed": request.seed != 0,
-        "timestep": len(opened) == 2 and "timestep" in request.options,
-        "defaults": len(opened) == 2 and request.defaults != "model",
-    }
-    for name, given in refused.items():
-        if given:
-            raise BadInputError(f"--{name} is of a run, and a trace is a run that was made")
-    if len(opened) == 2:
-        return (opened[0], opened[1]), ()
-    (trace,) = opened
-    others = [name for name in request.backends if name != trace.header.backend]
-    if not others:
-        raise BadInputError(f"the trace is of {trace.header.backend}: name another with --backends")
-    name: str | Path | None = request.model
-    if name is None:
-        name, _ = model_file(trace.header, request.menagerie, request.what[0])
-    model = load(
-        name,
-        backend=others[0],
-        defaults=request.defaults,
-        menagerie=request.menagerie if request.model else None,
-    )
-    options = {**trace.header.options, **request.options}
-    if options:
-        model = model.replace(**options)
-    played = play(
-        trace,
-        model,
-        command=command(["statemachine", "trace", "play", request.what[0], "--backend", others[0]]),
-        defaults=request.defaults,
-        options=options,
-        progress=progress,
-    )
-    said = (
-        f"the ctrl of {request.what[0]} was played on {others[0]}, from the state it starts in",
-    )
-    return (trace, played), said
+def _is_file(word: str) -> bool:
+    """Whether a word names a model's file, by its suffix."""
+    return Path(word.split("@", maxsplit=1)[0]).suffix.lower() in MODELS
+
+
+def _is_side(word: str, menagerie: str | None) -> bool:
+    """Whether a word is meant as a side: it names a model, or reads as if it did."""
+    if _is_file(word):
+        return True
+    try:
+        return bool(parse_sides([word], menagerie))
+    except StateMachineError:
+        return False
+
+
+def _another(sides: Sequence[Side]) -> str:
+    """An example of the side that is missing."""
+    if not sides:
+        return "so101@pybullet"
+    side = sides[0]
+    other = next(name for name in reversed(PAIR) if name != side.engine)
+    return f"{Path(side.file).name}@{other}"

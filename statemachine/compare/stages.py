@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,22 +47,23 @@ class StageGroup:
     size: int = 1
 
     def apart(self, one: Array, two: Array) -> Array:
-        """How far apart the elements (k,) are; NaN where one of them is not told."""
+        """How far apart the elements (n, k) are at n moments; NaN where one is not told."""
+        shape = len(one), len(self.names), self.size
         if self.size == 9:
-            return angle_between(one.reshape(-1, 3, 3), two.reshape(-1, 3, 3))
-        return np.linalg.norm((one - two).reshape(-1, self.size), axis=1)
+            return angle_between(one.reshape(*shape[:2], 3, 3), two.reshape(*shape[:2], 3, 3))
+        return np.linalg.norm((one - two).reshape(shape), axis=2)
 
-    def largest(self, one: Array, two: Array) -> float:
-        """The largest of all elements; of places how far they reach, of rotations one radian."""
+    def largest(self, one: Array, two: Array) -> Array:
+        """The largest of all elements (n,); of places their reach, of rotations one radian."""
         if self.size == 9:
-            return 1.0
-        both = np.concatenate([one, two]).reshape(-1, self.size)
+            return np.ones(len(one))
+        both = np.concatenate([one, two], axis=1).reshape(len(one), -1, self.size)
         if self.size == 3:
-            return float(np.linalg.norm(np.ptp(both, axis=0))) if len(both) else 0.0
-        return float(np.nanmax(np.abs(both), initial=0.0))
+            return np.array([float(np.linalg.norm(reach)) for reach in np.ptp(both, axis=1)])
+        return np.nanmax(np.abs(both[:, :, 0]), axis=1, initial=0.0)
 
 
-Touching = dict[str, tuple[float, Array]]  # by pair: how deep [m], and the force (3,) [N]
+Touching = dict[str, Array]  # by pair (4,): how deep [m], and the force [N]
 Reading = tuple[list[Array], Touching]
 
 
@@ -119,21 +120,20 @@ class StageReader:
             for unit, chosen in ((units[0], turns), (units[1], ~turns))
         ]
 
-    def primes(self, side: int) -> str:
-        """What of the step before an engine takes; "" for nothing."""
-        own = self._parts[side]
-        return own.PRIMES if own else ""
+    def prime(self, side: int, data: Data, before: dict[str, Array]) -> str:
+        """Let a Data know of the step before, and say what of it its engine takes; "" for nothing.
 
-    def prime(self, side: int, data: Data, before: dict[str, Array]) -> None:
-        """Let a Data know of the step before; `before` are arrays of the other side."""
+        `before` are arrays of the other side.
+        """
         own, model = self._parts[side], self._models[side]
         if not own or not own.PRIMES:
-            return
+            return ""
         given = {}
         for name, values in before.items():
             given[name] = np.zeros(model.nv)
             given[name][self.dofs[side]] = values[self.dofs[1 - side]]
         own.prime(model, data, given)
+        return own.PRIMES
 
     def read(self, side: int, data: Data, qpos: Array) -> Reading:
         """The numbers of all groups but the last, and the contacts.
@@ -182,38 +182,31 @@ class StageReader:
         return np.array(spots).ravel(), np.array(turns).ravel()
 
     def _touching(self, side: int, data: Data) -> Touching:
-        contacts, names = data.contacts, self._names[side]
+        contacts, (say, keys) = data.contacts, self._names[side]
         found: Touching = {}
         for k, geoms in enumerate(contacts.geom.tolist()):
             depth, force = -float(contacts.dist[k]), contacts.frame[k].T @ contacts.force[k]
             if depth < 0 and not force.any():
                 continue  # it is near, and does nothing
-            name, turned = names.name(geoms)
-            before, total = found.get(name, (-np.inf, np.zeros(3)))
-            found[name] = max(depth, before), total + (-force if turned else force)
+            one, two = (keys[geom] for geom in geoms)
+            name = say(one, two)
+            before = found.get(name, np.array([-np.inf, 0.0, 0.0, 0.0]))
+            total = before[1:] + (-force if one > two else force)
+            found[name] = np.array([max(depth, before[0]), *total])
         return found
 
 
-class _PairNames:
-    """Names for contacts, and which way a force is counted: the same for both sides."""
-
-    def __init__(self, names: ContactNames, keys: Sequence[int], geoms: bool) -> None:
-        self._names, self._keys, self._geoms = names, keys, geoms
-
-    def name(self, pair: Sequence[int]) -> tuple[str, bool]:
-        """What a pair of geoms is called, and whether its force must be turned round."""
-        one, two = (self._keys[geom] for geom in pair)
-        say = self._names.geoms if self._geoms else self._names.pair
-        return say(one, two), one > two
+# What says how a contact of two keys is called, and the key of each geom: of the two keys the
+# larger one is that on which the force is counted, the same on both sides.
+PairNames = tuple[Callable[[int, int], str], Sequence[int]]
 
 
-def _contact_names(matched: Matched) -> tuple[_PairNames, _PairNames]:
+def _contact_names(matched: Matched) -> tuple[PairNames, PairNames]:
     """By geoms, where both Models have the same; else by bodies, called as on the left."""
     one, two = matched.one, matched.two
     if one.geom_names == two.geom_names and np.array_equal(one.geom_bodyid, two.geom_bodyid):
-        names = ContactNames.of(one)
-        keys = range(one.ngeom)
-        return _PairNames(names, keys, True), _PairNames(names, keys, True)
+        same: PairNames = ContactNames.of(one).geoms, range(one.ngeom)
+        return same, same
     counterpart = {b: a for a, b in matched.bodies}
     # A body that only the right has comes after those of the left.
     extra = [b for b in range(two.nbody) if b not in counterpart]
@@ -224,7 +217,7 @@ def _contact_names(matched: Matched) -> tuple[_PairNames, _PairNames]:
     names = ContactNames(labels, geoms, range(len(labels)), parents)
     right = [counterpart[int(body)] for body in two.geom_bodyid]
     left = one.geom_bodyid.tolist()
-    return _PairNames(names, left, False), _PairNames(names, right, False)
+    return (names.pair, left), (names.pair, right)
 
 
 def _dofs(model: Model, joints: Sequence[int]) -> Ints:

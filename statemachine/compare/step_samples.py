@@ -78,7 +78,7 @@ class StepSpike:
     where: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class StageMeasure:
     """What was read of one group, at n moments.
 
@@ -86,16 +86,14 @@ class StageMeasure:
         group: Its k elements.
         apart: (n, k) how far the two sides are apart.
         null: (n, k) how far the left side is from itself.
-        sizes: (n,) its largest entry on either side.
-        scale: Its usual size.
+        scale: Its usual size, on either side.
         tolerance: What does not count.
     """
 
     group: StageGroup
     apart: Array
     null: Array
-    sizes: Array
-    scale: float = 0.0
+    scale: float
     tolerance: float = 0.0
 
     @property
@@ -110,43 +108,40 @@ class StepSamples:
     def __init__(self, reader: StageReader) -> None:
         self._reader, self.failed = reader, 0
         self.times: list[float] = []
-        # For each group and moment: differences, those of the null, and the largest entry.
-        self._apart: list[list[Array]] = [[] for _ in reader.groups]
-        self._null: list[list[Array]] = [[] for _ in reader.groups]
-        self._size: list[list[float]] = [[] for _ in reader.groups]
-        self._touch: list[tuple[dict[str, float], ...]] = []  # depth and force, each with its null
-        self._depth: list[float] = []
-        self._force: list[float] = []
+        # At each moment the numbers of the groups and the contacts, as of each `add`.
+        self._read: list[list[tuple[list[Array], Touching]]] = []
 
-    def add(
-        self,
-        time: float,
-        running: tuple[Reading, Array],
-        left: tuple[Reading, Array],
-        right: tuple[Reading, Array],
-    ) -> None:
+    def add(self, time: float, *readings: tuple[Reading, Array]) -> None:
         """One moment: the left side as it runs, put back to its State, and the right side."""
         self.times.append(time)
-        rows = [self._reader.whole(k, *each) for k, each in ((0, running), (0, left), (1, right))]
-        for g, group in enumerate(self._reader.groups):
-            whole, back, other = (row[g] for row in rows)
-            self._null[g].append(group.apart(whole, back))
-            self._apart[g].append(group.apart(back, other))
-            self._size[g].append(group.largest(back, other))
-        (_, a), (_, b), (_, c) = running[0], left[0], right[0]
-        self._touch.append((_deep(b, c), _deep(a, b), _pushed(b, c), _pushed(a, b)))
-        self._depth.append(max((abs(d) for d, _ in (*b.values(), *c.values())), default=0.0))
-        pushes = (float(np.linalg.norm(f)) for _, f in (*b.values(), *c.values()))
-        self._force.append(max(pushes, default=0.0))
+        self._read.append(
+            [
+                (self._reader.whole(side, *each), each[0][1])
+                for side, each in zip((0, 0, 1), readings, strict=True)
+            ]
+        )
 
     def measures(self, relative: float) -> list[StageMeasure]:
         """What both sides tell, each group with its scale and tolerance."""
-        found = [
-            *self._of_groups(),
-            *self._of_pairs(FOUND, 0, "m", self._depth),
-            *self._of_pairs(FORCE, 2, "N", self._force),
-        ]
-        found = [replace(each, scale=_usual(each.sizes)) for each in found]
+        found: list[StageMeasure] = []
+        for g, group in enumerate(self._reader.groups if self._read else ()):
+            running, left, right = (np.array([m[k][0][g] for m in self._read]) for k in range(3))
+            if group.names:
+                sizes = group.largest(left, right)
+                found += _measure(
+                    group, group.apart(left, right), group.apart(running, left), sizes
+                )
+        pairs = tuple(dict.fromkeys(p for m in self._read for k in (1, 2, 0) for p in m[k][1]))
+        if pairs:
+            # Depth and force of each pair at each moment; what is not found is zero.
+            running, left, right = (
+                np.array([[m[k][1].get(pair, np.zeros(4)) for pair in pairs] for m in self._read])
+                for k in range(3)
+            )
+            for stage, unit, of in ((FOUND, "m", _depths), (FORCE, "N", _pushes)):
+                sizes = np.maximum(of(left), of(right)).max(axis=1)
+                group = StageGroup(stage, unit, pairs)
+                found += _measure(group, of(left - right), of(running - left), sizes)
         # What is nothing but rounding, as the contact force of a run in which nothing touches,
         # is held against the other forces, and accelerations against what forces give.
         pushed = {unit: _largest(found, _FORCES, unit) for unit in ("N·m", "N")}
@@ -155,36 +150,11 @@ class StepSamples:
         for unit, force, mass in (("rad/s²", "N·m", "kg·m²"), ("m/s²", "N", "kg")):
             if masses[mass]:
                 least[unit] = pushed[force] / masses[mass]
-        scaled = []
         for each in found:
-            scale = each.scale
             if each.group.stage in (*_FORCES, AFTER):
-                scale = max(scale, _LEAST * least[each.group.unit])
-            scaled.append(replace(each, scale=scale, tolerance=relative * scale))
-        return scaled
-
-    def _of_groups(self) -> Iterator[StageMeasure]:
-        for g, group in enumerate(self._reader.groups):
-            apart = np.array(self._apart[g])
-            if not group.names or not apart.size:
-                continue
-            told = np.isfinite(apart).all(axis=0)
-            if told.any():
-                names = tuple(np.array(group.names, dtype=object)[told])
-                null = np.nan_to_num(np.array(self._null[g])[:, told])
-                own = replace(group, names=names)
-                yield StageMeasure(own, apart[:, told], null, np.array(self._size[g]))
-
-    def _of_pairs(
-        self, stage: str, place: int, unit: str, sizes: list[float]
-    ) -> Iterator[StageMeasure]:
-        pairs = tuple(dict.fromkeys(p for t in self._touch for k in (0, 1) for p in t[place + k]))
-        if pairs:
-            apart, null = (
-                np.array([[t[place + k].get(p, 0.0) for p in pairs] for t in self._touch])
-                for k in (0, 1)
-            )
-            yield StageMeasure(StageGroup(stage, unit, pairs), apart, null, np.array(sizes))
+                each.scale = max(each.scale, _LEAST * least[each.group.unit])
+            each.tolerance = relative * each.scale
+        return found
 
     def gaps(self, measures: Sequence[StageMeasure]) -> tuple[StageGap, ...]:
         """Each stage, by that of its units that is farthest beyond its tolerance."""
@@ -244,6 +214,14 @@ class StepSamples:
         return found
 
 
+def _measure(group: StageGroup, apart: Array, null: Array, sizes: Array) -> Iterator[StageMeasure]:
+    """That of the elements which both sides tell, if there are any."""
+    told = np.isfinite(apart).all(axis=0)
+    if told.any():
+        own = replace(group, names=tuple(np.array(group.names, dtype=object)[told]))
+        yield StageMeasure(own, apart[:, told], np.nan_to_num(null[:, told]), _usual(sizes))
+
+
 def _culprit(each: StageMeasure, row: int) -> str:
     """What to look at in a moment: the element that differs most, or where that comes from.
 
@@ -282,24 +260,11 @@ def _how_far(gap: StageGap) -> tuple[bool, float]:
     return gap.beyond > 0, gap.worst / gap.tolerance if gap.tolerance else np.inf
 
 
-def _deep(one: Touching, two: Touching) -> dict[str, float]:
-    """How far apart the depths of each pair are [m]; of one that only one side finds, its depth."""
-    found = {}
-    for pair in dict.fromkeys([*one, *two]):
-        depths = [side[pair][0] if pair in side else 0.0 for side in (one, two)]
-        found[pair] = abs(depths[0] - depths[1])
-    return found
+def _depths(touches: Array) -> Array:
+    """How deep (n, p) [m], of depths and forces (n, p, 4)."""
+    return np.abs(touches[:, :, 0])
 
 
-def _pushed(one: Touching, two: Touching) -> dict[str, float]:
-    """How far apart the forces of each pair are [N], as vectors."""
-    nothing = np.zeros(3)
-    return {
-        pair: float(
-            np.linalg.norm(
-                (one[pair][1] if pair in one else nothing)
-                - (two[pair][1] if pair in two else nothing)
-            )
-        )
-        for pair in dict.fromkeys([*one, *two])
-    }
+def _pushes(touches: Array) -> Array:
+    """How long the forces are (n, p) [N], of depths and forces (n, p, 4)."""
+    return np.array([[float(np.linalg.norm(t[1:])) for t in moment] for moment in touches])

@@ -1,4 +1,4 @@
-"""Two sides, run: each with commands of its own, then both with those of the left."""
+"""Two sides, run: each with commands of its own, then both with those of the left; or opened."""
 
 from __future__ import annotations
 
@@ -8,31 +8,35 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..backends import load
-from ..errors import BadInputError, StateMachineError, TraceError
-from ..interface import Array, Model
+from ..backends import backend_names, load
+from ..errors import (
+    BadInputError,
+    MissingEngineError,
+    StateMachineError,
+    TraceError,
+    unknown_name,
+)
+from ..installed import DEFAULT
+from ..interface import Model
 from ..measures import common_moments
-from ..measures.text import milliseconds
-from ..runs import Trace, model_file, play, read
+from ..measures.text import command, milliseconds
+from ..runs import Trace, model_file, play, read, record_scenario, shipped
 from ..runs.drive import Progress, check_length, part_of, silent, steps_in
-from ..runs.recorder import layout_of
-from ..runs.scenarios import Controller, Scenario
-from .alike import beginning_with, replace_layout, retold, told_alike, translated
+from ..runs.scenarios import SCENARIOS, Controller, Scenario, scenario
+from .alike import (
+    beginning_with,
+    for_left,
+    in_terms_of_right,
+    retold,
+    same_commands,
+    told_alike,
+)
 from .labels import files_apart, labels_of
 from .matching import Matched, match_models, start_of
 from .perturbed import Rerun
-from .request import Request
-from .side import Side
+from .sides import Request, Side, is_trace
 
 Loop = Literal["the same", "its own", "recorded", "more than ctrl"]
-
-
-@dataclass(frozen=True, eq=False)
-class _Clock:
-    """When the rows of a run will be."""
-
-    time: Array
-    timestep: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,35 +104,55 @@ def run_sides(request: Request, progress: Progress = silent) -> SidesRun:
     given |= request.options
     options = [{**given, **side.options} for side in request.sides]
     models = [side.load(**given) for side in request.sides]
-    reruns: tuple[Rerun, Rerun] | None = None
     matched = _matched(models[0], models[1], left, right, request)
     seconds = float(trace.time[-1] - trace.time[0]) if trace else request.seconds
     seconds = scenario.seconds if scenario and seconds is None else seconds or 0.0
     _check_moments(models, seconds)
+    reruns: tuple[Rerun, Rerun] | None = None
     if trace is not None:
         pair, said = _of_trace(trace, models, options, matched, request, progress)
         commands: Loop = "recorded"
-        played = pair[1]
+        rights = [pair[1]]
     else:
         assert scenario is not None
         scenario = scenario.on(models[0])
         reruns, said = _reruns(scenario, models, options, matched, request)
-        pair = _of_scenario(scenario, reruns, request, progress)
-        theirs = _in_terms_of_right(pair[0], pair[1], matched)
-        if any(trace.header.rewritten for trace in pair):
-            commands, played = "more than ctrl", pair[1]
-        elif _same_commands(theirs, pair[1]):
-            commands, played = "the same", pair[1]
+        pair = tuple(
+            rerun.record(
+                experiment=scenario.name,
+                says=scenario.says,
+                seed=request.seed if scenario.seeded else None,
+                progress=part_of(progress, 0.35 * place, 0.35),
+            )
+            for place, rerun in enumerate(reruns)
+        )
+        rights = [pair[1]]
+        theirs = in_terms_of_right(pair[0], pair[1], matched)
+        if any(run.header.rewritten for run in pair):
+            commands = "more than ctrl"
+        elif same_commands(theirs, pair[1]):
+            commands = "the same"
         else:
             commands = "its own"
-            played = _played(theirs, models[1], options[1], right, part_of(progress, 0.7, 0.3))
-    first, second, third = _told_apart(left, right, (*pair, played))
+            told = part_of(progress, 0.7, 0.3)
+            rights.append(_played(theirs, models[1], options[1], right, told))
+    one = pair[0]
+    a, b = (run.header.provenance.model_file for run in pair)
+    if left.path != right.path and a == b:  # as much of the paths as tells them apart
+        names = files_apart(left.path.parts, right.path.parts)
+        one, rights = _called(one, names[0]), [_called(each, names[1]) for each in rights]
     if matched is not None:
-        one, two = told_alike(first, second, matched)
-        third = two if third is second else told_alike(first, third, matched)[1]
-        first, second = one, two
+        both = [told_alike(one, each, matched) for each in rights]
+        one, rights = both[0][0], [two for _, two in both]
     file = left.path if left.path == right.path else None
-    return SidesRun(first, second, third, commands, matched, reruns, file, said)
+    return SidesRun(one, rights[0], rights[-1], commands, matched, reruns, file, said)
+
+
+def _called(trace: Trace, file: str) -> Trace:
+    """A run whose file goes by another name."""
+    header = trace.header
+    made_by = replace(header.provenance, model_file=file)
+    return Trace(replace(header, provenance=made_by), trace.columns)
 
 
 def _matched(one: Model, two: Model, left: Side, right: Side, request: Request) -> Matched | None:
@@ -147,33 +171,14 @@ def _matched(one: Model, two: Model, left: Side, right: Side, request: Request) 
 def _check_moments(models: list[Model], seconds: float) -> None:
     """Raise TraceError, before anything runs, where the timesteps hardly ever meet."""
     steps = [model.timestep for model in models]
-    one, two = (
-        _Clock(np.arange(0.0, steps_in(model, seconds) + 1) * model.timestep, model.timestep)
-        for model in models
-    )
+    one, two = (np.arange(0.0, steps_in(m, seconds) + 1) * m.timestep for m in models)
     try:
-        common_moments(one, two)
+        common_moments(one, two, (steps[0], steps[1]))
     except TraceError as error:
         raise TraceError(
             f"{error}; of a side: timestep={steps[0]:.15g} behind the right, or "
             f"timestep={steps[1]:.15g} behind the left"
         ) from None
-
-
-def _of_scenario(
-    scenario: Scenario, reruns: tuple[Rerun, Rerun], request: Request, progress: Progress
-) -> tuple[Trace, Trace]:
-    """A run on each side."""
-    traces = [
-        rerun.record(
-            experiment=scenario.name,
-            says=scenario.says,
-            seed=request.seed if scenario.seeded else None,
-            progress=part_of(progress, 0.35 * place, 0.35),
-        )
-        for place, rerun in enumerate(reruns)
-    ]
-    return traces[0], traces[1]
 
 
 def _reruns(
@@ -227,44 +232,14 @@ def _of_trace(
 ) -> tuple[tuple[Trace, Trace], tuple[str, ...]]:
     """A recorded run's start and commands, on both sides."""
     name = request.what[0]
-    refused = {"seconds": request.seconds is not None, "seed": request.seed != 0}
-    for option, given in refused.items():
-        if given:
-            raise BadInputError(f"--{option} is of a run, and a trace is a run that was made")
-    theirs = _for_left(trace, models[0], request)
+    _refuse_of_run(request)
+    theirs = for_left(trace, models[0], request)
     left, right = request.sides
     one = _played(theirs, models[0], options[0], left, part_of(progress, 0.0, 0.5))
-    told = theirs if matched is None else _in_terms_of_right(theirs, None, matched)
+    told = theirs if matched is None else in_terms_of_right(theirs, None, matched)
     two = _played(told, models[1], options[1], right, part_of(progress, 0.5, 0.5))
     said = f"the ctrl of {name} was played on both sides, from the state it starts in"
     return (one, two), (said,)
-
-
-def _for_left(trace: Trace, model: Model, request: Request) -> Trace:
-    """A trace as one of the left's Model; matched by the model that it was recorded with."""
-    header = trace.header
-    own = layout_of(model)
-    if all(getattr(header, name) == own[name] for name in ("joints", "actuators", "jnt_type")):
-        return replace_layout(trace, model, trace.qpos, trace.qvel, trace.ctrl)
-    try:
-        file, _ = model_file(header, request.menagerie, request.what[0])
-        matched = match_models(load(file), model, request.names)
-    except StateMachineError as error:
-        raise TraceError(
-            f"the trace has other joints or actuators than {model.path.name}, and what it was "
-            f"recorded with cannot be matched: {error}"
-        ) from None
-    return translated(trace, matched, start_of(model, None))
-
-
-def _in_terms_of_right(left: Trace, right: Trace | None, matched: Matched | None) -> Trace:
-    """The left's run as one of the right's Model; what is the right's alone stays as it starts."""
-    if matched is None:
-        return left
-    start = start_of(matched.two, None)
-    if right is not None:
-        start = right.qpos[0], right.qvel[0], right.ctrl[0]
-    return translated(left, matched, start)
 
 
 def _played(
@@ -273,26 +248,133 @@ def _played(
     return play(theirs, model, defaults=side.defaults, options=options, progress=progress)
 
 
-def _same_commands(theirs: Trace, right: Trace) -> bool:
-    """Whether the right was told at each of its moments what the left was, from the same start."""
-    if any(not np.array_equal(theirs[name][0], right[name][0]) for name in ("qpos", "qvel")):
-        return False
-    since, times = right.time - right.time[0], theirs.time - theirs.time[0]
-    early = 1e-6 * theirs.timestep  # as `play` has it
-    rows = np.searchsorted(times - early, since, side="right") - 1
-    used = since < times[-1] - early  # the command of a last row is never carried out
-    return np.array_equal(theirs.ctrl[rows[used]], right.ctrl[used])
+def sides_of(
+    request: Request | str, progress: Progress = silent
+) -> tuple[tuple[Trace, Trace], tuple[str, ...]]:
+    """The two traces that a request is about, and a line for each thing that stood in.
+
+    An experiment runs on both backends. Where one has no engine here, its recorded trace
+    takes its place, if the request is one that was recorded. Two traces are opened; the
+    ctrl of one is played on the other engine.
+
+    Raises:
+        UnknownNameError: No such experiment or backend.
+        MissingEngineError: An engine is missing, and nothing was recorded of this.
+        TraceError: A file is no trace.
+    """
+    if isinstance(request, str):
+        request = Request((request,))
+    if request.sides:
+        run = run_sides(request, progress)
+        return (run.left, run.right), run.said
+    if not 1 <= len(request.what) <= 2:
+        raise BadInputError("compare takes one experiment, or one or two traces")
+    if request.is_traces:
+        return _of_traces(request, progress)
+    if len(request.what) == 2:
+        raise BadInputError(
+            "compare takes one experiment: it runs on both engines; two traces are files"
+        )
+    what = request.what[0]
+    if what not in SCENARIOS and Path(what).is_file():
+        raise BadInputError(f"{what!r} is no trace: a trace ends in .npz or .parquet")
+    scenario(what)
+    for name in request.backends:
+        if name not in backend_names():
+            raise unknown_name("backend", name, backend_names())
+    said: list[str] = []
+    traces = [
+        _run(request, name, said, part_of(progress, 0.5 * k, 0.5))
+        for k, name in enumerate(request.backends)
+    ]
+    if all(trace.header.recorded for trace in traces):
+        raise MissingEngineError("no engine of the two is installed here", engine=DEFAULT)
+    return (traces[0], traces[1]), tuple(said)
 
 
-def _told_apart(left: Side, right: Side, traces: tuple[Trace, ...]) -> list[Trace]:
-    """The runs, with as much of their files' paths as tells these apart."""
-    one, two = left.path, right.path
-    a, b = (trace.header.provenance.model_file for trace in traces[:2])
-    if one == two or a != b:
-        return list(traces)
-    names = files_apart(one.parts, two.parts)
-    made: dict[int, Trace] = {}
-    for trace, name in zip(traces, (names[0], names[1], names[1]), strict=True):
-        header = replace(trace.header, provenance=replace(trace.header.provenance, model_file=name))
-        made.setdefault(id(trace), Trace(header, trace.columns))
-    return [made[id(trace)] for trace in traces]
+def _refuse_of_run(request: Request, **given: bool) -> None:
+    """Raise BadInputError for an option that has no meaning for a trace."""
+    refused = {"seconds": request.seconds is not None, "seed": request.seed != 0, **given}
+    for option in (name for name, wrong in refused.items() if wrong):
+        raise BadInputError(f"--{option} is of a run, and a trace is a run that was made")
+
+
+def _run(request: Request, backend: str, said: list[str], progress: Progress) -> Trace:
+    asked = scenario(request.what[0])
+    try:
+        model = load(
+            request.model or asked.model,
+            backend=backend,
+            defaults=request.defaults,
+            menagerie=request.menagerie,
+        )
+    except MissingEngineError as error:
+        if request != Request(request.what, request.backends, request.defaults):
+            raise  # nothing like it was recorded
+        try:
+            trace = shipped(asked.name, backend, request.defaults)
+        except StateMachineError:
+            raise error from None
+        said.append(f"{error}; its side is the recorded run that comes with the package")
+        return trace
+    return record_scenario(
+        asked,
+        model,
+        seconds=request.seconds,
+        seed=request.seed,
+        command=command(
+            ["statemachine", "trace", "record", *request.what, "--backend", backend],
+            ("--defaults", request.defaults, "model"),
+            ("--model", request.model, None),
+            ("--menagerie", request.menagerie and "DIR", None),
+            ("--seconds", request.seconds, None),
+            ("--seed", request.seed, 0),
+            ("--timestep", request.options.get("timestep"), None),
+        ),
+        defaults=request.defaults,
+        options=request.options,
+        progress=progress,
+    )
+
+
+def _of_traces(request: Request, progress: Progress) -> tuple[tuple[Trace, Trace], tuple[str, ...]]:
+    for word in request.what:
+        if not is_trace(word):
+            hint = " (an experiment runs on both engines alone)" if word in SCENARIOS else ""
+            raise BadInputError(f"{word!r} is no trace{hint}: a trace ends in .npz or .parquet")
+    opened = [read(word) for word in request.what]
+    _refuse_of_run(
+        request,
+        timestep=len(opened) == 2 and "timestep" in request.options,
+        defaults=len(opened) == 2 and request.defaults != "model",
+    )
+    if len(opened) == 2:
+        return (opened[0], opened[1]), ()
+    (trace,) = opened
+    others = [name for name in request.backends if name != trace.header.backend]
+    if not others:
+        raise BadInputError(f"the trace is of {trace.header.backend}: name another with --backends")
+    name: str | Path | None = request.model
+    if name is None:
+        name, _ = model_file(trace.header, request.menagerie, request.what[0])
+    model = load(
+        name,
+        backend=others[0],
+        defaults=request.defaults,
+        menagerie=request.menagerie if request.model else None,
+    )
+    options = {**trace.header.options, **request.options}
+    if options:
+        model = model.replace(**options)
+    played = play(
+        trace,
+        model,
+        command=command(["statemachine", "trace", "play", request.what[0], "--backend", others[0]]),
+        defaults=request.defaults,
+        options=options,
+        progress=progress,
+    )
+    said = (
+        f"the ctrl of {request.what[0]} was played on {others[0]}, from the state it starts in",
+    )
+    return (trace, played), said

@@ -1,24 +1,51 @@
-"""The words of every comparison: contacts, moments, gaps, and numbers as text (`text`)."""
+"""What all comparisons share: contacts, moments, gaps, tolerances, numbers as text (`text`)."""
 
 from __future__ import annotations
 
 from .contacts import ContactNames, same_pairs, together
-from .gap import Gap, largest
-from .moments import SAME, Common, common_moments, nearest
-from .quantities import QUANTITIES, Quantity, Tolerance, parse_tolerances
+from .gap import (
+    Deviation,
+    Gap,
+    JointPlaces,
+    distances,
+    farthest,
+    joint_gap,
+    largest,
+    turns,
+)
+from .moments import SAME, Common, at_moments, common_moments, nearest
+from .quantities import (
+    COUNT,
+    QUANTITIES,
+    Quantity,
+    Tolerance,
+    amount,
+    parse_tolerances,
+    tolerance_of,
+)
 
 __all__ = [
+    "COUNT",
     "QUANTITIES",
     "SAME",
     "Common",
     "ContactNames",
+    "Deviation",
     "Gap",
+    "JointPlaces",
     "Quantity",
     "Tolerance",
+    "amount",
+    "at_moments",
     "common_moments",
+    "distances",
+    "farthest",
+    "joint_gap",
     "largest",
     "nearest",
     "parse_tolerances",
     "same_pairs",
     "together",
+    "tolerance_of",
+    "turns",
 ]

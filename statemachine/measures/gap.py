@@ -1,4 +1,4 @@
-"""The largest difference of something: how large, of what, and when."""
+"""How far apart two readings of one quantity are: at one moment, and over many."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..interface import Array
+from ..interface import Array, Ints, JointType
 from .text import distance, reading
 
 
@@ -50,7 +50,108 @@ class Gap:
         return f"{text} at {self.where}" if self.where else text
 
 
+@dataclass(frozen=True)
+class Deviation:
+    """How far apart two runs are in one quantity.
+
+    Attributes:
+        unit: Of the distances: "rad" or "m".
+        worst: The largest distance at any moment; at: when [s].
+        rms: Root of the mean square over the moments.
+        end: At the last moment.
+    """
+
+    unit: str
+    worst: float = 0.0
+    at: float = 0.0
+    rms: float = 0.0
+    end: float = 0.0
+
+    @classmethod
+    def of(cls, sizes: Array, time: Array, unit: str) -> Deviation:
+        """Of distances (n,) [unit] at moments (n,) [s]."""
+        worst, row = largest(sizes)
+        rms = float(np.sqrt(np.mean(sizes**2)))
+        return cls(unit, worst, float(time[row]), rms, float(sizes[-1]))
+
+    def or_larger(self, other: Deviation) -> Deviation:
+        """Of each figure the larger one."""
+        most = other if other.worst > self.worst else self
+        rms, end = max(self.rms, other.rms), max(self.end, other.end)
+        return Deviation(self.unit, most.worst, most.at, rms, end)
+
+
+@dataclass(frozen=True, eq=False)
+class JointPlaces:
+    """Where in qpos each kind of joint has its numbers.
+
+    Attributes:
+        hinges, slides: Of each hinge [rad] and each slide [m].
+        balls: Where the quaternion of each ball joint starts.
+        free: Where the position of each free body starts; its quaternion follows.
+    """
+
+    hinges: Ints
+    slides: Ints
+    balls: Ints
+    free: Ints
+
+    @classmethod
+    def of(cls, types: Sequence[int] | Ints, addresses: Sequence[int] | Ints) -> JointPlaces:
+        """Of joints (n,) by their `JointType` and their place in qpos."""
+        kinds, places = np.asarray(types), np.asarray(addresses, dtype=np.int64)
+        of = {kind: places[kinds == int(kind)] for kind in JointType}
+        hinges, slides = of[JointType.HINGE], of[JointType.SLIDE]
+        return cls(hinges, slides, of[JointType.BALL], of[JointType.FREE])
+
+    @property
+    def quats(self) -> Ints:
+        """Where all quaternions start: those of ball joints, then those of free bodies."""
+        return np.concatenate([self.balls, self.free + 3])
+
+
+def joint_gap(
+    names: Sequence[str], types: Sequence[int] | Ints, addresses: Sequence[int] | Ints,
+    one: Array, two: Array,
+) -> Gap | None:  # fmt: skip
+    """The hinge that differs most between two moments, or the slide where there is no hinge.
+
+    Args:
+        names: Of the joints; types, addresses: their `JointType`s and places in qpos.
+        types: See names.
+        addresses: See names.
+        one: (nq,) one moment; two: the other.
+        two: See one.
+    """
+    kinds, places = np.asarray(types), np.asarray(addresses)
+    for kind, unit in ((JointType.HINGE, "rad"), (JointType.SLIDE, "m")):
+        joints = np.flatnonzero(kinds == int(kind))
+        if len(joints):
+            apart = np.abs(one[places[joints]] - two[places[joints]])
+            return Gap.of(apart, unit, [names[joint] for joint in joints.tolist()])
+    return None
+
+
 def largest(sizes: Array) -> tuple[float, int]:
     """The largest of some sizes (n,), and its place; what is no number is larger than all."""
     place = int(np.argmax(sizes))  # the first NaN, if there is one
     return float(sizes[place]), place
+
+
+def distances(one: Array, two: Array) -> Array:
+    """Lengths (…) of the way from one vector (…, k) to another."""
+    return np.linalg.norm(one - two, axis=-1)
+
+
+def farthest(one: Array, two: Array) -> Array:
+    """The largest difference (…) of any of k numbers (…, k)."""
+    return np.abs(one - two).max(axis=-1, initial=0.0)
+
+
+def turns(one: Array, two: Array) -> Array:
+    """Angles (…) [rad] between unit quaternions (…, 4), in any order of their components.
+
+    By the chord, so that tiny angles keep their digits. q and -q are one rotation.
+    """
+    chord = np.minimum(distances(one, two), distances(one, -two))
+    return 4 * np.arcsin(np.minimum(chord / 2, 1.0))

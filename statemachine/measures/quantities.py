@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import BadInputError, unknown_name
+from ..interface import Array
+from .text import milliseconds, rounded
+
+# A 12-bit encoder, as in the SO-101's servos (Feetech STS3215).
+COUNT = 2 * np.pi / 4096
+_COUNT_SAYS = "1/4096 turn, one count of a 12-bit encoder as in the SO-101's servos"
+_ENERGY = 0.01  # of what the energy changes by in the run
+_FORCE = 0.05  # of its mean while it acts
 
 
 @dataclass(frozen=True)
@@ -20,6 +28,8 @@ class Quantity:
         plural: What several of the kind are called.
         moves: Whether it says where something is.
         own: Whether it is a coordinate of its own, and nothing that follows from others.
+        tolerance: A difference that does not matter [unit]; None: `tolerance_of` says it of a run.
+        reason: Why that much.
     """
 
     name: str
@@ -27,22 +37,32 @@ class Quantity:
     plural: str
     moves: bool = False
     own: bool = False
+    tolerance: float | None = None
+    reason: str = ""
 
 
 QUANTITIES = {
     quantity.name: quantity
     for quantity in (
-        Quantity("joint", "rad", "joints", moves=True, own=True),
-        Quantity("slide", "m", "slides", moves=True, own=True),
-        Quantity("tip", "m", "fingertip", moves=True),
-        Quantity("tip rotation", "rad", "rotation of the fingertip", moves=True),
-        Quantity("body", "m", "free bodies", moves=True, own=True),
-        Quantity("body rotation", "rad", "rotation of free bodies", moves=True, own=True),
+        Quantity("joint", "rad", "joints", True, True, COUNT, _COUNT_SAYS),
+        Quantity("slide", "m", "slides", True, True, 1e-4, "a tenth of a millimetre"),
+        Quantity("tip", "m", "fingertip", True),
+        Quantity(
+            "tip rotation", "rad", "rotation of the fingertip", True, False, COUNT, _COUNT_SAYS
+        ),
+        Quantity(
+            "body", "m", "free bodies", True, True, 1e-3,
+            "a millimetre: what a grasp of a box of centimetres forgives",
+        ),
+        Quantity(
+            "body rotation", "rad", "rotation of free bodies", True, True, np.radians(1.0),
+            "a degree, which moves the rim of a hand's breadth by 1 mm",
+        ),
         Quantity("energy", "J", "energy"),
         Quantity("contact", "s", "first touches"),
         Quantity("force", "N", "normal forces"),
     )
-}
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -53,7 +73,51 @@ class Tolerance:
     reason: str
 
 
-# What a tolerance is given in: the suffix, its size in SI, and the SI unit.
+def tolerance_of(
+    kind: str, one: Array, two: Array, reach: float, timestep: float,
+    given: Mapping[str, float] | None = None,
+) -> Tolerance:  # fmt: skip
+    """The tolerance of a quantity in two runs.
+
+    Args:
+        kind: Which of `QUANTITIES`.
+        one: Its values (n,) in one run; two: in the other. Of energies and forces they count.
+        two: See one.
+        reach: How far a fingertip gets from the foot of its arm [m].
+        timestep: The longer of the two [s].
+        given: Values by kind that win over ours [SI].
+    """
+    known = QUANTITIES[kind]
+    if given and kind in given:
+        return Tolerance(given[kind], "as given")
+    if known.tolerance is not None:
+        return Tolerance(known.tolerance, known.reason)
+    if kind == "tip":
+        return Tolerance(
+            COUNT * reach,
+            f"what one count of a 12-bit encoder moves it, {reach:.2f} m from the arm's foot",
+        )
+    if kind == "energy":
+        changes = max(float(np.ptp(v[np.isfinite(v)])) if np.isfinite(v).any() else 0.0
+                      for v in (one, two))  # fmt: skip
+        return Tolerance(
+            max(_ENERGY * changes, 1e-9),
+            f"1 % of {rounded(changes, 'J')}, by which the energy changes in the run",
+        )
+    if kind == "force":
+        # Not of its peak: that of an impact is its impulse over the timestep, whatever that is.
+        acting = max(float(v[v > 0].mean()) if (v > 0).any() else 0.0 for v in (one, two))
+        return Tolerance(
+            max(_FORCE * acting, 1e-6),
+            f"5 % of {rounded(acting, 'N')}, the mean while they touch",
+        )
+    return Tolerance(
+        timestep * (1 + 1e-9),
+        f"one timestep, {milliseconds(timestep, 3)}: an engine looks at contacts once in a step",
+    )
+
+
+# What a size is given in: the suffix, its size in SI, and the SI unit.
 _SUFFIXES = (
     ("deg", np.pi / 180, "rad"),
     ("rad", 1.0, "rad"),
@@ -66,6 +130,18 @@ _SUFFIXES = (
     ("J", 1.0, "J"),
     ("N", 1.0, "N"),
 )
+
+
+def amount(text: str) -> tuple[float, str]:
+    """A size above zero [SI] and its SI unit, of words like "0.5deg"; NaN where it is none."""
+    for suffix, factor, unit in _SUFFIXES:
+        if text.endswith(suffix):
+            try:
+                value = float(text.removesuffix(suffix)) * factor
+            except ValueError:
+                break
+            return (value if 0 < value < np.inf else np.nan), unit
+    return np.nan, ""
 
 
 def parse_tolerances(words: Iterable[str]) -> dict[str, float]:
@@ -81,25 +157,12 @@ def parse_tolerances(words: Iterable[str]) -> dict[str, float]:
         kind = kind.replace("-", " ")
         if kind not in QUANTITIES:
             raise unknown_name("kind of quantity", kind, QUANTITIES)
-        unit, scale = QUANTITIES[kind].unit, 0.0
-        for suffix, factor, of in _SUFFIXES:
-            if text.endswith(suffix):
-                text, scale = text.removesuffix(suffix), factor
-                if of != unit:
-                    raise BadInputError(f"{kind} is measured in {_units(unit)}, not in {suffix}")
-                break
-        if not scale:
-            raise BadInputError(f"{word!r} needs a unit: {kind} is measured in {_units(unit)}")
-        try:
-            value = float(text) * scale
-        except ValueError:
-            value = float("nan")
-        if not (np.isfinite(value) and value > 0):
-            raise BadInputError(f"a tolerance reads like joint=0.5deg or tip=2mm; got {word!r}")
+        value, unit = amount(text)
+        if unit != QUANTITIES[kind].unit or np.isnan(value):
+            units = [suffix for suffix, _, of in _SUFFIXES if of == QUANTITIES[kind].unit]
+            raise BadInputError(
+                f"{kind} is measured in {', '.join(units)}: a tolerance reads like joint=0.5deg or "
+                f"tip=2mm; got {word!r}"
+            )
         tolerances[kind] = value
     return tolerances
-
-
-def _units(unit: str) -> str:
-    """What a quantity may be given in."""
-    return ", ".join(suffix for suffix, _, of in _SUFFIXES if of == unit)

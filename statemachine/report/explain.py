@@ -10,7 +10,7 @@ from ..compare.why import ADDS_UP, CauseShare, Explanation
 from ..measures.text import NONE, capital, few, percent, quantity, short_time, significant
 from ..page import Block, Items, Page, Section, Table, TableCell, Text, Verdict
 from . import why
-from .why_words import SMALL, THREE, inside, noisy, three
+from .why_words import SMALL, THREE, gap_sentence, inside, noisy, three
 
 _SHOWN = 12  # rows; the rest is folded away
 _WIDE = 15  # characters of a value
@@ -46,7 +46,8 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
 
 def causes(result: Explanation) -> list[Block]:
     """How far apart the sides are, and how much of it each difference explains."""
-    blocks: list[Block] = [Text(_gap_sentence(result))]
+    text = gap_sentence(result.first, result.quantity, "As they come", " (--quantity)")
+    blocks: list[Block] = [Text(text)]
     if result.is_rounding:
         blocks.append(Text(_nothing(result)))
     elif result.floor > SMALL * result.gap:
@@ -80,24 +81,6 @@ def _unmatched(result: Explanation) -> list[str]:
                 hint = " (--map LEFT=RIGHT)" if all(o.get(kind) for o in result.unmatched) else ""
                 lines.append(f"Only the {side} has the {kind}{plural} {few(names, 6)}{hint}.")
     return lines + [f"{capital(note)}." for note in result.notes]
-
-
-def _gap_sentence(result: Explanation) -> str:
-    gap = result.first[result.quantity]
-    what = f"the {result.quantity}"
-    if result.quantity in ("joints", "slides", "ball joints"):
-        what = f"the worst {result.quantity.removesuffix('s')}"
-    text = (
-        f"As they come, {what} is up to {quantity(gap.worst, gap.unit)} apart, at "
-        f"{short_time(gap.at)} (root mean square {quantity(gap.rms, gap.unit)}, in the end "
-        f"{quantity(gap.end, gap.unit)})."
-    )
-    others = [
-        f"{name} {quantity(other.worst, other.unit)}"
-        for name, other in result.first.items()
-        if name != result.quantity
-    ]
-    return text + (f" Elsewhere: {', '.join(others)} (--quantity)." if others else "")
 
 
 def _nothing(result: Explanation) -> str:

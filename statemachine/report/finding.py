@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..compare import Agreement, Comparison, Series
-from ..compare.agreement import SETTLED
+from ..compare.series import SETTLED, at_the_end
 from ..compare.why import Attribution
 from ..measures import QUANTITIES
 from ..measures.text import capital, on, quantity, short_time
@@ -148,8 +148,7 @@ def _in_the_end(comparison: Comparison, curves: Sequence[Series]) -> str:
 
 def changing(curve: Series, found: Agreement) -> float | None:
     """The last difference, if it moves within the end by more than it may to be settled."""
-    time = curve.time
-    tail = curve.difference[time >= time[-1] - SETTLED * (time[-1] - time[0])]
+    tail = curve.difference[at_the_end(curve.time)]
     moves = float(np.ptp(tail))
     if moves > min(found.tolerance, _MOVES * found.settled):
         return float(tail[-1])

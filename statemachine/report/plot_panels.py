@@ -17,9 +17,8 @@ from ..compare import (
     labels_of,
     series,
 )
-from ..compare.tolerances import COUNT
 from ..interface import Array, JointType
-from ..measures import QUANTITIES
+from ..measures import COUNT, QUANTITIES
 from ..measures.text import few, milliseconds, quantity, reading, short_time
 from ..runs import Header, Trace
 from .floor import changed_by

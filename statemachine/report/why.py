@@ -14,6 +14,7 @@ from .why_words import (
     amount,
     astray,
     conclusion,
+    gap_sentence,
     inside,
     moves,
     noisy,
@@ -53,7 +54,10 @@ def page(result: Attribution, said: Sequence[str] = ()) -> Page:
 
 def causes(result: Attribution) -> list[Block]:
     """How much of the gap each factor takes away, all on top of each other and alone."""
-    blocks: list[Block] = [Text(_gap_sentence(result))]
+    text = gap_sentence(result.first, result.quantity, "Without any change")
+    if result.between:
+        text += " The timesteps have too few moments in common: rows between were interpolated."
+    blocks: list[Block] = [Text(text)]
     if not result.alone and result.gap > result.negligible:
         known = math.isfinite(result.floor)
         return [*blocks, Text(inside(amount(result, result.floor) if known else "without a bound"))]
@@ -131,31 +135,6 @@ def _step(result: Attribution, trial: FactorTrial) -> str:
         f"{capital(title(trial.factor))} of {whose}: {_brought(result, trial)} – the gap is then "
         f"{left}"
     )
-
-
-def _what(result: Attribution) -> str:
-    if result.quantity in ("joints", "slides", "ball joints"):
-        return f"the worst {result.quantity.removesuffix('s')}"
-    return f"the {result.quantity}"
-
-
-def _gap_sentence(result: Attribution) -> str:
-    gap = result.first[result.quantity]
-    text = (
-        f"Without any change, {_what(result)} is up to {amount(result, gap.worst)} apart, at "
-        f"{short_time(gap.at)} (root mean square {amount(result, gap.rms)}, in the end "
-        f"{amount(result, gap.end)})."
-    )
-    others = [
-        f"{name} {quantity(other.worst, other.unit)}"
-        for name, other in result.first.items()
-        if name != result.quantity
-    ]
-    if others:
-        text += f" Elsewhere: {', '.join(others)}."
-    if result.between:
-        text += " The timesteps have too few moments in common: rows between were interpolated."
-    return text
 
 
 def _brought(result: Attribution, trial: FactorTrial) -> str:

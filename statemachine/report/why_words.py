@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ..compare.why import FACTORS, UNEXPLAINED, Attribution, FactorTrial
+from ..measures import Deviation
 from ..measures.text import listed, percent, quantity, short_time
 
 _WORTH = 0.005  # the least part of the gap that is spoken of
@@ -29,6 +30,19 @@ def three(explained: float, located: float, unexplained: float) -> str:
         f"{percent(explained)} of the gap is explained, {percent(located)} is located, "
         f"{percent(unexplained)} is unexplained"
     )
+
+
+def gap_sentence(gaps: Mapping[str, Deviation], of: str, begins: str, hint: str = "") -> str:
+    """How far apart two runs are in one of some quantities; the others follow."""
+    gap = gaps[of]
+    worst, rms, end = (quantity(size, gap.unit) for size in (gap.worst, gap.rms, gap.end))
+    what = f"worst {of.removesuffix('s')}" if of in ("joints", "slides", "ball joints") else of
+    text = (
+        f"{begins}, the {what} is up to {worst} apart, at {short_time(gap.at)} (root mean square "
+        f"{rms}, in the end {end})."
+    )
+    others = [f"{name} {quantity(g.worst, g.unit)}" for name, g in gaps.items() if name != of]
+    return text + (f" Elsewhere: {', '.join(others)}{hint}." if others else "")
 
 
 def inside(floor: str) -> str:

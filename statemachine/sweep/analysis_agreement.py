@@ -9,8 +9,8 @@ from typing import Literal
 
 import numpy as np
 
-from ..compare.tolerances import COUNT
 from ..interface import Array
+from ..measures import COUNT
 from .analysis_gaps import QUANTITIES, SweepGaps, median, worst
 from .analysis_runs import ModelFacts
 from .factors import Value
@@ -111,7 +111,7 @@ def agreement_of(
 def _tolerance(
     gaps: SweepGaps, name: str, facts: ModelFacts, given: Mapping[str, float] | None
 ) -> tuple[Array, str]:
-    """(p) at each setting, and why that much: those of `compare.tolerances`."""
+    """(p) at each setting, and why that much: those of `measures`."""
     kind, points = QUANTITIES[name].kind, len(gaps.points)
     if given and kind in given:
         return np.full(points, given[kind]), "as given"

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..interface import Array, JointType, Model, usual_site
-from ..measures import largest
+from ..interface import Array, Ints, JointType, Model
+from ..measures import Gap, distances, joint_gap
 
 _TURN = math.pi / 180  # radians in a degree
 
@@ -54,15 +54,12 @@ class Separation:
 
     Attributes:
         tip: Between the two fingertips [m]; None without a site.
-        joint: The hinge or slide that differs most, among hinges if there are any.
-        angle: By how much [rad]; of a slide [m]; None without such a joint.
-        slide: Whether it is a slide.
+        joint: Of the hinge or slide that differs most, among hinges if there are any; None
+            without such a joint.
     """
 
     tip: float | None
-    joint: str
-    angle: float | None
-    slide: bool = False
+    joint: Gap | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,23 +159,12 @@ def controls_of(model: Model) -> tuple[Control, ...]:
     return tuple(found)
 
 
-def tip_of(model: Model, site: str | None = None) -> int | None:
-    """Id of the site that stands for the fingertip: the named one, else the usual one.
-
-    Raises:
-        UnknownNameError: There is no site of that name.
-    """
-    if site is not None:
-        return model.site_id(site)
-    return usual_site(model.site_names)
-
-
-def gap_between(
+def separation(
     names: Sequence[str],
-    types: Sequence[int],
-    addresses: Sequence[int],
-    qpos: tuple[Array, Array],
-    tips: tuple[Array | None, Array | None],
+    types: Sequence[int] | Ints,
+    addresses: Sequence[int] | Ints,
+    qpos: Sequence[Array],
+    poses: Sequence[EnginePose],
 ) -> Separation:
     """How far two moments of one model are apart.
 
@@ -187,15 +173,8 @@ def gap_between(
         types: Their `JointType`s.
         addresses: Where each is in qpos.
         qpos: (nq,) of both.
-        tips: (3,) of both, if there is a site.
+        poses: Of both.
     """
-    one, two = tips
-    tip = None if one is None or two is None else float(np.linalg.norm(one - two))
-    for kind in (JointType.HINGE, JointType.SLIDE):
-        joints = [joint for joint, its in enumerate(types) if its == kind]
-        if joints:
-            starts = [addresses[joint] for joint in joints]
-            apart = np.abs(qpos[0][starts] - qpos[1][starts])
-            angle, worst = largest(apart)
-            return Separation(tip, names[joints[worst]], angle, kind == JointType.SLIDE)
-    return Separation(tip, "", None)
+    one, two = (pose.tip for pose in poses[:2])
+    tip = None if one is None or two is None else float(distances(one, two))
+    return Separation(tip, joint_gap(names, types, addresses, qpos[0], qpos[1]))

@@ -8,37 +8,16 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ..errors import StateMachineError
-from .frames import Command, Control, Play, ResetTo, Seek, SetSpeed, Snapshot, Step
+from .frames import Command, Play, ResetTo, Seek, SetSpeed, Snapshot, Step
 from .pace import Pacer
+from .recording import TraceSession
+from .session import LiveSession
 
 RATE = 40.0  # frames in a second of the clock
 _MOST_LAG = 0.25  # seconds behind the clock that may still be caught up
 
 
-class Show(Protocol):
-    """What can be shown: a running simulation, or a recording. See `LiveSession`."""
-
-    timestep: float
-    names: tuple[str, ...]
-    controls: tuple[Control, ...]
-    places: tuple[str, ...]
-    tip: str
-    length: float | None
-
-    @property
-    def running(self) -> bool:
-        """Whether time is to go on by itself."""
-        ...
-
-    def apply(self, command: Command) -> None:
-        """Do what was asked for."""
-
-    def advance(self, count: int = 1) -> None:
-        """Take steps."""
-
-    def frame(self) -> Snapshot:
-        """This moment."""
-        ...
+Show = LiveSession | TraceSession  # what can be shown
 
 
 @dataclass(frozen=True)

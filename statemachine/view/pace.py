@@ -69,11 +69,9 @@ class Pacer:
         while len(self._marks) > 2 and self._marks[1][0] <= now - _WINDOW:
             self._marks.popleft()
 
-    def give_up(self, now: float) -> int:
-        """Let go of the steps that are due, so that the lag does not grow; how many."""
-        lost = self.due(now)
-        self._taken += lost
-        return lost
+    def give_up(self, now: float) -> None:
+        """Let go of the steps that are due, so that the lag does not grow."""
+        self._taken += self.due(now)
 
     def factor(self, now: float) -> float | None:
         """Simulated seconds in a second of the clock, of late; None before it can be told."""

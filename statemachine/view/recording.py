@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import BadInputError, TraceError
-from ..interface import Array, usual_site
+from ..interface import usual_site
 from ..runs import Header, Trace
 from .frames import (
     Command,
@@ -18,10 +18,9 @@ from .frames import (
     Play,
     ResetTo,
     Seek,
-    Separation,
     Snapshot,
     Step,
-    gap_between,
+    separation,
 )
 
 _NEEDED = ("xpos", "xquat")
@@ -132,7 +131,8 @@ class TraceSession:
             other = self._traces[1]
             # Moments that are not the same say nothing about the engines.
             if abs(other.time[rows[1]] - other.time[0] - since) < _EQUAL:
-                gap = self._gap((poses[0], poses[1]), (first.qpos[rows[0]], other.qpos[rows[1]]))
+                header, both = self.header, (first.qpos[rows[0]], other.qpos[rows[1]])
+                gap = separation(header.joints, header.jnt_type, header.jnt_qposadr, both, poses)
         return Snapshot(
             time=float(first.time[self._row]),
             steps=self._row,
@@ -142,16 +142,6 @@ class TraceSession:
             poses=tuple(poses),
             gap=gap,
             trouble="",
-        )
-
-    def _gap(self, poses: tuple[EnginePose, EnginePose], qpos: tuple[Array, Array]) -> Separation:
-        header = self.header
-        return gap_between(
-            header.joints,
-            header.jnt_type,
-            header.jnt_qposadr,
-            qpos,
-            (poses[0].tip, poses[1].tip),
         )
 
 

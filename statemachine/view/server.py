@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import errno
-import io
 import logging
 import os
 import socket
 from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
+from io import StringIO
 from types import ModuleType
 from typing import Any
 
@@ -83,7 +83,7 @@ def serve(host: str, port: int, label: str, door: Door) -> Any:
     viser = require_viser()
     # Who connects and says nothing, as browsers do to be quick, is no news for a terminal.
     logging.getLogger("websockets").addHandler(logging.NullHandler())
-    with _hush(), _without("_VISER_PORT_OVERRIDE"), _guarded(door) as guarded:
+    with redirect_stdout(StringIO()), _without("_VISER_PORT_OVERRIDE"), _guarded(door) as guarded:
         server = viser.ViserServer(host=host, port=port, label=label, verbose=False)
     if not guarded:
         stop(server)
@@ -100,11 +100,11 @@ def serve(host: str, port: int, label: str, door: Door) -> Any:
 
 def stop(server: Any) -> None:
     """Close the connections and free the port; nothing is printed."""
-    with _hush():
+    with redirect_stdout(StringIO()):
         server.stop()
 
 
-@contextlib.contextmanager
+@contextmanager
 def _guarded(door: Door) -> Iterator[list[Any]]:
     """While viser opens its server, put a door before it.
 
@@ -130,13 +130,7 @@ def _guarded(door: Door) -> Iterator[list[Any]]:
         websockets.serve = plain
 
 
-@contextlib.contextmanager
-def _hush() -> Any:
-    with contextlib.redirect_stdout(io.StringIO()):
-        yield
-
-
-@contextlib.contextmanager
+@contextmanager
 def _without(name: str) -> Any:
     value = os.environ.pop(name, None)
     try:

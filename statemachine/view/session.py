@@ -8,7 +8,7 @@ from types import TracebackType
 import numpy as np
 
 from ..errors import BadInputError, StateMachineError
-from ..interface import Data, Model, forward, make_data, reset, step
+from ..interface import Data, Model, forward, make_data, reset, step, usual_site
 from .frames import (
     Command,
     EnginePose,
@@ -20,8 +20,7 @@ from .frames import (
     Snapshot,
     Step,
     controls_of,
-    gap_between,
-    tip_of,
+    separation,
 )
 
 _STEPS_MOST = 100_000  # of one press of a button
@@ -52,7 +51,7 @@ class LiveSession:
         Args:
             models: One Model, or the same file on two engines: the second is the ghost.
             keyframe: Where to start; None for the default state.
-            site: What stands for the fingertip; see `tip_of`.
+            site: What stands for the fingertip; None for the usual site.
 
         Raises:
             UnknownNameError: There is no such keyframe or site.
@@ -71,13 +70,12 @@ class LiveSession:
         self.names = tuple(model.backend for model in models)
         self.controls = controls_of(first)
         self.places = tuple(k.name or f"keyframe {n}" for n, k in enumerate(first.keyframes))
-        self._site = tip_of(first, site)
+        self._site = usual_site(first.site_names) if site is None else first.site_id(site)
         self.tip = "" if self._site is None else first.site_names[self._site]
         start = None if keyframe is None else first.key_id(keyframe)
         self._arms: list[tuple[Model, Data]] = []
-        self._poses: tuple[EnginePose, ...] = ()
-        self._gap: Separation | None = None
-        self._time = 0.0
+        # The last moment that was good: its time, the poses, how far apart they are.
+        self._good: tuple[float, tuple[EnginePose, ...], Separation | None] = 0.0, (), None
         self._running, self._trouble, self._steps, self._resets = False, "", 0, 0
         try:
             for model in models:
@@ -137,14 +135,15 @@ class LiveSession:
         """
         if not self._trouble:
             self._look()
+        time, poses, gap = self._good
         return Snapshot(
-            time=self._time,
+            time=time,
             steps=self._steps,
             running=self._running,
             ctrl=np.array(self._arms[0][1].ctrl),
             resets=self._resets,
-            poses=self._poses,
-            gap=self._gap,
+            poses=poses,
+            gap=gap,
             trouble=self._trouble,
         )
 
@@ -158,17 +157,12 @@ class LiveSession:
                 return
             tip = None if self._site is None else np.array(data.site_xpos[self._site])
             poses.append(EnginePose(model.backend, np.array(data.xpos), np.array(data.xquat), tip))
-        self._poses = tuple(poses)
-        model, data = self._arms[0]
-        self._time = data.time
-        if len(self._arms) > 1:
-            self._gap = gap_between(
-                model.joint_names,
-                model.jnt_type.tolist(),
-                model.jnt_qposadr.tolist(),
-                (data.qpos, self._arms[1][1].qpos),
-                (poses[0].tip, poses[1].tip),
-            )
+        (model, first), *others = self._arms
+        gap = None
+        if others:
+            both = first.qpos, others[0][1].qpos
+            gap = separation(model.joint_names, model.jnt_type, model.jnt_qposadr, both, poses)
+        self._good = first.time, tuple(poses), gap
 
     def _reset(self, keyframe: int | None) -> None:
         if keyframe is not None and not 0 <= keyframe < len(self.places):

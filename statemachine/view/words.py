@@ -29,9 +29,10 @@ def rows(frame: Snapshot, pace: Tempo, tip: str) -> list[tuple[str, str]]:
     if frame.gap is not None:
         if frame.gap.tip is not None:
             found.append(("tips apart", millimetres(frame.gap.tip, 3)))
-        if frame.gap.angle is not None:
-            far = position(frame.gap.angle, frame.gap.slide, 3)
-            found.append(("joints apart", f"{far}, {frame.gap.joint}"))
+        joint = frame.gap.joint
+        if joint is not None:
+            far = position(joint.size or 0.0, joint.unit == "m", 3)
+            found.append(("joints apart", f"{far}, {joint.where}"))
     return found
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from .attribute import attribute
 from .explain import CauseShare, Explanation, explain
 from .factors import FACTORS, Factor
-from .gap import Deviation
 from .results import UNEXPLAINED, Attribution, FactorTrial, FirstTouch
 from .shapley import ADDS_UP
 
@@ -15,7 +14,6 @@ __all__ = [
     "UNEXPLAINED",
     "Attribution",
     "CauseShare",
-    "Deviation",
     "Explanation",
     "Factor",
     "FactorTrial",

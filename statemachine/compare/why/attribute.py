@@ -8,13 +8,13 @@ from typing import Any
 
 from ...errors import EndedEarlyError, StateMachineError, unknown_name
 from ...interface import Model
+from ...measures import Deviation
 from ...runs.drive import Progress, silent
 from ...runs.scenarios import Scenario
 from ..one_step import one_step
 from ..perturbed import EXACT, Uncertainty, rerun_of
 from ..stages import FOUND
 from .factors import FACTORS, OFF_ORDER, PARITY_ORDER, Factor
-from .gap import Deviation
 from .results import ROUNDING, Attribution, Detection, FactorTrial, Way, bounds_of, telling
 from .runs import Runs
 from .sides import Change, Changes, same, side_of

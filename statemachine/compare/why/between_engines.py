@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from ...backends import load
 from ...errors import StateMachineError
 from ...interface import Model
+from ...measures import Deviation
 from ...runs.drive import Progress
 from ...runs.scenarios import Scenario
 from .attribute import attribute
-from .gap import Deviation
 from .results import Attribution
 from .trials import Trials
 

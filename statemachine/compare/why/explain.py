@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from ...errors import BadInputError, EndedEarlyError, unknown_name
 from ...interface import Model
+from ...measures import Deviation
 from ...runs.drive import Progress, part_of, silent
 from ...runs.provenance import Provenance, provenance
 from ...runs.scenarios import Scenario
@@ -22,7 +23,6 @@ from .between_engines import (
     run_alike,
 )
 from .causes import Cause, causes, differences_of
-from .gap import Deviation
 from .results import ROUNDING, UNEXPLAINED, Attribution, bounds_of, telling
 from .shapley import Method, Shares, shapley
 from .trials import Measure, Trials

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from ...measures import Deviation
 from ...runs.provenance import Provenance
-from .gap import Deviation
 
 # Rounding, after it has grown for some seconds: less than this is no gap to be explained.
 ROUNDING = {"rad": 1e-8, "m": 1e-9}

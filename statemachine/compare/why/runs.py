@@ -6,6 +6,7 @@ from typing import Any
 
 from ...errors import DivergedError, EngineError, UnsupportedError
 from ...interface import Data, Model
+from ...measures import Deviation
 from ...runs import Trace, record
 from ...runs.drive import Progress
 from ...runs.provenance import provenance
@@ -13,7 +14,7 @@ from ...runs.robot import moved_by_actuators, touching
 from ...runs.scenarios import Scenario
 from ..perturbed import Rerun, Uncertainty, perturbed_runs
 from .factors import FACTORS
-from .gap import Curves, Deviation, Ruler
+from .gap import Curves, Ruler
 from .results import FirstTouch
 from .sides import AdjustableSide, Changes
 
@@ -49,7 +50,7 @@ class Runs:
         for place, trace in enumerate(traces):
             self._curves[place, ()] = self.ruler.curves(trace)
             self.ended = self.ended or trace.header.ended
-        self.natural = self.ruler.held(traces[0], watches[0].at_start)
+        self.natural = self.ruler.held(watches[0].at_start)
         self.quantity = self.natural
         self._watches = watches
 
@@ -117,7 +118,7 @@ class Runs:
         """How far one moves from where it starts."""
         run = self.curves(0, changes)
         assert run  # it has gaps
-        start = Curves({name: curve[:1] for name, curve in run.of.items()})
+        start = {name: curve[:1] for name, curve in run.items()}
         return float(self.ruler.distances(self.quantity, run, start).max())
 
     @property

@@ -19,6 +19,7 @@ from ...engines.model_differences import Edit, ModelDifference
 from ...errors import DivergedError, EngineError, ModelError, UnsupportedError
 from ...installed import DEFAULT
 from ...interface import Array, Model
+from ...measures import Deviation
 from ...processes import checked_jobs
 from ...runs import Trace
 from ...runs.scenarios import Controller, Scenario
@@ -27,7 +28,7 @@ from ..forks import forks_for, in_forks
 from ..matching import Matched, start_of
 from ..perturbed import RUNS, Rerun, Uncertainty, perturbed_run
 from .causes import Cause, built
-from .gap import Curves, Deviation, Ruler
+from .gap import Curves, Ruler
 
 Measure = Literal["worst", "end", "rms"]
 _Run = tuple[int, frozenset[str]]  # a side, and the causes that change it
@@ -334,7 +335,7 @@ class Trials:
         first = self._runs[0, frozenset()].curves
         assert first is not None  # it has gaps
         return again is not None and all(
-            np.array_equal(values, again.of[name]) for name, values in first.of.items()
+            np.array_equal(values, again[name]) for name, values in first.items()
         )
 
     def floor(self, uncertain: Uncertainty) -> dict[str, Deviation]:
