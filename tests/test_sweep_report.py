@@ -24,14 +24,15 @@ from statemachine.report.sweep_report import page
 from statemachine.report.terminal import show
 from statemachine.sweep import Design, Sweep, Vary, run_sweep
 from statemachine.sweep.analysis import SweepReport, sweep_report
+from statemachine.sweep.analysis_data import SweepData, read_runs, sweep_data
 from statemachine.sweep.analysis_fit import fit_curves
-from statemachine.sweep.analysis_gaps import SweepRuns, gaps_of, runs_of
+from statemachine.sweep.analysis_gaps import agreement_of, gap_map
 from statemachine.sweep.analysis_indices import variance_shares
-from statemachine.sweep.analysis_runs import facts_of
+from statemachine.sweep.analysis_runs import ModelFacts, facts_of
 from statemachine.sweep.analysis_together import REFINED, brought_together
 from statemachine.sweep.cell import DONE, FAILED
-from statemachine.sweep.folder import SCHEMA
-from statemachine.sweep.rows import RowWriter, read_cells
+from statemachine.sweep.folder import SCHEMA, design_of, read_manifest
+from statemachine.sweep.rows import RowWriter, read_cells, schema_of
 
 SIDES = ("mujoco", "pybullet")
 TIMES = 5  # moments of a made-up run
@@ -261,21 +262,17 @@ def test_a_sweep_that_failed_everywhere_has_no_report(tmp_path: Path) -> None:
             of(folder)
 
 
-def test_a_gap_inside_the_chaos_floor_is_no_difference(tmp_path: Path) -> None:
-    from statemachine.sweep import analysis, analysis_agreement
-    from statemachine.sweep.analysis_gaps import gaps_of
-    from statemachine.sweep.analysis_runs import ModelFacts
-    from statemachine.sweep.folder import design_of, read_manifest
-    from statemachine.sweep.rows import read_cells
+def data_of(folder: Path) -> SweepData:
+    return sweep_data(read_cells(folder), design_of(read_manifest(folder)), SIDES, 1, TIMES)
 
-    folder = agreement(tmp_path / "s", seeds=1)
-    design = design_of(read_manifest(folder))
-    gaps = gaps_of(read_cells(folder), design, SIDES, 1)
+
+def test_a_gap_inside_the_chaos_floor_is_no_difference(tmp_path: Path) -> None:
+    data = data_of(agreement(tmp_path / "s", seeds=1))
     width, tolerances = np.full(10, 2.5e-3), {"tip": 1.5e-3}
-    found, settings = analysis_agreement.agreement_of(gaps, "tip", width, ModelFacts(), tolerances)
+    found, settings = agreement_of(data, "tip", width, ModelFacts(), tolerances)
     verdicts = {each.values[0]: each.verdict for each in settings if each.values[1] == 0}
     assert verdicts == {0: "agrees", 1: "agrees", 2: "chaos", 3: "no runs", 4: "differs"}
-    chart = analysis.gap_map(gaps, analysis.median(gaps.gap("tip")), width, None)
+    chart = gap_map(data, "tip", width, None)
     assert chart is not None
     assert chart.inside[0] == (True, True, True, False, False)
     assert found.counts["chaos"] == 2
@@ -307,7 +304,7 @@ def test_the_value_that_brings_them_together_is_found(tmp_path: Path) -> None:
     assert found.fit.within(0.2e-3) == pytest.approx((0.61 - reach, 0.61 + reach), abs=6e-3)
     assert found.fit.within(0.05e-3) is None
     assert found.measured is None
-    assert found.fit.at(1.61) == pytest.approx(np.hypot(5e-3, 0.1e-3), rel=0.01)
+    assert np.interp(1.61, *found.fit.scan) == pytest.approx(np.hypot(5e-3, 0.1e-3), rel=0.01)
 
 
 def test_its_error_is_that_of_the_seeds(tmp_path: Path) -> None:
@@ -453,16 +450,23 @@ def test_what_does_not_go_together_is_said(tmp_path: Path, capsys: Any) -> None:
         of(Path(folder), backends=["mujoco"])
 
 
-def test_a_report_of_ten_thousand_rows_has_no_loop_over_moments(tmp_path: Path) -> None:
-    """Read as arrays and row by row, the runs are the same."""
-    from statemachine.sweep.analysis_gaps import _read, runs_of
-    from statemachine.sweep.rows import read_cells
-
-    table = read_cells(agreement(tmp_path / "s"))
-    done = table.filter(np.array([s == DONE for s in table["status"].to_pylist()]))
-    one, two = _read(done, None), runs_of(done.to_pylist())
-    for name in one.__dataclass_fields__:
-        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+def test_runs_of_several_lengths_keep_their_last_moment_last() -> None:
+    arrow = pytest.importorskip("pyarrow")
+    tips = [[[1.0, 2.0, 3.0]], [[4.0, 5.0, 6.0], [7.0, 8.0, 9.0]], None, [[1.0, 1.0, 1.0]] * 2]
+    rows: list[dict[str, Any]] = [
+        {"status": DONE, "time": 1.0, "steps": 4, "sample_tip": tip, "sample_qpos": [[0.0, 1.0]]}
+        for tip in tips
+    ]
+    rows[1]["first_touch"] = 0.5
+    rows[3]["status"] = FAILED
+    runs = read_runs(arrow.Table.from_pylist(rows, schema_of((), {})), 3, [1])
+    assert (runs["tip"].shape, runs["qpos"].shape) == ((4, 3, 3), (4, 3, 1))
+    for run, tip in zip(runs["tip"], [*tips[:2], None, None], strict=True):
+        there = tip or np.empty((0, 3))
+        np.testing.assert_array_equal(run[3 - len(there) :], there)
+        assert np.isnan(run[: 3 - len(there)]).all()
+    np.testing.assert_array_equal(runs["touch"], [np.inf, 0.5, np.inf, np.nan])
+    np.testing.assert_array_equal(runs["timestep"], [0.25, 0.25, 0.25, np.nan])
 
 
 class _Runs:
@@ -471,14 +475,14 @@ class _Runs:
     def __init__(self, left: TipOf, right: TipOf) -> None:
         self._of = dict(zip(SIDES, (left, right), strict=True))
 
-    def run(self, backends: Any, settings: Any, **_: Any) -> SweepRuns:
-        return runs_of(
-            [
-                {"status": DONE, "steps": 100, "time": 1.0, "sample_qpos": [[0.0]],
-                 "sample_tip": [self._of[backend](*values, seed)]}
-                for backend, (values, seed) in zip(backends, settings, strict=True)
-            ]
-        )  # fmt: skip
+    def run(self, asked: Any, **_: Any) -> Any:
+        arrow = pytest.importorskip("pyarrow")
+        rows = [
+            {"status": DONE, "steps": 100, "time": 1.0, "sample_qpos": [[0.0]],
+             "sample_tip": [self._of[backend](*values, seed)]}
+            for backend, values, seed in asked
+        ]  # fmt: skip
+        return read_runs(arrow.Table.from_pylist(rows, schema_of((), {})), TIMES)
 
 
 def test_where_a_run_contradicts_the_fit_the_best_run_is_the_answer(tmp_path: Path) -> None:
@@ -495,8 +499,7 @@ def test_where_a_run_contradicts_the_fit_the_best_run_is_the_answer(tmp_path: Pa
     assert fit.fit.gap < 1e-3  # which no run gives
     assert fit.best is None
     runner: Any = _Runs(nowhere, right)
-    gaps = gaps_of(read_cells(folder), Design((vary,)), SIDES, 1)
-    found = brought_together(gaps, vary, "tip", 0.2e-3, varied="both", runner=runner)
+    found = brought_together(data_of(folder), vary, "tip", 0.2e-3, varied="both", runner=runner)
     assert found.measured is not None
     assert found.measured > 5e-3
     assert found.best is not None
@@ -511,8 +514,7 @@ def test_where_a_run_contradicts_the_fit_the_best_run_is_the_answer(tmp_path: Pa
     # Where it agrees with the fit nothing more is run.
     runner = _Runs(nowhere, lambda gain, _: along_x(5e-3 * (gain - 0.61)))
     folder = made_up(tmp_path / "t", Design((vary,)), *runner._of.values())
-    gaps = gaps_of(read_cells(folder), Design((vary,)), SIDES, 1)
-    found = brought_together(gaps, vary, "tip", 0.2e-3, varied="both", runner=runner)
+    found = brought_together(data_of(folder), vary, "tip", 0.2e-3, varied="both", runner=runner)
     assert (found.best, found.cells) == (None, 2)
 
 
@@ -540,5 +542,5 @@ def test_a_real_sweep_is_answered(tmp_path: Path) -> None:
     assert fit.fit.value == pytest.approx(1.0, abs=0.15)
     assert fit.measured is not None
     assert fit.pairs == 2
-    assert fit.measured < fit.fit.at(0.6)
+    assert fit.measured < np.interp(0.6, *fit.fit.scan)
     assert found.ran == found.floor.cells + fit.cells
