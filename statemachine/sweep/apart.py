@@ -55,7 +55,8 @@ def _begin_trackers() -> None:
 
 def _deaf() -> None:
     """Processes that this thread begins never take a Ctrl-C: it is for the driver to answer it."""
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    if hasattr(signal, "pthread_sigmask"):  # not on Windows
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
 class _Process:
@@ -116,10 +117,9 @@ def apart(rules: CellRules, batches: Iterable[Batch], jobs: int) -> Results:
         finally:
             free.put(process)
 
-    able = hasattr(signal, "pthread_sigmask")  # not on Windows
-    if able:
+    if os.name != "nt":
         _begin_trackers()
-    with ThreadPoolExecutor(jobs, initializer=_deaf if able else None) as threads:
+    with ThreadPoolExecutor(jobs, initializer=_deaf) as threads:
         try:
             coming = iter(batches)
             waiting = {threads.submit(run, batch) for batch in islice(coming, jobs)}
