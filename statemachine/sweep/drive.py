@@ -179,7 +179,7 @@ def _on_dask(client: Any, rules: CellRules, batches: Iterator[Batch]) -> Results
         BadInputError: The scheduler went away.
     """
     distributed = require_extra("distributed", "--scheduler", "Dask", "cluster")
-    finished, out = distributed.as_completed(), {}
+    finished, out = distributed.as_completed(loop=client.loop), {}
 
     def hand_out(count: int) -> None:
         for batch in itertools.islice(batches, count):
