@@ -9,7 +9,7 @@ from collections.abc import Callable
 from contextlib import redirect_stdout
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pytest
@@ -24,18 +24,26 @@ from statemachine.report.sweep_report import page
 from statemachine.report.terminal import show
 from statemachine.sweep import Design, Sweep, Vary, run_sweep
 from statemachine.sweep.analysis import SweepReport, sweep_report
+from statemachine.sweep.analysis_data import SweepData, read_runs, sweep_data
 from statemachine.sweep.analysis_fit import fit_curves
-from statemachine.sweep.analysis_gaps import SweepRuns, gaps_of, runs_of
+from statemachine.sweep.analysis_gaps import agreement_of, gap_map
 from statemachine.sweep.analysis_indices import variance_shares
-from statemachine.sweep.analysis_runs import facts_of
+from statemachine.sweep.analysis_runs import ModelFacts, facts_of
 from statemachine.sweep.analysis_together import REFINED, brought_together
 from statemachine.sweep.cell import DONE, FAILED
-from statemachine.sweep.folder import SCHEMA
-from statemachine.sweep.rows import RowWriter, read_cells
+from statemachine.sweep.folder import SCHEMA, design_of, read_manifest
+from statemachine.sweep.rows import RowWriter, read_cells, schema_of
 
 SIDES = ("mujoco", "pybullet")
 TIMES = 5  # moments of a made-up run
 TipOf = Callable[..., Any]
+T = TypeVar("T")
+
+
+def the(value: T | None) -> T:
+    """What is there."""
+    assert value is not None
+    return value
 
 
 def made_up(
@@ -113,8 +121,7 @@ def text(shown: Page) -> str:
 
 
 def shares(found: SweepReport) -> dict[str, tuple[float, float]]:
-    assert found.sensitivity is not None
-    return {each.label: (each.first, each.total) for each in found.sensitivity.indices}
+    return {each.label: (each.first, each.total) for each in the(found.sensitivity).indices}
 
 
 def ishigami(x: float, y: float, z: float, _seed: int) -> list[float]:
@@ -137,22 +144,19 @@ def test_sobol_indices_are_those_of_the_ishigami_function(tmp_path: Path) -> Non
     factors = tuple(Vary(name, bounds=(-np.pi, np.pi)) for name in "xyz")
     design = Design(factors, samples=1024, indices=True, seed=1)
     found = of(made_up(tmp_path / "s", design, nowhere, ishigami))
-    assert found.sensitivity is not None
-    assert found.sensitivity.method == "sobol"
-    assert found.sensitivity.samples == 1024
+    assert the(found.sensitivity).method == "sobol"
+    assert the(found.sensitivity).samples == 1024
     assert shares(found).keys() == ISHIGAMI.keys()
-    for each in found.sensitivity.indices:
+    for each in the(found.sensitivity).indices:
         first, total = ISHIGAMI[each.label]
         assert each.first == pytest.approx(first, abs=0.03), each
         assert each.total == pytest.approx(total, abs=0.03), each
         for value, interval in ((first, each.first_interval), (total, each.total_interval)):
-            assert interval is not None
-            low, high = interval
+            low, high = the(interval)
             assert low - 0.02 < value < high + 0.02  # 95 %, six of them
             assert 0 < high - low < 0.3
-    assert found.sensitivity.indices[0].label == "x"
-    assert found.map is not None
-    assert (found.map.across, found.map.up, found.map.others) == ("x", "y", ("z",))
+    assert the(found.sensitivity).indices[0].label == "x"
+    assert (the(found.map).across, the(found.map).up, the(found.map).others) == ("x", "y", ("z",))
 
 
 def test_failed_cells_leave_their_samples_out_of_the_indices(tmp_path: Path) -> None:
@@ -166,9 +170,8 @@ def test_failed_cells_leave_their_samples_out_of_the_indices(tmp_path: Path) -> 
     found = of(folder)
     assert found.failed == {"DivergedError": 1}
     assert found.quantity.counts["no runs"] == 1
-    assert found.sensitivity is not None
-    assert found.sensitivity.samples == 128
-    assert "1 of 256 samples" in found.sensitivity.notes[0]
+    assert the(found.sensitivity).samples == 128
+    assert "1 of 256 samples" in the(found.sensitivity).notes[0]
     said = text(page(found))
     assert "1 cell failed (1 DivergedError)" in said
     assert shares(found)["y"][0] == pytest.approx(ISHIGAMI["y"][0], abs=0.15)
@@ -186,9 +189,8 @@ def test_a_full_factorial_is_taken_apart_as_its_closed_form(tmp_path: Path) -> N
     expected = {"x": (x, x + both), "y": (y, y + both), "z": (0.0, 0.0)}
     for name, pair in shares(found).items():
         assert pair == pytest.approx(expected[name], abs=1e-9)
-    assert found.sensitivity is not None
-    assert found.sensitivity.method == "factorial"
-    assert found.sensitivity.indices[0].first_interval is None  # of one seed
+    assert the(found.sensitivity).method == "factorial"
+    assert the(found.sensitivity).indices[0].first_interval is None  # of one seed
 
 
 def test_a_factorial_with_holes_keeps_the_rest(tmp_path: Path) -> None:
@@ -200,8 +202,7 @@ def test_a_factorial_with_holes_keeps_the_rest(tmp_path: Path) -> None:
     found = of(folder)
     assert shares(found)["x"] == pytest.approx((1, 1))
     assert shares(found)["y"] == pytest.approx((0, 0))
-    assert found.sensitivity is not None
-    assert "y = 1.0" in found.sensitivity.notes[0]
+    assert "y = 1.0" in the(found.sensitivity).notes[0]
     assert found.failed == {"DivergedError": 6}
 
 
@@ -232,13 +233,12 @@ def test_settings_agree_by_the_tolerance(tmp_path: Path) -> None:
     assert by[2.0, 1.0].median == pytest.approx(3e-3)
     assert by[2.0, 1.0].worst == pytest.approx(4e-3)
     assert by[3.0, 0.0].median is None
-    assert found.map is not None
     gap = {
-        (x, y): found.map.gap[r][c]
-        for r, y in enumerate(found.map.rows)
-        for c, x in enumerate(found.map.columns)
+        (x, y): the(found.map).gap[r][c]
+        for r, y in enumerate(the(found.map).rows)
+        for c, x in enumerate(the(found.map).columns)
     }
-    flipped = found.map.across == "y"
+    flipped = the(found.map).across == "y"
     for pair, value in gap.items():
         x, y = pair[::-1] if flipped else pair
         expected = None if (x, y) == (3.0, 0.0) else pytest.approx(1e-3 * (float(x) + float(y)))
@@ -261,23 +261,18 @@ def test_a_sweep_that_failed_everywhere_has_no_report(tmp_path: Path) -> None:
             of(folder)
 
 
-def test_a_gap_inside_the_chaos_floor_is_no_difference(tmp_path: Path) -> None:
-    from statemachine.sweep import analysis, analysis_agreement
-    from statemachine.sweep.analysis_gaps import gaps_of
-    from statemachine.sweep.analysis_runs import ModelFacts
-    from statemachine.sweep.folder import design_of, read_manifest
-    from statemachine.sweep.rows import read_cells
+def data_of(folder: Path) -> SweepData:
+    return sweep_data(read_cells(folder), design_of(read_manifest(folder)), SIDES, 1, TIMES)
 
-    folder = agreement(tmp_path / "s", seeds=1)
-    design = design_of(read_manifest(folder))
-    gaps = gaps_of(read_cells(folder), design, SIDES, 1)
+
+def test_a_gap_inside_the_chaos_floor_is_no_difference(tmp_path: Path) -> None:
+    data = data_of(agreement(tmp_path / "s", seeds=1))
     width, tolerances = np.full(10, 2.5e-3), {"tip": 1.5e-3}
-    found, settings = analysis_agreement.agreement_of(gaps, "tip", width, ModelFacts(), tolerances)
+    found, settings = agreement_of(data, "tip", width, ModelFacts(), tolerances)
     verdicts = {each.values[0]: each.verdict for each in settings if each.values[1] == 0}
     assert verdicts == {0: "agrees", 1: "agrees", 2: "chaos", 3: "no runs", 4: "differs"}
-    chart = analysis.gap_map(gaps, analysis.median(gaps.gap("tip")), width, None)
-    assert chart is not None
-    assert chart.inside[0] == (True, True, True, False, False)
+    chart = gap_map(data, "tip", width, None)
+    assert the(chart).inside[0] == (True, True, True, False, False)
     assert found.counts["chaos"] == 2
 
 
@@ -298,29 +293,27 @@ def fitted(
 def test_the_value_that_brings_them_together_is_found(tmp_path: Path) -> None:
     (found,) = fitted(tmp_path / "s", best=0.61, least=0.1e-3).together
     assert found.varied == "both"  # a parameter of a function is no side's own
-    assert found.fit is not None
-    assert found.fit.value == pytest.approx(0.61, abs=1e-3)
-    assert found.fit.gap == pytest.approx(0.1e-3, rel=1e-3)
-    assert found.fit.error == pytest.approx(0.0, abs=1e-3)  # the seeds are alike
+    assert the(found.fit).value == pytest.approx(0.61, abs=1e-3)
+    assert the(found.fit).gap == pytest.approx(0.1e-3, rel=1e-3)
+    assert the(found.fit).error == pytest.approx(0.0, abs=1e-3)  # the seeds are alike
     assert found.verdict == "together"
     reach = np.sqrt(0.2**2 - 0.1**2) / 5  # where hypot(5 mm · reach, 0.1 mm) is 0.2 mm
-    assert found.fit.within(0.2e-3) == pytest.approx((0.61 - reach, 0.61 + reach), abs=6e-3)
-    assert found.fit.within(0.05e-3) is None
+    assert the(found.fit).within(0.2e-3) == pytest.approx((0.61 - reach, 0.61 + reach), abs=6e-3)
+    assert the(found.fit).within(0.05e-3) is None
     assert found.measured is None
-    assert found.fit.at(1.61) == pytest.approx(np.hypot(5e-3, 0.1e-3), rel=0.01)
+    assert np.interp(1.61, *the(found.fit).scan) == pytest.approx(np.hypot(5e-3, 0.1e-3), rel=0.01)
 
 
 def test_its_error_is_that_of_the_seeds(tmp_path: Path) -> None:
     seeds, spread = 16, 0.02
     report = fitted(tmp_path / "s", best=0.9, least=5e-3, seeds=seeds, spread=spread)
     (found,) = report.together
-    assert found.fit is not None
-    assert found.fit.value == pytest.approx(0.9, abs=0.02)
+    assert the(found.fit).value == pytest.approx(0.9, abs=0.02)
     # The gap is a parabola here, so that the value is the mean of 16 that are evenly spread;
     # the curves of a seed at 2 values of y are the same, and count once.
     deviation = spread * np.sqrt((seeds**2 - 1) / 12)
-    assert found.fit.error == pytest.approx(deviation / np.sqrt(seeds), rel=0.15)
-    assert found.fit.of == "16 seeds drawn again"
+    assert the(found.fit).error == pytest.approx(deviation / np.sqrt(seeds), rel=0.15)
+    assert the(found.fit).of == "16 seeds drawn again"
     assert found.verdict == "closer"
     said = text(page(report))
     assert "brings mujoco and pybullet closer, not together" in " ".join(said.split())
@@ -341,9 +334,8 @@ def test_one_curve_has_its_error_from_the_curvature(tmp_path: Path) -> None:
         tmp_path / "s", design, nowhere, lambda gain, _: [5e-3 * (gain - 1), 1e-3, 0.0]
     )
     (found,) = of(folder).together
-    assert found.fit is not None
     # One unknown: s² = 5 · 1e-6 / 14 left over, Σ slope² = 5 · 25e-6.
-    assert found.fit.error == pytest.approx(np.sqrt(5e-6 / 14 / (5 * 25e-6)), rel=0.02)
+    assert the(found.fit).error == pytest.approx(np.sqrt(5e-6 / 14 / (5 * 25e-6)), rel=0.02)
 
 
 def moments(x: list[float], steps: int, d: int = 2) -> NDArray[np.float64]:
@@ -357,9 +349,8 @@ def test_runs_that_keep_fewer_moments_are_fitted_by_those_they_have() -> None:
     levels = np.array([0.0, 1.0, 2.0])
     right = np.concatenate([moments([-1, 0, 1], steps) for steps in (4, 2)])
     found = fit_curves("qpos", levels, 0 * right, right, [0, 0])
-    assert found is not None
-    assert (found.value, found.curves) == (pytest.approx(1.0, abs=1e-3), 2)
-    assert found.scan[1][-1] == pytest.approx(1.0)
+    assert (the(found).value, the(found).curves) == (pytest.approx(1.0, abs=1e-3), 2)
+    assert the(found).scan[1][-1] == pytest.approx(1.0)
 
 
 def test_of_a_curve_with_runs_of_several_lengths_the_end_is_fitted() -> None:
@@ -369,8 +360,7 @@ def test_of_a_curve_with_runs_of_several_lengths_the_end_is_fitted() -> None:
     right[0, :, :-1] = 7.0
     right[0, 0, :2] = np.nan
     found = fit_curves("qpos", levels, 0 * np.nan_to_num(right), right, [0])
-    assert found is not None
-    assert (found.value, found.gap) == (
+    assert (the(found).value, the(found).gap) == (
         pytest.approx(1.0, abs=1e-3),
         pytest.approx(0.0, abs=1e-3),
     )
@@ -384,11 +374,9 @@ def test_a_sampled_range_is_fitted_by_a_parabola(tmp_path: Path) -> None:
     )  # fmt: skip
     report = of(folder, fit=["gain"])
     (found,) = report.together
-    assert found.fit is not None
-    assert found.fit.value == pytest.approx(0.7, abs=0.02)
-    assert report.sensitivity is not None
-    assert report.sensitivity.method == "rank"
-    assert "run it with --indices" in report.sensitivity.notes[0]
+    assert the(found.fit).value == pytest.approx(0.7, abs=0.02)
+    assert the(report.sensitivity).method == "rank"
+    assert "run it with --indices" in the(report.sensitivity).notes[0]
 
 
 def test_pictures_and_page_are_of_the_same_figures(tmp_path: Path) -> None:
@@ -453,16 +441,23 @@ def test_what_does_not_go_together_is_said(tmp_path: Path, capsys: Any) -> None:
         of(Path(folder), backends=["mujoco"])
 
 
-def test_a_report_of_ten_thousand_rows_has_no_loop_over_moments(tmp_path: Path) -> None:
-    """Read as arrays and row by row, the runs are the same."""
-    from statemachine.sweep.analysis_gaps import _read, runs_of
-    from statemachine.sweep.rows import read_cells
-
-    table = read_cells(agreement(tmp_path / "s"))
-    done = table.filter(np.array([s == DONE for s in table["status"].to_pylist()]))
-    one, two = _read(done, None), runs_of(done.to_pylist())
-    for name in one.__dataclass_fields__:
-        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+def test_runs_of_several_lengths_keep_their_last_moment_last() -> None:
+    arrow = pytest.importorskip("pyarrow")
+    tips = [[[1.0, 2.0, 3.0]], [[4.0, 5.0, 6.0], [7.0, 8.0, 9.0]], None, [[1.0, 1.0, 1.0]] * 2]
+    rows: list[dict[str, Any]] = [
+        {"status": DONE, "time": 1.0, "steps": 4, "sample_tip": tip, "sample_qpos": [[0.0, 1.0]]}
+        for tip in tips
+    ]
+    rows[1]["first_touch"] = 0.5
+    rows[3]["status"] = FAILED
+    runs = read_runs(arrow.Table.from_pylist(rows, schema_of((), {})), 3, [1])
+    assert (runs["tip"].shape, runs["qpos"].shape) == ((4, 3, 3), (4, 3, 1))
+    for run, tip in zip(runs["tip"], [*tips[:2], None, None], strict=True):
+        there = tip or np.empty((0, 3))
+        np.testing.assert_array_equal(run[3 - len(there) :], there)
+        assert np.isnan(run[: 3 - len(there)]).all()
+    np.testing.assert_array_equal(runs["touch"], [np.inf, 0.5, np.inf, np.nan])
+    np.testing.assert_array_equal(runs["timestep"], [0.25, 0.25, 0.25, np.nan])
 
 
 class _Runs:
@@ -471,14 +466,14 @@ class _Runs:
     def __init__(self, left: TipOf, right: TipOf) -> None:
         self._of = dict(zip(SIDES, (left, right), strict=True))
 
-    def run(self, backends: Any, settings: Any, **_: Any) -> SweepRuns:
-        return runs_of(
-            [
-                {"status": DONE, "steps": 100, "time": 1.0, "sample_qpos": [[0.0]],
-                 "sample_tip": [self._of[backend](*values, seed)]}
-                for backend, (values, seed) in zip(backends, settings, strict=True)
-            ]
-        )  # fmt: skip
+    def run(self, asked: Any, **_: Any) -> Any:
+        arrow = pytest.importorskip("pyarrow")
+        rows = [
+            {"status": DONE, "steps": 100, "time": 1.0, "sample_qpos": [[0.0]],
+             "sample_tip": [self._of[backend](*values, seed)]}
+            for backend, values, seed in asked
+        ]  # fmt: skip
+        return read_runs(arrow.Table.from_pylist(rows, schema_of((), {})), TIMES)
 
 
 def test_where_a_run_contradicts_the_fit_the_best_run_is_the_answer(tmp_path: Path) -> None:
@@ -491,18 +486,14 @@ def test_where_a_run_contradicts_the_fit_the_best_run_is_the_answer(tmp_path: Pa
     folder = made_up(tmp_path / "s", Design((vary,)), nowhere, right)
     report = of(folder, tolerances={"tip": 0.2e-3}, fit=["gain"])
     (fit,) = report.together
-    assert fit.fit is not None
-    assert fit.fit.gap < 1e-3  # which no run gives
+    assert the(fit.fit).gap < 1e-3  # which no run gives
     assert fit.best is None
     runner: Any = _Runs(nowhere, right)
-    gaps = gaps_of(read_cells(folder), Design((vary,)), SIDES, 1)
-    found = brought_together(gaps, vary, "tip", 0.2e-3, varied="both", runner=runner)
-    assert found.measured is not None
-    assert found.measured > 5e-3
-    assert found.best is not None
-    assert found.value == found.best.value == pytest.approx(0.625)
-    assert found.after == min(found.best.tried[1]) == pytest.approx(5.1e-3)
-    assert found.error == found.best.apart == pytest.approx(0.25 / (REFINED - 1))
+    found = brought_together(data_of(folder), vary, "tip", 0.2e-3, varied="both", runner=runner)
+    assert the(found.measured) > 5e-3
+    assert found.value == the(found.best).value == pytest.approx(0.625)
+    assert found.after == min(the(found.best).tried[1]) == pytest.approx(5.1e-3)
+    assert found.error == the(found.best).apart == pytest.approx(0.25 / (REFINED - 1))
     assert found.verdict == "closer"
     assert found.cells == 2 * (1 + REFINED)
     said = " ".join(text(page(dataclasses.replace(report, together=(found,)))).split())
@@ -511,8 +502,7 @@ def test_where_a_run_contradicts_the_fit_the_best_run_is_the_answer(tmp_path: Pa
     # Where it agrees with the fit nothing more is run.
     runner = _Runs(nowhere, lambda gain, _: along_x(5e-3 * (gain - 0.61)))
     folder = made_up(tmp_path / "t", Design((vary,)), *runner._of.values())
-    gaps = gaps_of(read_cells(folder), Design((vary,)), SIDES, 1)
-    found = brought_together(gaps, vary, "tip", 0.2e-3, varied="both", runner=runner)
+    found = brought_together(data_of(folder), vary, "tip", 0.2e-3, varied="both", runner=runner)
     assert (found.best, found.cells) == (None, 2)
 
 
@@ -529,16 +519,13 @@ def test_a_real_sweep_is_answered(tmp_path: Path) -> None:
     )  # fmt: skip
     run_sweep(sweep, tmp_path / "s", jobs=1)
     found = sweep_report(tmp_path / "s", floor_cells=4, jobs=1)
-    assert found.floor is not None
-    assert (found.floor.cells, found.floor.settings) == (4, 2)
+    assert (the(found.floor).cells, the(found.floor).settings) == (4, 2)
     assert 0 < max(each.floor or 0 for each in found.settings) < 1e-6
     (fit,) = found.together
     assert (fit.label, fit.varied, fit.own) == ("damping", "right", 1.0)
     assert own.any()
-    assert fit.fit is not None
     # Both engines have the same model: its own damping, or one near it, is the best.
-    assert fit.fit.value == pytest.approx(1.0, abs=0.15)
-    assert fit.measured is not None
+    assert the(fit.fit).value == pytest.approx(1.0, abs=0.15)
     assert fit.pairs == 2
-    assert fit.measured < fit.fit.at(0.6)
-    assert found.ran == found.floor.cells + fit.cells
+    assert the(fit.measured) < np.interp(0.6, *the(fit.fit).scan)
+    assert found.ran == the(found.floor).cells + fit.cells

@@ -37,6 +37,12 @@ def one_line(text: object) -> str:
     return "".join(c if c.isprintable() else "?" for c in " ".join(str(text).split()))
 
 
+# What an option is: its flags, its metavar, its help, and what else argparse is told.
+Row = tuple[Any, ...]
+REPEATED = {"action": "append", "default": []}
+_TYPES = {"N": int, "S": float}  # of what has this metavar
+
+
 def file_name(text: str) -> Path:
     """A file to be written, as an option's type."""
     if not text:
@@ -44,49 +50,60 @@ def file_name(text: str) -> Path:
     return Path(text)
 
 
-def add_json(parser: argparse.ArgumentParser, what: str = "result", default: Any = False) -> None:
+def add_table(parser: Any, *rows: Row) -> None:
+    """Options from a table; one whose metavar is "" is a switch.
+
+    Args:
+        parser: A parser, or a group of one.
+        *rows: The options.
+    """
+    for flags, metavar, says, *more in rows:
+        told: dict[str, Any] = {"help": says, "metavar": metavar, "type": _TYPES.get(metavar)}
+        if metavar == "":
+            told = {"help": says, "action": "store_true"}
+        for each in more:
+            told |= each
+        parser.add_argument(*flags.split(), **told)
+
+
+# What several commands have.
+BACKEND = ("--backend", "NAME", f"an engine, or all (default {DEFAULT})", {"default": DEFAULT})
+ENGINE = ("--backend", "NAME", f"an engine (default {DEFAULT})", {"default": DEFAULT})
+DEFAULTS = (
+    "--defaults",
+    None,
+    "engine: each engine as its own users meet it (default model)",
+    {"default": "model", "choices": ("model", "engine")},
+)
+JOBS = ("--jobs", "N", "processes here (one a processor)")
+SECONDS = ("--seconds", "S", "simulated time")
+TRUST = (
+    "--trust-binary",
+    "",
+    "read a binary model (.mjb) that this library did not write; it can do harm",
+)
+
+
+def menagerie() -> tuple[Row, Row]:
+    """The options --trust-binary, which `cli.main` obeys, and --menagerie."""
+    folder = os.environ.get("MENAGERIE") or None
+    says = "look the model up in this folder of public models (default $MENAGERIE)"
+    return TRUST, ("--menagerie", "DIR", says, {"default": folder})
+
+
+def json_of(what: str = "result") -> Row:
     """The option --json."""
-    parser.add_argument(
-        "--json", action="store_true", default=default, help=f"print the {what} as JSON"
-    )
+    return "--json", "", f"print the {what} as JSON"
 
 
-def add_backend(
-    parser: argparse.ArgumentParser, everyone: bool = True, default: str = DEFAULT
-) -> None:
-    """The option --backend."""
-    text = "an engine, or all" if everyone else "an engine"
-    parser.add_argument(
-        "--backend", default=default, metavar="NAME", help=f"{text} (default {DEFAULT})"
-    )
-
-
-def add_menagerie(parser: argparse.ArgumentParser, default: str | None = None) -> None:
-    """The options --menagerie and --trust-binary, of commands that load a model."""
-    add_trust(parser, default or False)
-    parser.add_argument(
-        "--menagerie",
-        default=default or os.environ.get("MENAGERIE") or None,
-        metavar="DIR",
-        help="look the model up in this folder of public models (default $MENAGERIE)",
-    )
-
-
-def add_trust(parser: argparse.ArgumentParser, default: Any = False) -> None:
-    """The option --trust-binary; `cli.main` does what it says."""
-    parser.add_argument(
-        "--trust-binary",
-        action="store_true",
-        default=default,
-        help="read a binary model (.mjb) that this library did not write; it can do harm",
-    )
-
-
-def add_model(parser: argparse.ArgumentParser, model: str) -> None:
+def model_of(model: str) -> Row:
     """The option --model."""
-    parser.add_argument(
-        "--model", default=model, metavar="NAME|FILE", help=f"the model (default {model})"
-    )
+    return "--model", "NAME|FILE", f"the model (default {model})", {"default": model}
+
+
+def seed_of(what: str) -> Row:
+    """The option --seed."""
+    return "--seed", "N", f"of {what} (0)", {"default": 0}
 
 
 def on_each_backend(

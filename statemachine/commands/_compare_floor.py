@@ -6,20 +6,17 @@ import argparse
 from typing import Any
 
 from ..errors import BadInputError
+from ._common import REPEATED, Row
 
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Those of the chaos floor."""
-    parser.add_argument(
+OPTIONS: tuple[Row, ...] = (
+    (
         "--floor",
-        action="append",
-        default=[],
-        metavar="SIZE",
-        help="what your robot's start is uncertain by, such as 0.1mm or 0.1deg",
-    )
-    parser.add_argument(
-        "--no-floor", action="store_true", help="do not look for the chaos floor: faster"
-    )
+        "SIZE",
+        "what your robot's start is uncertain by, such as 0.1mm or 0.1deg",
+        REPEATED,
+    ),
+    ("--no-floor", "", "do not look for the chaos floor: faster"),
+)
 
 
 def check(options: argparse.Namespace) -> None:

@@ -9,20 +9,16 @@ from typing import Any
 
 from ..errors import BadInputError, MissingEngineError, StateMachineError
 from ..installed import PAIR
-from ._common import PROGRAM
+from ._common import PROGRAM, Row
 
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Those of the report."""
-    parser.add_argument(
+OPTIONS: tuple[Row, ...] = (
+    (
         "--html",
-        default=None,
-        metavar="PAGE.html",
-        help="write a report that stands alone: both runs in 3D, curves, figures, what causes it",
-    )
-    parser.add_argument(
-        "--no-why", action="store_true", help="of --html: do not look for what causes it"
-    )
+        "PAGE.html",
+        "write a report that stands alone: both runs in 3D, curves, figures, what causes it",
+    ),
+    ("--no-why", "", "of --html: do not look for what causes it"),
+)
 
 
 def check(options: argparse.Namespace) -> None:

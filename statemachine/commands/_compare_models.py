@@ -5,31 +5,21 @@ from __future__ import annotations
 import argparse
 
 from ..errors import BadInputError
-from ._common import PROGRAM, pairs_of, show
+from ._common import PROGRAM, REPEATED, Row, pairs_of, show
 
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Those of this half of the command; --backends, --seed, --menagerie, --json are shared."""
-    group = parser.add_argument_group("comparing descriptions of a robot")
-    group.add_argument(
+OPTIONS: tuple[Row, ...] = (
+    (
         "--models",
-        nargs="+",
-        metavar="NAME|FILE",
-        help="two models, URDF or MJCF, before anything moves; FILE@ENGINE, or --backends and one "
+        "NAME|FILE",
+        "two models, URDF or MJCF, before anything moves; FILE@ENGINE, or --backends and one "
         "model: what an engine makes of it",
-    )
-    group.add_argument(
-        "--frame",
-        action="append",
-        default=[],
-        metavar="LEFT=RIGHT",
-        help="a frame of the left and what the right calls it",
-    )
-    group.add_argument("--rename", action="append", dest="map", default=[], help=argparse.SUPPRESS)
-    group.add_argument(
-        "--digits", type=int, default=None, metavar="N", help="equal means to so many digits (6)"
-    )
-    group.add_argument("--all", action="store_true", help="a row for every figure that differs")
+        {"nargs": "+"},
+    ),
+    ("--frame", "LEFT=RIGHT", "a frame of the left and what the right calls it", REPEATED),
+    ("--rename", None, argparse.SUPPRESS, REPEATED, {"dest": "map"}),
+    ("--digits", "N", "equal means to so many digits (6)"),
+    ("--all", "", "a row for every figure that differs"),
+)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -8,40 +8,33 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError, ModelFileError, UnknownNameError
-from ._common import complain
+from ._common import Row, complain
 
 _OF_FILM = {"fps": 30.0, "slow": 1.0, "size": (640, 480), "renderer": "auto"}
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    """The options."""
-    group = parser.add_argument_group("pictures")
-    group.add_argument(
-        "--plot", default=None, metavar="FILE", help="write a figure: .svg, .png or .pdf"
-    )
-    group.add_argument(
-        "--film", default=None, metavar="FILE", help="write a film of both sides: .webp or .mp4"
-    )
-    add_film(group)
+def _size(text: str) -> tuple[int, int]:
+    width, cross, height = text.lower().partition("x")
+    if not (cross and width.isdecimal() and height.isdecimal()):
+        raise argparse.ArgumentTypeError(f"a size reads like 640x480; got {text}")
+    return int(width), int(height)
 
 
-def add_film(group: Any) -> None:
-    """How a film is made."""
-    group.add_argument(
-        "--fps", type=float, default=None, metavar="N", help="of the film (default 30)"
-    )
-    group.add_argument(
-        "--slow", type=float, default=None, metavar="N", help="of the film: N times slower"
-    )
-    group.add_argument(
-        "--size", type=_size, default=None, metavar="WxH", help="of the film (640x480)"
-    )
-    group.add_argument(
+OF_FILM: tuple[Row, ...] = (
+    ("--fps", "N", "of the film (default 30)", {"type": float}),
+    ("--slow", "N", "of the film: N times slower", {"type": float}),
+    ("--size", "WxH", "of the film (640x480)", {"type": _size}),
+    (
         "--renderer",
-        default=None,
-        metavar="NAME",
-        help="of the film: an engine that draws, or auto: the first that can here",
-    )
+        "NAME",
+        "of the film: an engine that draws, or auto: the first that can here",
+    ),
+)
+OPTIONS: tuple[Row, ...] = (
+    ("--plot", "FILE", "write a figure: .svg, .png or .pdf"),
+    ("--film", "FILE", "write a film of both sides: .webp or .mp4"),
+    *OF_FILM,
+)
 
 
 @dataclass(frozen=True)
@@ -185,13 +178,6 @@ def _models(options: Any, files: Any, *traces: Any) -> Any:
             )
         models.append(model)
     return tuple(models)
-
-
-def _size(text: str) -> tuple[int, int]:
-    width, cross, height = text.lower().partition("x")
-    if not (cross and width.isdecimal() and height.isdecimal()):
-        raise argparse.ArgumentTypeError(f"a size reads like 640x480; got {text}")
-    return int(width), int(height)
 
 
 def _bytes(size: int) -> str:

@@ -7,23 +7,21 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError
-from ._common import show
+from ._common import Row, show
 from ._compare_rerun import both_of, finer, refuse_recorded
 
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Those of the two questions."""
-    group = parser.add_argument_group("is it a difference, and of what?")
-    group.add_argument(
+OPTIONS: tuple[Row, ...] = (
+    (
         "--one-step",
-        action="store_true",
-        help="one step on each side from each state of the left one: the stage that parts first",
-    )
-    group.add_argument(
+        "",
+        "one step on each side from each state of the left one: the stage that parts first",
+    ),
+    (
         "--converge",
-        action="store_true",
-        help="run with steps as given, halved and quartered: what vanishes is discretisation",
-    )
+        "",
+        "run with steps as given, halved and quartered: what vanishes is discretisation",
+    ),
+)
 
 
 def asked(options: argparse.Namespace) -> bool:

@@ -7,39 +7,24 @@ from dataclasses import replace
 from typing import Any
 
 from ..errors import BadInputError
-from ._common import PROGRAM, complain, show
+from ._common import JOBS, PROGRAM, Row, complain, show
 
 _OF_SIDES = ("measure", "finer", "budget", "jobs")
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Those of --why."""
-    group = parser.add_argument_group("why")
-    group.add_argument(
-        "--why", action="store_true", help="which difference explains how much of the gap"
-    )
-    group.add_argument(
-        "--quantity", default=None, metavar="NAME", help="what the gap is measured in"
-    )
-    group.add_argument(
+OPTIONS: tuple[Row, ...] = (
+    ("--why", "", "which difference explains how much of the gap"),
+    ("--quantity", "NAME", "what the gap is measured in"),
+    (
         "--measure",
-        default=None,
-        choices=("worst", "end", "rms"),
-        help="which figure of it, of two sides (worst)",
-    )
-    group.add_argument(
-        "--finer", action="store_true", help="every difference of two sides by its entries"
-    )
-    group.add_argument(
-        "--budget",
-        type=int,
-        default=None,
-        metavar="N",
-        help="how many sets of causes may be run where they interact (200)",
-    )
-    group.add_argument(
-        "--jobs", type=int, default=None, metavar="N", help="processes here (one a processor)"
-    )
+        None,
+        "which figure of it, of two sides (worst)",
+        {"choices": ("worst", "end", "rms")},
+    ),
+    ("--finer", "", "every difference of two sides by its entries"),
+    ("--budget", "N", "how many sets of causes may be run where they interact (200)"),
+    JOBS,
+)
 
 
 def _given(options: argparse.Namespace, name: str) -> bool:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError
-from ._common import complain, file_name
+from ._common import REPEATED, add_table, complain, file_name
 
 # Options of a report alone, and what they are where they are not given.
 _DEFAULTS: dict[str, Any] = {
@@ -26,53 +26,39 @@ _DEFAULTS: dict[str, Any] = {
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Those of the report."""
     group = parser.add_argument_group("from a sweep to an answer")
-    group.add_argument(
-        "--report",
-        nargs="?",
-        const=True,
-        default=None,
-        metavar="DIR",
-        help="of the dataset in DIR, or of that which was just run: where two engines agree, what "
-        "the gap is sensitive to, which value brings them together",
-    )
-    group.add_argument(
-        "--quantity",
-        default=None,
-        metavar="NAME",
-        help="whose gap: tip, tip-end, qpos, qpos-end, touch (tip)",
-    )
-    group.add_argument(
-        "--tolerance",
-        action="append",
-        default=[],
-        metavar="KIND=SIZE",
-        help="another tolerance, such as tip=2mm, joint=0.5deg, contact=10ms",
-    )
-    group.add_argument(
-        "--fit",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="the parameter that is to bring them together (the most sensitive one)",
-    )
-    group.add_argument(
-        "--varied",
-        choices=("right", "both"),
-        default=None,
-        help="right: the left engine keeps the model's own value; both: both have the same "
-        "(right, of an option of the model)",
-    )
-    group.add_argument(
-        "--floor-cells", type=int, default=None, metavar="N", help="run for the chaos floor (64)"
-    )
-    group.add_argument(
-        "--no-runs", action="store_true", help="no floor and no check: nothing is run for a report"
-    )
-    group.add_argument(
-        "--html", type=file_name, default=None, metavar="PAGE.html", help="write it as one page"
-    )
-    group.add_argument(
-        "--plot", type=file_name, default=None, metavar="FILE", help="write its pictures: .png, …"
+    add_table(
+        group,
+        (
+            "--report",
+            "DIR",
+            "of the dataset in DIR, or of that which was just run: where two engines agree, what "
+            "the gap is sensitive to, which value brings them together",
+            {"nargs": "?", "const": True},
+        ),
+        ("--quantity", "NAME", "whose gap: tip, tip-end, qpos, qpos-end, touch (tip)"),
+        (
+            "--tolerance",
+            "KIND=SIZE",
+            "another tolerance, such as tip=2mm, joint=0.5deg, contact=10ms",
+            REPEATED,
+        ),
+        (
+            "--fit",
+            "NAME",
+            "the parameter that is to bring them together (the most sensitive one)",
+            REPEATED,
+        ),
+        (
+            "--varied",
+            None,
+            "right: the left engine keeps the model's own value; both: both have the same "
+            "(right, of an option of the model)",
+            {"choices": ("right", "both")},
+        ),
+        ("--floor-cells", "N", "run for the chaos floor (64)"),
+        ("--no-runs", "", "no floor and no check: nothing is run for a report"),
+        ("--html", "PAGE.html", "write it as one page", {"type": file_name}),
+        ("--plot", "FILE", "write its pictures: .png, …", {"type": file_name}),
     )
 
 

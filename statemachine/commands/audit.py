@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import argparse
 
-from ._common import add_backend, add_json, add_menagerie, add_model, on_each_backend, show
+from ._common import (
+    BACKEND,
+    add_table,
+    json_of,
+    menagerie,
+    model_of,
+    on_each_backend,
+    seed_of,
+    show,
+)
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -21,12 +30,15 @@ def add(parser: argparse.ArgumentParser) -> None:
         "another Data, threads and processes change nothing. What an engine itself forgets is a "
         "fact, not a fault: it is shown, and the exit code is 0."
     )
-    add_backend(parser)
-    add_model(parser, "so101/scene_box")
-    add_menagerie(parser)
-    add_json(parser)
-    parser.add_argument("--steps", type=int, default=60, metavar="N", help="of each future (60)")
-    parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the commands (0)")
+    add_table(
+        parser,
+        BACKEND,
+        model_of("so101/scene_box"),
+        *menagerie(),
+        json_of(),
+        ("--steps", "N", "of each future (60)", {"default": 60}),
+        seed_of("the commands"),
+    )
     parser.set_defaults(run=run)
 
 

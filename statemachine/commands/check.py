@@ -6,8 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from . import _mutants
-from ._common import SAYS_NO, add_backend, add_json, complain, file_name, show
+from ._common import ENGINE, REPEATED, SAYS_NO, add_table, complain, file_name, json_of, show
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -22,60 +21,67 @@ def add(parser: argparse.ArgumentParser) -> None:
         "Exit code 1: a function does not do what it should; of a class: a file could not be "
         "judged."
     )
-    parser.add_argument(
-        "files",
-        nargs="*",
-        metavar="FILE|FOLDER",
-        help="the student's file, like step_loop.py, or the folder that it is in; or those of a "
-        "class, each in the folder or in a folder of its own there",
+    add_table(
+        parser,
+        (
+            "files",
+            "FILE|FOLDER",
+            "the student's file, like step_loop.py, or the folder that it is in; or those of a "
+            "class, each in the folder or in a folder of its own there",
+            {"nargs": "*"},
+        ),
+        ENGINE,
+        (
+            "--time-limit",
+            "S",
+            "seconds that each function of FILE may compute (default 5); time in which the "
+            "machine is busy with others does not count, up to 120 s on the clock, or 8 times S; "
+            "what only waits may do so for 10 s, or twice S",
+            {"default": 5.0},
+        ),
+        (
+            "--csv",
+            "TABLE",
+            "of a class: write the table there after each file; typed again, it judges only "
+            "files that are new or changed",
+            {"type": file_name},
+        ),
+        (
+            "--jobs",
+            "N",
+            "of a class: how many files are judged at once (default: one for two processors)",
+        ),
+        (
+            "--roster",
+            "LIST",
+            "of a class: a CSV file with a row for each student, whose cells (a name, a number) "
+            "are looked for in the names of files; who handed in nothing is a row of the table",
+            {"type": Path},
+        ),
+        (
+            "--tests",
+            "",
+            "of a class: run the test_arm.py in each student's folder on arms with faults, too",
+        ),
+        (
+            "--gradescope",
+            "RESULTS",
+            "of one file, or a folder with one: write Gradescope's results.json, too",
+            {"type": file_name},
+        ),
+        (
+            "--mutants",
+            "TESTFILE",
+            "run these tests on the arm with one fault at a time, and say which they catch",
+        ),
+        (
+            "--only",
+            "FAULT",
+            "with --mutants: only this fault; may be given several times",
+            REPEATED,
+        ),
+        json_of("judgement"),
     )
-    add_backend(parser, everyone=False)
-    parser.add_argument(
-        "--time-limit",
-        type=float,
-        default=5.0,
-        metavar="S",
-        help="seconds that each function of FILE may compute (default 5); time in which the "
-        "machine is busy with others does not count, up to 120 s on the clock, or 8 times S; "
-        "what only waits may do so for 10 s, or twice S",
-    )
-    parser.add_argument(
-        "--csv",
-        type=file_name,
-        default=None,
-        metavar="TABLE",
-        help="of a class: write the table there after each file; typed again, it judges only "
-        "files that are new or changed",
-    )
-    parser.add_argument(
-        "--jobs",
-        type=int,
-        default=None,
-        metavar="N",
-        help="of a class: how many files are judged at once (default: one for two processors)",
-    )
-    parser.add_argument(
-        "--roster",
-        type=Path,
-        default=None,
-        metavar="LIST",
-        help="of a class: a CSV file with a row for each student, whose cells (a name, a number) "
-        "are looked for in the names of files; who handed in nothing is a row of the table",
-    )
-    parser.add_argument(
-        "--tests",
-        action="store_true",
-        help="of a class: run the test_arm.py in each student's folder on arms with faults, too",
-    )
-    parser.add_argument(
-        "--gradescope",
-        type=file_name,
-        default=None,
-        metavar="RESULTS",
-        help="of one file, or a folder with one: write Gradescope's results.json, too",
-    )
-    _mutants.add(parser)
-    add_json(parser, "judgement")
     parser.set_defaults(run=run, parser=parser)
 
 
@@ -98,13 +104,24 @@ def run(options: argparse.Namespace) -> int:
             "--csv, --jobs, --roster and --tests go with several files, or a folder"
         )
     if options.mutants is not None:
-        return _mutants.run(options)
+        return _mutants(options)
     if options.only:
         options.parser.error("--only goes with --mutants")
     for target in (options.csv, options.gradescope):
         if target is not None:
             check_place(target)
     return _class(options) if several else _one(options)
+
+
+def _mutants(options: argparse.Namespace) -> int:
+    """A student's tests, on every mutant."""
+    from ..grading.mutants.run import examine
+    from ..report import mutants
+    from ..report.progress import progress
+
+    with progress("mutants") as report:
+        found = examine(options.mutants, options.backend, options.only, progress=report)
+    return show(mutants.page(found), found, options.json)
 
 
 def _one(options: argparse.Namespace) -> int:

@@ -15,7 +15,20 @@ from . import (
     _compare_why,
 )
 from . import _compare_pictures as pictures
-from ._common import PROGRAM, add_json, add_menagerie, complain, pairs_of, show
+from ._common import (
+    DEFAULTS,
+    PROGRAM,
+    REPEATED,
+    SECONDS,
+    Row,
+    add_table,
+    complain,
+    json_of,
+    menagerie,
+    pairs_of,
+    seed_of,
+    show,
+)
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -37,55 +50,47 @@ def add(parser: argparse.ArgumentParser) -> None:
         "stays unexplained."
     )
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument(
-        "what",
-        nargs="*",
-        metavar="WHAT",
-        help="what is run: an experiment, FILE.py:FUNCTION or a recorded TRACE; then nothing, two "
-        "sides, or a second trace",
-    )
-    parser.add_argument(
-        "--backends",
-        nargs=2,
-        default=None,
-        metavar=("A", "B"),
-        help="the engines (default mujoco pybullet)",
-    )
-    add_defaults(parser)
-    add_run(parser)
-    parser.add_argument(
-        "--tolerance",
-        action="append",
-        default=[],
-        metavar="KIND=VALUE",
-        help="another tolerance, such as joint=0.5deg, tip=2mm, energy=0.1J",
+    add_table(
+        parser,
+        (
+            "what",
+            "WHAT",
+            "what is run: an experiment, FILE.py:FUNCTION or a recorded TRACE; then nothing, two "
+            "sides, or a second trace",
+            {"nargs": "*"},
+        ),
+        ("--backends", ("A", "B"), "the engines (default mujoco pybullet)", {"nargs": 2}),
+        *run_options(),
+        (
+            "--tolerance",
+            "KIND=VALUE",
+            "another tolerance, such as joint=0.5deg, tip=2mm, energy=0.1J",
+            REPEATED,
+        ),
+        *_compare_floor.OPTIONS,
+        *_compare_html.OPTIONS,
+        json_of(),
     )
     group = parser.add_argument_group("two sides")
-    group.add_argument(
-        "--map",
-        action="append",
-        default=[],
-        metavar="LEFT=RIGHT",
-        help="a joint, body, site or actuator of the left and its name on the right; of --models, "
-        "too",
+    add_table(
+        group,
+        (
+            "--map",
+            "LEFT=RIGHT",
+            "a joint, body, site or actuator of the left and its name on the right; of --models, "
+            "too",
+            REPEATED,
+        ),
+        ("--every", "N", "steps for which what FUNCTION(model, data) returned holds (1)"),
+        ("--keyframe", "NAME", "where a FUNCTION starts, on both sides"),
     )
-    group.add_argument(
-        "--every",
-        type=int,
-        default=None,
-        metavar="N",
-        help="steps for which what FUNCTION(model, data) returned holds (1)",
-    )
-    group.add_argument(
-        "--keyframe", default=None, metavar="NAME", help="where a FUNCTION starts, on both sides"
-    )
-    _compare_why.add_options(parser)
-    _compare_floor.add_options(parser)
-    _compare_steps.add_options(parser)
-    _compare_html.add_options(parser)
-    pictures.add(parser)
-    _compare_models.add_options(parser)
-    add_json(parser)
+    for title, rows in (
+        ("why", _compare_why.OPTIONS),
+        ("is it a difference, and of what?", _compare_steps.OPTIONS),
+        ("pictures", pictures.OPTIONS),
+        ("comparing descriptions of a robot", _compare_models.OPTIONS),
+    ):
+        add_table(parser.add_argument_group(title), *rows)
     parser.set_defaults(run=run, words_in="what")
 
 
@@ -105,16 +110,6 @@ def experiments() -> str:
     return "\n".join(f"  {name:<9} {says}" for name, says in EXPERIMENTS.items())
 
 
-def add_defaults(parser: argparse.ArgumentParser) -> None:
-    """The option --defaults."""
-    parser.add_argument(
-        "--defaults",
-        default="model",
-        choices=("model", "engine"),
-        help="engine: each engine as its own users meet it (default model)",
-    )
-
-
 class _Once(argparse.Action):
     """An option whose second value would silently replace the first."""
 
@@ -130,21 +125,16 @@ class _Once(argparse.Action):
         setattr(namespace, self.dest, values)
 
 
-def add_run(parser: argparse.ArgumentParser) -> None:
+def run_options() -> tuple[Row, ...]:
     """Options that change what is run."""
-    parser.add_argument(
-        "--model",
-        default=None,
-        action=_Once,
-        metavar="NAME|FILE",
-        help="instead of the experiment's own",
+    return (
+        DEFAULTS,
+        ("--model", "NAME|FILE", "instead of the experiment's own", {"action": _Once}),
+        *menagerie(),
+        SECONDS,
+        ("--timestep", "S", "of each step [s]"),
+        seed_of("what is drawn"),
     )
-    add_menagerie(parser)
-    parser.add_argument("--seconds", type=float, default=None, metavar="S", help="simulated time")
-    parser.add_argument(
-        "--timestep", type=float, default=None, metavar="S", help="of each step [s]"
-    )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of what is drawn (0)")
 
 
 def request_of(options: argparse.Namespace) -> Any:

@@ -6,22 +6,24 @@ import argparse
 
 from ..errors import BadInputError, MissingEngineError
 from ..installed import ENGINES, available
-from ._common import MISSING, PROGRAM, add_json, complain, show
+from ._common import MISSING, PROGRAM, add_table, complain, json_of, show
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Its options."""
     parser.description = "Ask the engines themselves, not our backends: every answer is measured."
-    parser.add_argument(
-        "question",
-        nargs="*",
-        help="only these, such as quaternion or gravity (default: all; a wrong name lists them)",
+    add_table(
+        parser,
+        (
+            "question",
+            None,
+            "only these, such as quaternion or gravity (default: all; a wrong name lists them)",
+            {"nargs": "*"},
+        ),
+        ("--calls", "", "which call does what, each run"),
+        ("--backend", "NAME", "an engine, or all (default all)", {"default": "all"}),
+        json_of(),
     )
-    parser.add_argument("--calls", action="store_true", help="which call does what, each run")
-    parser.add_argument(
-        "--backend", default="all", metavar="NAME", help="an engine, or all (default all)"
-    )
-    add_json(parser)
     parser.set_defaults(run=run)
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 
-from ._common import MISSING, add_json, show
+from ._common import MISSING, add_table, json_of, show
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Its options."""
-    add_json(parser, "findings")
+    add_table(parser, json_of("findings"))
     parser.set_defaults(run=run)
 
 

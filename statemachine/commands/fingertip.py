@@ -4,29 +4,36 @@ from __future__ import annotations
 
 import argparse
 
-from ._common import add_backend, add_json, add_menagerie, add_model, on_each_backend, show
+from ._common import (
+    BACKEND,
+    add_table,
+    json_of,
+    menagerie,
+    model_of,
+    on_each_backend,
+    seed_of,
+    show,
+)
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Its options."""
     parser.description = "Compare poses of sites or bodies on an engine with Pinocchio's."
-    add_backend(parser)
-    add_model(parser, "so101")
-    add_menagerie(parser)
-    add_json(parser)
-    parser.add_argument("--poses", type=int, default=200, metavar="N", help="how many (200)")
-    parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the poses (0)")
-    parser.add_argument(
-        "--site",
-        default=None,
-        metavar="NAME",
-        help="the site or body (gripperframe if there is one, else every body at an end)",
-    )
-    parser.add_argument(
-        "--witness", default=None, metavar="FILE", help="what Pinocchio reads (default: the model)"
-    )
-    parser.add_argument(
-        "--witness-frame", default=None, metavar="NAME", help="the frame's name there"
+    add_table(
+        parser,
+        BACKEND,
+        model_of("so101"),
+        *menagerie(),
+        json_of(),
+        ("--poses", "N", "how many (200)", {"default": 200}),
+        seed_of("the poses"),
+        (
+            "--site",
+            "NAME",
+            "the site or body (gripperframe if there is one, else every body at an end)",
+        ),
+        ("--witness", "FILE", "what Pinocchio reads (default: the model)"),
+        ("--witness-frame", "NAME", "the frame's name there"),
     )
     parser.set_defaults(run=run)
 

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError, MissingEngineError
-from ..installed import DEFAULT
 from ..lessons import LESSONS, STATIONS
 from ..lessons.records import Lesson
 from ._common import (
+    BACKEND,
     MISSING,
     PROGRAM,
     SAYS_NO,
-    add_backend,
-    add_json,
-    add_menagerie,
-    add_model,
+    Row,
+    add_table,
     complain,
+    json_of,
+    menagerie,
+    model_of,
     on_each_backend,
     show,
 )
@@ -30,20 +32,20 @@ def add(parser: argparse.ArgumentParser) -> None:
     """Its options, and a parser for each station."""
     parser.description = "Without a name: all stations, one after the other."
     parser.epilog = "In a terminal each station asks for a prediction before it shows the answer."
-    _add_shared(parser)
-    parser.add_argument(
-        "--from",
-        dest="start",
-        type=by_number,
-        choices=[lesson.name for lesson in STATIONS],
-        default=None,
-        metavar="STATION",
-        help="of the whole path: where to begin, if not at the first",
-    )
-    parser.add_argument(
-        "--further",
-        action="store_true",
-        help="of the whole path: then the fingertip against a witness, and where to go next",
+    add_table(
+        parser,
+        *_shared(),
+        (
+            "--from",
+            "STATION",
+            "of the whole path: where to begin, if not at the first",
+            {"dest": "start", "type": by_number, "choices": [lesson.name for lesson in STATIONS]},
+        ),
+        (
+            "--further",
+            "",
+            "of the whole path: then the fingertip against a witness, and where to go next",
+        ),
     )
     parser.set_defaults(run=run_path)
     named = parser.add_subparsers(metavar="name")
@@ -57,52 +59,32 @@ def by_number(word: str) -> str:
     return names[int(word) - 1] if word.isdecimal() and 0 < int(word) <= len(names) else word
 
 
-def _add_shared(parser: argparse.ArgumentParser, default: Any = None) -> None:
+def _shared() -> Iterator[Row]:
     """Options that come before a station's name or after it; the later one counts."""
-    add_backend(parser, default=default or DEFAULT)
-    add_menagerie(parser, default)
-    add_json(parser, default=default or False)
-    parser.add_argument(
-        "--calls",
-        action="store_true",
-        default=default or False,
-        help="show which of the engine's own functions the code made it run",
-    )
-    parser.add_argument(
-        "--no-questions",
-        action="store_true",
-        default=default or False,
-        help="do not ask for predictions, do not wait",
-    )
-    parser.add_argument(
-        "--record",
-        default=default,
-        metavar="FILE",
-        help="keep your predictions in this file, with a score, to hand in",
-    )
+    yield from (BACKEND, *menagerie(), json_of())
+    yield "--calls", "", "show which of the engine's own functions the code made it run"
+    yield "--no-questions", "", "do not ask for predictions, do not wait"
+    yield "--record", "FILE", "keep your predictions in this file, with a score, to hand in"
 
 
 def _add_lesson(named: Any, lesson: Lesson) -> None:
     parser = named.add_parser(lesson.name, help=lesson.question, description=lesson.question)
-    _add_shared(parser, default=argparse.SUPPRESS)
-    add_model(parser, lesson.model)
+    rows: list[Row] = [(*row, {"default": argparse.SUPPRESS}) for row in _shared()]
     for option in lesson.options:
         if option.kind is bool:
-            parser.add_argument(option.flag, dest=option.key, action="store_true", help=option.help)
+            rows.append((option.flag, "", option.help, {"dest": option.key}))
             continue
+        metavar = None if option.choices else "X,X,…" if option.many else option.key.upper()
         default = "" if option.default is None else f" (default {option.default})"
-        parser.add_argument(
-            option.flag,
-            dest=option.key,
-            default=option.default,
-            type=_numbers if option.many else option.kind,
-            choices=option.choices,
-            metavar=None if option.choices else "X,X,…" if option.many else option.key.upper(),
-            help=option.help + default,
-        )
-    parser.add_argument(
-        "--plot", default=None, metavar="FILE", help="write its pictures: .svg, .png or .pdf"
-    )
+        more = {
+            "dest": option.key,
+            "default": option.default,
+            "type": _numbers if option.many else option.kind,
+            "choices": option.choices,
+        }
+        rows.append((option.flag, metavar, option.help + default, more))
+    rows.append(("--plot", "FILE", "write its pictures: .svg, .png or .pdf"))
+    add_table(parser, *rows, model_of(lesson.model))
     parser.set_defaults(run=run, lesson=lesson)
 
 

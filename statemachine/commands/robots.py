@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ._common import SAYS_NO, add_json, add_trust, complain, show
+from ._common import SAYS_NO, TRUST, add_table, complain, json_of, seed_of, show
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -23,30 +23,22 @@ def add(parser: argparse.ArgumentParser) -> None:
         "without contacts that neither a warning nor the timestep accounts for, an explosion, a "
         "witness that places a frame elsewhere. A refusal is a fact, and no fault."
     )
-    parser.add_argument("paths", nargs="+", metavar="DIR|FILE", help="folders of models, or models")
-    parser.add_argument(
-        "--out",
-        default=None,
-        metavar="TABLE",
-        help="write the table there after each model, .csv or .json; typed again, it examines "
-        "only models that are new or changed",
+    add_table(
+        parser,
+        ("paths", "DIR|FILE", "folders of models, or models", {"nargs": "+"}),
+        (
+            "--out",
+            "TABLE",
+            "write the table there after each model, .csv or .json; typed again, it examines "
+            "only models that are new or changed",
+        ),
+        ("--quick", "", "leave out the experiments and the costs"),
+        ("--seconds", "S", "that a model may take (60)", {"default": 60.0}),
+        ("--jobs", "N", "how many models at once (default: one for each processor)"),
+        seed_of("what is drawn"),
+        TRUST,
+        json_of("table"),
     )
-    parser.add_argument(
-        "--quick", action="store_true", help="leave out the experiments and the costs"
-    )
-    parser.add_argument(
-        "--seconds", type=float, default=60.0, metavar="S", help="that a model may take (60)"
-    )
-    parser.add_argument(
-        "--jobs",
-        type=int,
-        default=None,
-        metavar="N",
-        help="how many models at once (default: one for each processor)",
-    )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of what is drawn (0)")
-    add_trust(parser)
-    add_json(parser, "table")
     parser.set_defaults(run=run)
 
 

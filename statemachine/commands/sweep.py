@@ -7,8 +7,19 @@ from pathlib import Path
 from typing import Any
 
 from . import _sweep_report
-from ._common import SAYS_NO, add_json, add_menagerie, complain, show
-from .compare import add_defaults, experiments
+from ._common import (
+    DEFAULTS,
+    JOBS,
+    REPEATED,
+    SAYS_NO,
+    SECONDS,
+    add_table,
+    complain,
+    json_of,
+    menagerie,
+    show,
+)
+from .compare import experiments
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -34,94 +45,50 @@ def add(parser: argparse.ArgumentParser) -> None:
         "all\nsettings. docs/sweeps.md has the columns of the dataset."
     )
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument(
-        "what", nargs="?", metavar="WHAT", help="an experiment, or FILE.py:FUNCTION"
-    )
-    parser.add_argument(
-        "--vary", action="append", default=[], metavar="NAME=VALUES", help="what changes; see above"
-    )
-    parser.add_argument(
-        "--out",
-        default=None,
-        metavar="DIR",
-        help="the folder of the dataset; a new one, or to go on",
-    )
-    parser.add_argument(
-        "--backend",
-        action="append",
-        default=None,
-        metavar="NAME",
-        help="an engine, or all; may be repeated (all)",
-    )
-    parser.add_argument(
-        "--seeds",
-        type=int,
-        default=1,
-        metavar="N",
-        help="starts for each setting: seeds 0 to N-1 (1)",
-    )
-    parser.add_argument(
-        "--spread",
-        default=None,
-        metavar="SIZES",
-        help="how far a seed other than 0 puts the start away (1deg,1mm; 0 for not at all)",
+    add_table(
+        parser,
+        ("what", "WHAT", "an experiment, or FILE.py:FUNCTION", {"nargs": "?"}),
+        ("--vary", "NAME=VALUES", "what changes; see above", REPEATED),
+        ("--out", "DIR", "the folder of the dataset; a new one, or to go on"),
+        ("--backend", "NAME", "an engine, or all; may be repeated (all)", {"action": "append"}),
+        ("--seeds", "N", "starts for each setting: seeds 0 to N-1 (1)", {"default": 1}),
+        (
+            "--spread",
+            "SIZES",
+            "how far a seed other than 0 puts the start away (1deg,1mm; 0 for not at all)",
+        ),
     )
     group = parser.add_argument_group("ranges")
-    group.add_argument(
-        "--samples",
-        type=int,
-        default=0,
-        metavar="N",
-        help="Sobol points of the ranges, a power of 2",
-    )
-    group.add_argument(
-        "--indices",
-        action="store_true",
-        help="the points that Sobol indices are computed from: N for each range, and 2 N more",
-    )
-    group.add_argument(
-        "--design-seed", type=int, default=0, metavar="N", help="of what is drawn for them (0)"
+    add_table(
+        group,
+        ("--samples", "N", "Sobol points of the ranges, a power of 2", {"default": 0}),
+        (
+            "--indices",
+            "",
+            "the points that Sobol indices are computed from: N for each range, and 2 N more",
+        ),
+        ("--design-seed", "N", "of what is drawn for them (0)", {"default": 0}),
     )
     group = parser.add_argument_group("the run")
-    group.add_argument(
-        "--model", default=None, metavar="NAME|FILE", help="instead of the experiment's own"
-    )
-    add_menagerie(parser)
-    group.add_argument("--seconds", type=float, default=None, metavar="S", help="simulated time")
-    group.add_argument("--keyframe", default=None, metavar="NAME", help="where a FUNCTION starts")
-    group.add_argument(
-        "--every",
-        type=int,
-        default=1,
-        metavar="N",
-        help="steps for which what a FUNCTION returned holds (1)",
-    )
-    add_defaults(parser)
-    group.add_argument(
-        "--moments", type=int, default=20, metavar="N", help="of each run that are kept (20)"
-    )
-    group.add_argument(
-        "--timeout", type=float, default=600.0, metavar="S", help="that a cell may take (600)"
+    add_table(
+        group,
+        ("--model", "NAME|FILE", "instead of the experiment's own"),
+        SECONDS,
+        ("--keyframe", "NAME", "where a FUNCTION starts"),
+        ("--every", "N", "steps for which what a FUNCTION returned holds (1)", {"default": 1}),
+        ("--moments", "N", "of each run that are kept (20)", {"default": 20}),
+        ("--timeout", "S", "that a cell may take (600)", {"default": 600.0}),
     )
     group = parser.add_argument_group("where")
-    group.add_argument(
-        "--jobs", type=int, default=None, metavar="N", help="processes here (one a processor)"
-    )
-    group.add_argument(
-        "--scheduler", default=None, metavar="ADDRESS", help="of Dask, whose workers run it instead"
-    )
-    group.add_argument(
-        "--extend",
-        action="store_true",
-        help="let the dataset in DIR grow by values, seeds, engines",
-    )
-    group.add_argument(
-        "--retry-failed",
-        action="store_true",
-        help="run the cells that failed again; their rows are replaced",
+    add_table(
+        group,
+        JOBS,
+        ("--scheduler", "ADDRESS", "of Dask, whose workers run it instead"),
+        ("--extend", "", "let the dataset in DIR grow by values, seeds, engines"),
+        ("--retry-failed", "", "run the cells that failed again; their rows are replaced"),
     )
     _sweep_report.add_options(parser)
-    add_json(parser, "summary, or the report,")
+    add_table(parser, DEFAULTS, *menagerie(), json_of("summary, or the report,"))
     parser.set_defaults(run=run)
 
 

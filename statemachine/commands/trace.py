@@ -10,16 +10,19 @@ from ..errors import BadInputError
 from ..installed import DEFAULT
 from . import _compare_pictures as pictures
 from ._common import (
+    DEFAULTS,
+    ENGINE,
     PROGRAM,
     SAYS_NO,
-    add_backend,
-    add_json,
-    add_menagerie,
+    Row,
+    add_table,
     complain,
+    json_of,
+    menagerie,
     one_line,
     show,
 )
-from .compare import EXPERIMENTS, add_defaults, add_run, experiments
+from .compare import EXPERIMENTS, experiments, run_options
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -27,21 +30,58 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.description = "Everything that a run did, in a file that opens without an engine."
     parser.set_defaults(run=lambda _options: _none_given())
     named = parser.add_subparsers(metavar="action")
-    _add_record(named)
-    _add_play(named)
-    look = named.add_parser("show", help="what a trace is of, and what is in it")
-    look.add_argument("file", metavar="TRACE", help="a file .npz or .parquet")
-    add_json(look, "header")
-    look.set_defaults(run=run_show)
-    table = named.add_parser(
-        "csv",
-        help="write it as CSV, contacts in a second file",
-        description="One row for each moment; contacts go into NAME.contacts.csv beside it.",
+    file = ("file", "TRACE", "a file .npz or .parquet")
+    own = ("--model", "NAME|FILE", "instead of the trace's own"), *menagerie()
+    record = (
+        ("what", "EXPERIMENT", "what to do", {"nargs": "?"}),
+        (
+            "--controller",
+            "FILE.py[:NAME]",
+            "instead: a function (time, data) -> ctrl, by default named controller",
+        ),
+        ("--keyframe", "NAME", "where a controller starts"),
+        ENGINE,
+        *run_options(),
+        _output("WHAT.BACKEND.npz"),
     )
-    table.add_argument("file", metavar="TRACE", help="a file .npz or .parquet")
-    _add_output(table, "TRACE.csv")
-    table.set_defaults(run=run_csv)
-    _add_pictures(named)
+    play = file, ENGINE, DEFAULTS, *own, _output("TRACE.BACKEND.npz")
+    for name, help_, run, rows in (
+        ("record", "record an experiment, or a controller of your own", run_record, record),
+        ("play", "play the ctrl of a trace on an engine", run_play, play),
+        (
+            *("show", "what a trace is of, and what is in it"),
+            *(run_show, (file, json_of("header"))),
+        ),
+        (
+            *("csv", "write it as CSV, contacts in a second file"),
+            *(run_csv, (file, _output("TRACE.csv"))),
+        ),
+        (
+            *("plot", "draw its curves: .svg, .png or .pdf"),
+            *(run_pictures, (file, _output("TRACE.svg"))),
+        ),
+        (
+            *("film", "make a film of it: .webp or .mp4"),
+            *(run_pictures, (file, _output("TRACE.webp"), *own, *pictures.OF_FILM)),
+        ),
+    ):
+        action = named.add_parser(
+            name,
+            help=help_,
+            description=_DESCRIPTIONS.get(name),
+            epilog=f"experiments:\n{experiments()}" if name == "record" else None,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        add_table(action, *rows)
+        action.set_defaults(run=run, picture=name)
+
+
+_DESCRIPTIONS = {
+    "record": "Run it, then run it again with the recorded commands to read what the engine\n"
+    "derives: the second run must end in the same bits.",
+    "play": "From the state that the trace starts in; the result is another trace.",
+    "csv": "One row for each moment; contacts go into NAME.contacts.csv beside it.",
+}
 
 
 def _none_given() -> int:
@@ -50,72 +90,8 @@ def _none_given() -> int:
     )
 
 
-def _add_pictures(named: Any) -> None:
-    for name, help_, usual in (
-        ("plot", "draw its curves: .svg, .png or .pdf", "TRACE.svg"),
-        ("film", "make a film of it: .webp or .mp4", "TRACE.webp"),
-    ):
-        parser = named.add_parser(name, help=help_)
-        parser.add_argument("file", metavar="TRACE", help="a file .npz or .parquet")
-        _add_output(parser, usual)
-        parser.set_defaults(run=run_pictures, picture=name)
-        if name == "film":
-            parser.add_argument(
-                "--model", default=None, metavar="NAME|FILE", help="instead of the trace's own"
-            )
-            add_menagerie(parser)
-            pictures.add_film(parser)
-
-
-def _add_output(parser: argparse.ArgumentParser, usual: str) -> None:
-    parser.add_argument(
-        "-o", "--output", default=None, metavar="FILE", help=f"where to (default {usual})"
-    )
-
-
-def _add_record(named: Any) -> None:
-    parser = named.add_parser(
-        "record",
-        help="record an experiment, or a controller of your own",
-        description=(
-            "Run it, then run it again with the recorded commands to read what the engine\n"
-            "derives: the second run must end in the same bits."
-        ),
-        epilog=f"experiments:\n{experiments()}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("what", nargs="?", metavar="EXPERIMENT", help="what to do")
-    parser.add_argument(
-        "--controller",
-        default=None,
-        metavar="FILE.py[:NAME]",
-        help="instead: a function (time, data) -> ctrl, by default named controller",
-    )
-    parser.add_argument(
-        "--keyframe", default=None, metavar="NAME", help="where a controller starts"
-    )
-    add_backend(parser, everyone=False)
-    add_defaults(parser)
-    add_run(parser)
-    _add_output(parser, "WHAT.BACKEND.npz")
-    parser.set_defaults(run=run_record)
-
-
-def _add_play(named: Any) -> None:
-    parser = named.add_parser(
-        "play",
-        help="play the ctrl of a trace on an engine",
-        description="From the state that the trace starts in; the result is another trace.",
-    )
-    parser.add_argument("file", metavar="TRACE", help="a file .npz or .parquet")
-    add_backend(parser, everyone=False)
-    add_defaults(parser)
-    parser.add_argument(
-        "--model", default=None, metavar="NAME|FILE", help="instead of the trace's own"
-    )
-    add_menagerie(parser)
-    _add_output(parser, "TRACE.BACKEND.npz")
-    parser.set_defaults(run=run_play)
+def _output(usual: str) -> Row:
+    return "-o --output", "FILE", f"where to (default {usual})"
 
 
 def run_record(options: argparse.Namespace) -> int:

@@ -12,7 +12,7 @@ from contextlib import suppress
 from typing import Any
 
 from ..errors import BadInputError, TraceError
-from ._common import PROGRAM, add_backend, add_menagerie, complain, one_line
+from ._common import ENGINE, PROGRAM, add_table, complain, menagerie, one_line
 
 _PORT = 8080
 _MODEL = "so101/scene_box"
@@ -24,40 +24,31 @@ def add(parser: argparse.ArgumentParser) -> None:
         "Show a simulation in the browser at the pace of the clock, with a slider "
         "for each actuator; the other engine beside it as a ghost. Ctrl-C ends it."
     )
-    parser.add_argument(
-        "traces", nargs="*", metavar="TRACE", help="play this recording; a second one is the ghost"
+    add_table(
+        parser,
+        ("traces", "TRACE", "play this recording; a second one is the ghost", {"nargs": "*"}),
+        ("--model", "NAME|FILE", f"the model (default {_MODEL}; of a recording, its own)"),
+        ENGINE,
+        ("--ghost", "NAME", "another engine, under the same commands, seen through"),
+        (
+            "--keyframe",
+            "NAME|N",
+            "where to start; 'default' is the default state (default: the first keyframe)",
+        ),
+        ("--site", "NAME", "the fingertip (default gripperframe, else the last site)"),
+        ("--speed", "X", "times real time (1)", {"type": float, "default": 1.0}),
+        ("--paused", "", "let time stand at the start"),
+        ("--port", "N", f"or the next free one ({_PORT})", {"default": _PORT}),
+        (
+            "--host",
+            "ADDR",
+            "listen there, for whoever reaches it (default: this machine only)",
+            {"default": "127.0.0.1"},
+        ),
+        ("--open", "", "open the page in a browser here"),
+        ("--seconds", "S", "end after so long"),
+        *menagerie(),
     )
-    parser.add_argument(
-        "--model",
-        metavar="NAME|FILE",
-        help=f"the model (default {_MODEL}; of a recording, its own)",
-    )
-    add_backend(parser, everyone=False)
-    parser.add_argument(
-        "--ghost", metavar="NAME", help="another engine, under the same commands, seen through"
-    )
-    parser.add_argument(
-        "--keyframe",
-        metavar="NAME|N",
-        help="where to start; 'default' is the default state (default: the first keyframe)",
-    )
-    parser.add_argument(
-        "--site", metavar="NAME", help="the fingertip (default gripperframe, else the last site)"
-    )
-    parser.add_argument("--speed", type=float, default=1.0, metavar="X", help="times real time (1)")
-    parser.add_argument("--paused", action="store_true", help="let time stand at the start")
-    parser.add_argument(
-        "--port", type=int, default=_PORT, metavar="N", help=f"or the next free one ({_PORT})"
-    )
-    parser.add_argument(
-        "--host",
-        default="127.0.0.1",
-        metavar="ADDR",
-        help="listen there, for whoever reaches it (default: this machine only)",
-    )
-    parser.add_argument("--open", action="store_true", help="open the page in a browser here")
-    parser.add_argument("--seconds", type=float, metavar="S", help="end after so long")
-    add_menagerie(parser)
     parser.set_defaults(run=run)
 
 

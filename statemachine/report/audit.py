@@ -9,11 +9,10 @@ from ..audit.falls import BOXES, FALL, STEPS
 from ..audit.findings import EACH_OTHER, AuditFinding
 from ..audit.restore import FORGETS, NO_CONTACTS, NOT_RESTORED, RESTORE, WITHOUT
 from ..engines.futures import worst
-from ..measures.text import count, milliseconds, rough
+from ..measures.text import NONE, count, milliseconds, rough
 from ..page import Block, Page, Table, Text, Verdict
 from .audit_words import cell, sentences
 
-_NOT_TRIED = "–"
 _OF_THE_STATE = (RESTORE, WITHOUT, FORGETS, NO_CONTACTS)
 _AT_REST = 1e-2  # of the fastest joint or body [rad/s or m/s]
 
@@ -112,7 +111,7 @@ def _by_target(one: Audited, rows: Mapping[str, Sequence[AuditFinding]]) -> Tabl
         firsts = {each.gap.first for each in of if each.into != EACH_OTHER} - {None}
         steps = sorted(step for step in firsts if step is not None)
         between = f"{steps[0]} to {steps[-1]}" if len(steps) > 1 else str(*steps)
-        shown.append((name, *cells, between or _NOT_TRIED))
+        shown.append((name, *cells, between or NONE))
     return Table(
         ("what is restored", *kinds, EACH_OTHER, "from step"),
         shown,
@@ -213,4 +212,4 @@ def _broken(one: Audited, of: Sequence[AuditFinding]) -> str:
 
 def _worst(findings: Iterable[AuditFinding]) -> str:
     gaps = [each.gap for each in findings]
-    return cell(worst(gaps)) if gaps else _NOT_TRIED
+    return cell(worst(gaps)) if gaps else NONE

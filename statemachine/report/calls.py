@@ -9,11 +9,11 @@ from ..calls import Call, CallRecording, Statement
 from ..engines import needed_part
 from ..engines.call_watch import CallWords
 from ..interface import DERIVED
+from ..measures.text import NONE
 from ..page import Block, Code, Table, Text
 
 _MOST_NAMES = 8  # of what a call changed
 _MOST_ROWS = 6  # of the calls on one thing, before those that changed nothing share one
-_NOTHING = "–"
 _NO_OBJECT = "no object"
 
 
@@ -58,7 +58,7 @@ def _heading(recordings: Mapping[str, CallRecording]) -> Text:
     return Text(
         f"The engine's own words, recorded from this run on {engines}: under each line, the "
         "functions of the engine that it made run, how often, and what differed after a call, "
-        f"bit by bit ({_NOTHING} is nothing that shows there). Looked at, before and after each "
+        f"bit by bit ({NONE} is nothing that shows there). Looked at, before and after each "
         f"call: {looks}. Looking takes time: what the code prints of the clock is not the engine's."
     )
 
@@ -127,13 +127,13 @@ def _rows(calls: Sequence[Call]) -> Iterator[tuple[str, str, str]]:
         yield (
             f"  {len(idle)} others",
             f"{sum(call.count for call in idle):,}",
-            f"{_NOTHING}: {names}",
+            f"{NONE}: {names}",
         )
 
 
 def _names(changed: Sequence[str]) -> str:
     if len(changed) <= _MOST_NAMES + 1:
-        return ", ".join(changed) or _NOTHING
+        return ", ".join(changed) or NONE
     return f"{', '.join(changed[:_MOST_NAMES])} and {len(changed) - _MOST_NAMES} more"
 
 

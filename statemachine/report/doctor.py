@@ -79,7 +79,8 @@ class Diagnosis:
 
 def examine() -> Diagnosis:
     """Look at Python, the engines, rendering, the viewer, the import name and the extras."""
-    findings = [_python(), *map(_engine, ENGINES), _rendering(), _viewer(), _clash()]
+    python = HealthCheck("python", True, f"{platform.python_version()}, {sys.executable}")
+    findings = [python, *map(_engine, ENGINES), _rendering(), _viewer(), _clash()]
     packages = (replace(package, version=_version(package.name)) for package in _PACKAGES)
     return Diagnosis(tuple(findings), tuple(packages))
 
@@ -120,10 +121,6 @@ def page(diagnosis: Diagnosis) -> Page:
     )
 
 
-def _python() -> HealthCheck:
-    return HealthCheck("python", True, f"{platform.python_version()}, {sys.executable}")
-
-
 def _engine(name: str) -> HealthCheck:
     code = f"from statemachine.installed import require; require({name!r})"
     check = _imported(name, code, name != DEFAULT)
@@ -149,7 +146,13 @@ def _imported(name: str, code: str, optional: bool) -> HealthCheck:
     """Whether something can be imported, and what is said if not."""
     # In a subprocess: a broken engine may take its process down, or print at will.
     try:
-        done = _run(code)
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            capture_output=True,
+            text=True,
+            timeout=_PATIENCE,
+            check=False,
+        )
     except subprocess.TimeoutExpired:
         return HealthCheck(name, False, f"import takes over {_PATIENCE} s", "try again", optional)
     if done.returncode == 0:
@@ -183,14 +186,4 @@ def _clash() -> HealthCheck:
         False,
         f"python-statemachine {version} uses the same import name",
         "pip uninstall python-statemachine, then pip install --force-reinstall statemachine-sim",
-    )
-
-
-def _run(code: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        timeout=_PATIENCE,
-        check=False,
     )

@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable, Iterator
 
 from ..page import (
-    LETTERS,
     Block,
     Code,
     Heading,
@@ -127,17 +126,13 @@ def _section(block: Section, picture: Callable[[Picture], str]) -> str:
 def asked(block: Question) -> str:
     """A question and its choices, without the answer."""
     text = "" if block.always else "**Before you read on:** "
-    lines = [f"{text}{_escaped(block.text)}", ""]
-    for letter, choice in zip(LETTERS, block.choices, strict=False):
-        lines.append(f"- {letter}) {_escaped(choice)}")
-    return "\n".join(lines)
+    choices = [f"- {_escaped(choice)}" for choice in block.lettered]
+    return "\n".join([f"{text}{_escaped(block.text)}", "", *choices])
 
 
 def answer(block: Question) -> str:
     """What the run says about it."""
-    right = "none of them" if block.right is None else block.choices[block.right]
-    letter = "" if block.right is None else f"{LETTERS[block.right]}) "
-    return f"{letter}{_escaped(right)}. {_escaped(block.because)}"
+    return f"{_escaped(block.answer)}. {_escaped(block.because)}"
 
 
 def _folded(inside: list[str], summary: str = "What the run says") -> str:

@@ -7,22 +7,20 @@ object is none; Jupyter runs what the reader runs, and is what courses and hosts
 
 from __future__ import annotations
 
-import base64
 import json
 from itertools import takewhile, zip_longest
 from typing import Any
 
 from ..backends import load
-from ..errors import BadInputError, MissingEngineError, unknown_name
+from ..errors import BadInputError, unknown_name
 from ..installed import DEFAULT
 from ..lessons import LESSONS, module
 from ..lessons.pictures import with_picture
 from ..lessons.records import Lesson
 from ..lessons.session import fitted, page_of_lesson, take
-from ..page import LETTERS, Code, Page, Picture, Printed, Question, RobotPicture, Text
-from .figures import svg
+from ..page import LETTERS, Code, Page, Printed, Question, Text
 from .markdown import answer, asked, block_as_markdown
-from .robot_pictures import webp
+from .robot_pictures import inline
 from .terminal import judged
 
 _INSTALL = """\
@@ -71,11 +69,11 @@ class Shown:
                 letter = next(letters, "")
                 if letter:
                     verdict = judged(block, LETTERS.index(letter))
-                    parts.append(block_as_markdown(verdict, _inline))
+                    parts.append(block_as_markdown(verdict, inline))
                 else:
                     parts.append(f"You made no prediction. The run says: {answer(block)}")
             elif not isinstance(block, (Code, Printed)):
-                parts.append(block_as_markdown(block, _inline))
+                parts.append(block_as_markdown(block, inline))
         return "\n\n".join(filter(None, parts))
 
     def __repr__(self) -> str:
@@ -175,20 +173,9 @@ def _opening(page: Page) -> str:
     """The first paragraphs and the questions, without what answers them."""
     blocks = [*_leading(page), *(each for each in page.blocks if isinstance(each, Question))]
     return "\n\n".join(
-        asked(each) if isinstance(each, Question) else block_as_markdown(each, _inline)
+        asked(each) if isinstance(each, Question) else block_as_markdown(each, inline)
         for each in blocks
     )
-
-
-def _inline(picture: Picture) -> str:
-    """A picture as a data address; none without what draws it."""
-    robot = isinstance(picture, RobotPicture)
-    try:
-        content = webp(picture) if robot else svg(picture).encode()
-    except MissingEngineError:
-        return ""
-    encoded = base64.b64encode(content).decode()
-    return f"data:image/{'webp' if robot else 'svg+xml'};base64,{encoded}"
 
 
 def _cell(name: str, kind: str, source: str) -> dict[str, Any]:

@@ -122,18 +122,8 @@ def _rows(line: str) -> int:
 
 def _asked(question: Question) -> Iterator[str]:
     """A question and its choices in lines of the window's width."""
+    width = max(min(shutil.get_terminal_size().columns, _WIDTH_MOST), 20)
     text = question.text if question.always else f"Before you read on: {question.text}"
-    yield from _wrapped(text)
-    for letter, choice in zip(LETTERS, question.choices, strict=False):
-        yield from _wrapped(f"{letter}) {choice}", indent=2)
-
-
-def _wrapped(text: str, indent: int = 0) -> list[str]:
-    width = min(shutil.get_terminal_size().columns, _WIDTH_MOST)
-    first = " " * indent
-    return textwrap.wrap(
-        text,
-        max(width, 20),
-        initial_indent=first,
-        subsequent_indent=first and first + "   ",
-    )
+    yield from textwrap.wrap(text, width)
+    for choice in question.lettered:
+        yield from textwrap.wrap(choice, width, initial_indent="  ", subsequent_indent="     ")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,10 +12,12 @@ import numpy as np
 
 from ..backends import load
 from ..drawing.camera import Camera, framed
+from ..errors import MissingEngineError
 from ..installed import require_extra
 from ..interface import Array
-from ..page import RobotPicture
+from ..page import Picture, RobotPicture
 from ..rendering import Motion, camera_for, drawn, motion_through, renderer_here
+from .figures import svg
 from .film_files import write_webp
 
 _SIZE = (480, 360)
@@ -46,6 +49,26 @@ def webp(picture: RobotPicture) -> bytes:
         path = Path(folder, "picture.webp")
         write_webp(path, images(), milliseconds)
         return path.read_bytes()
+
+
+def drawn_picture(picture: Picture) -> tuple[bytes, str]:
+    """A picture of a page, and its kind: "svg+xml", or "webp" of a robot.
+
+    Raises:
+        MissingEngineError: What draws it is not installed.
+    """
+    if isinstance(picture, RobotPicture):
+        return webp(picture), "webp"
+    return svg(picture).encode(), "svg+xml"
+
+
+def inline(picture: Picture) -> str:
+    """A picture as a data address; "" without what draws it."""
+    try:
+        content, kind = drawn_picture(picture)
+    except MissingEngineError:
+        return ""
+    return f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
 
 
 def _close(camera: Camera, motions: list[Motion], body: int) -> Camera:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from ..measures.text import count, figure, listed, rough, sentence
+from ..measures.text import NONE, count, figure, listed, rough, sentence
 from ..page import Block, Page, Table, Text, Verdict
 from ..robots.examine import TRIED
 from ..robots.gaps import STEPS
 from ..robots.records import RUNS, TOLERANCE, BackendRow, ExaminedModel, RunGap, Survey
 
-_NOTHING = "–"
 _WIDEST = 28  # characters of a name
 _LISTED = 20  # of what is wrong, and of features
 
@@ -91,7 +90,7 @@ def _bits(survey: Survey, row: ExaminedModel) -> str:
     if first is None or (first.refusal and first.refusal_without):
         return "no"
     told = [value for each in row.backends.values() for value in _same(each)]
-    return "✗" if False in told else "✓" if True in told else _NOTHING
+    return "✗" if False in told else "✓" if True in told else NONE
 
 
 def _same(row: BackendRow) -> tuple[bool | None, bool | None]:
@@ -101,10 +100,10 @@ def _same(row: BackendRow) -> tuple[bool | None, bool | None]:
 def _gap(model: ExaminedModel, other: str, without: bool) -> str:
     row = model.backends.get(other)
     if row is None:
-        return _NOTHING
+        return NONE
     gap = row.without_contacts if without else row.with_contacts
     if gap is None:
-        return "refused" if (row.refusal_without if without else row.refusal) else _NOTHING
+        return "refused" if (row.refusal_without if without else row.refusal) else NONE
     if not model.nv:
         return "still"
     if gap.explodes:
@@ -116,7 +115,7 @@ def _gap(model: ExaminedModel, other: str, without: bool) -> str:
 
 def _witness(row: ExaminedModel) -> str:
     if row.witness is None:
-        return _NOTHING
+        return NONE
     if row.witness.gap is None:
         return "refused"
     return f"{row.witness.grade.partition(' ')[0]} {rough(row.witness.gap)}"
@@ -124,7 +123,7 @@ def _witness(row: ExaminedModel) -> str:
 
 def _runs(row: ExaminedModel) -> str:
     counts = [_running(each) for each in row.backends.values() if each.scenarios]
-    return " ".join(map(str, counts)) or _NOTHING
+    return " ".join(map(str, counts)) or NONE
 
 
 def _running(row: BackendRow) -> int:
@@ -133,7 +132,7 @@ def _running(row: BackendRow) -> int:
 
 def _cost(row: ExaminedModel) -> str:
     costs = [f"{each.cost:.3g}" for each in row.backends.values() if each.cost is not None]
-    return " ".join(costs) or _NOTHING
+    return " ".join(costs) or NONE
 
 
 def _legend(survey: Survey, tried: bool) -> str:
@@ -223,16 +222,16 @@ def _one(survey: Survey, row: ExaminedModel) -> Page:
     ]
     for name in TRIED:
         cells = [row.backends[n].scenarios.get(name) for n in names]
-        marks = [_NOTHING if cell is None else "✓" if cell == RUNS else "no" for cell in cells]
+        marks = [NONE if cell is None else "✓" if cell == RUNS else "no" for cell in cells]
         lines.append((f"scenario {name}", marks))
     costs = [row.backends[n].cost for n in names]
     lines.append(
         (
             "cost of a step, on this machine",
-            [_NOTHING if cost is None else f"{cost:.3g} ×" for cost in costs],
+            [NONE if cost is None else f"{cost:.3g} ×" for cost in costs],
         )
     )
-    lines = [(what, cells) for what, cells in lines if set(cells) != {_NOTHING}]
+    lines = [(what, cells) for what, cells in lines if set(cells) != {NONE}]
     table = Table(
         ("", *names), [(what, *cells) for what, cells in lines], words=frozenset(range(9))
     )
@@ -264,12 +263,12 @@ def _loads(row: BackendRow) -> str:
 
 
 def _mark(value: bool | None) -> str:
-    return _NOTHING if value is None else "✓" if value else "✗"
+    return NONE if value is None else "✓" if value else "✗"
 
 
 def _whole(gap: RunGap | None) -> str:
     if gap is None:
-        return _NOTHING
+        return NONE
     parts = [
         f"{what} {rough(value)} {unit}"
         for what, value, unit in (
@@ -280,7 +279,7 @@ def _whole(gap: RunGap | None) -> str:
         )
         if value is not None
     ]
-    text = ", ".join(parts) or _NOTHING
+    text = ", ".join(parts) or NONE
     if gap.shrinks is not None:
         text += f"; {gap.shrinks:.3g} times that at half the timestep"
     return f"{text}; {gap.ended} (after {count(gap.steps, 'step')})" if gap.ended else text

@@ -22,9 +22,8 @@ from ..runs.whole import replace_bytes
 from . import compare as comparison
 from . import conventions, why
 from .cheat_sheet import cheat_sheet
-from .figures import svg
 from .markdown import block_as_markdown, markdown
-from .robot_pictures import webp
+from .robot_pictures import drawn_picture
 
 
 def make_path(
@@ -143,7 +142,7 @@ def _write(folder: Path, name: str, page: Page, question: str, typed: str) -> Pa
     def picture(block: Picture) -> str:
         robot = isinstance(block, RobotPicture)
         try:
-            content = webp(block) if robot else svg(block).encode()
+            content, _ = drawn_picture(block)
         except MissingEngineError:
             if robot:
                 return ""  # the page has its words

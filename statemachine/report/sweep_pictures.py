@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from ..measures.text import listed, reading, significant
 from ..page import Bars, HeatMap, Traces
 from ..sweep.analysis import SweepReport
-from ..sweep.analysis_map import GapMap
+from ..sweep.analysis_gaps import GapMap
 from ..sweep.analysis_together import BroughtTogether
 
 

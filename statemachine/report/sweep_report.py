@@ -14,8 +14,7 @@ from ..measures.text import (
 )
 from ..page import Block, Headline, Page, Section, Table, TableCell, Text
 from ..sweep.analysis import SweepReport
-from ..sweep.analysis_agreement import VERDICTS, SettingGap
-from ..sweep.analysis_map import GapMap
+from ..sweep.analysis_gaps import VERDICTS, GapMap, SettingGap
 from .sweep_fit import line, together
 from .sweep_pictures import axis, bars, map_picture, setting_word, size_word
 

@@ -18,12 +18,17 @@ from ..errors import BadInputError, unknown_name
 from ..interface import Array
 from ..measures.text import listed
 from ..runs.drive import Progress, part_of, silent
-from .analysis_agreement import QuantityAgreement, SettingGap, agreement_of, only_rounding
-from .analysis_floor import SweepFloor, floor_of
-from .analysis_gaps import SweepGaps, gaps_of, median
+from .analysis_data import SweepData, sweep_data
+from .analysis_gaps import (
+    GapMap,
+    QuantityAgreement,
+    SettingGap,
+    agreement_of,
+    gap_map,
+    only_rounding,
+)
 from .analysis_indices import Sensitivity, sensitivity
-from .analysis_map import GapMap, gap_map
-from .analysis_runs import CellRunner, ModelFacts, facts_of, runner_of
+from .analysis_runs import CellRunner, ModelFacts, SweepFloor, facts_of, floor_of, runner_of
 from .analysis_together import BroughtTogether, Varied, brought_together
 from .design import Design
 from .factors import Vary
@@ -139,30 +144,28 @@ def sweep_report(
         if name not in labels:
             raise unknown_name("parameter", name, labels)
     facts = facts_of(manifest, design.factors, sides, menagerie)
-    seeds = manifest["design"]["seeds"]
-    gaps = gaps_of(read_cells(folder), design, sides, seeds, facts.hinges)
-    if quantity is not None and quantity not in gaps.quantities:
-        raise unknown_name("quantity", quantity, gaps.quantities)
-    main = quantity or gaps.quantities[0]
-    runner: CellRunner | str = "nothing was to be run"
+    seeds, moments = manifest["design"]["seeds"], manifest["request"]["moments"]
+    data = sweep_data(read_cells(folder), design, sides, seeds, moments, facts.hinges)
+    if quantity is not None and quantity not in data.gaps:
+        raise unknown_name("quantity", quantity, data.gaps)
+    main = quantity or next(iter(data.gaps))
+    runner, floor, no_floor = None, None, "nothing was to be run"
     if run:
-        runner = runner_of(manifest, sides, facts.hinges, menagerie, jobs)
-    floor, no_floor = None, runner if isinstance(runner, str) else ""
-    if isinstance(runner, CellRunner):
-        floor = floor_of(gaps, runner, floor_cells, part_of(progress, 0.0, 0.5))
+        found = runner_of(manifest, data, facts.hinges, menagerie, jobs)
+        runner, no_floor = (None, found) if isinstance(found, str) else (found, "")
+    if runner is not None:
+        floor = floor_of(data, runner, floor_cells, part_of(progress, 0.0, 0.5))
         no_floor = "" if floor else "no cell was to be run for it"
     widths = {} if floor is None else floor.width
-    found = {
-        name: agreement_of(gaps, name, widths.get(name), facts, tolerances)
-        for name in gaps.quantities
+    agreements = {
+        name: agreement_of(data, name, widths.get(name), facts, tolerances) for name in data.gaps
     }
-    agreement, settings = found[main]
-    figures = gaps.gap(main)
+    agreement, settings = agreements[main]
     rounding = only_rounding(settings)
-    shares = None if rounding else sensitivity(design, gaps.points, figures)
+    shares = None if rounding else sensitivity(data, data.gaps[main])
     together = () if rounding and not fit else _together(
-        gaps, shares, agreement, widths.get(main), facts, fit, varied,
-        runner if isinstance(runner, CellRunner) else None, part_of(progress, 0.5, 0.5),
+        data, shares, agreement, widths.get(main), facts, fit, varied, runner,
+        part_of(progress, 0.5, 0.5),
     )  # fmt: skip
     return SweepReport(
         what=manifest["request"]["what"],
@@ -173,13 +176,13 @@ def sweep_report(
         units={label: unit for label, unit in facts.units.items() if unit},
         seeds=seeds,
         quantity=agreement,
-        quantities=tuple(each for each, _ in found.values()),
+        quantities=tuple(each for each, _ in agreements.values()),
         settings=settings,
-        failed=gaps.failed,
-        missing=gaps.missing,
+        failed=data.failed,
+        missing=data.missing,
         floor=floor,
         no_floor=no_floor,
-        map=gap_map(gaps, median(figures), widths.get(main), shares),
+        map=gap_map(data, main, widths.get(main), shares),
         sensitivity=shares,
         together=together,
         ran=(floor.cells if floor else 0) + sum(each.cells for each in together),
@@ -208,7 +211,7 @@ def _sides(there: Sequence[str], asked: Sequence[str]) -> tuple[str, str]:
 
 
 def _together(
-    gaps: SweepGaps,
+    data: SweepData,
     shares: Sensitivity | None,
     agreement: QuantityAgreement,
     width: Array | None,
@@ -219,9 +222,9 @@ def _together(
     progress: Progress,
 ) -> tuple[BroughtTogether, ...]:
     """The fit of each parameter that is asked for, else of the one that counts most."""
-    chosen = [vary for vary in gaps.design.factors if vary.label in asked]
+    chosen = [vary for vary in data.design.factors if vary.label in asked]
     if not asked:
-        chosen = _candidates(gaps.design, shares)[:1]
+        chosen = _candidates(data.design, shares)[:1]
     floor = _middle(width)
     found = []
     for k, vary in enumerate(chosen):
@@ -230,7 +233,7 @@ def _together(
         how: Varied = varied or ("right" if vary.kind == "option" else "both")
         found.append(
             brought_together(
-                gaps, vary, agreement.name, max(agreement.tolerance, floor),
+                data, vary, agreement.name, max(agreement.tolerance, floor),
                 varied=how, own=facts.own.get(vary.label), runner=runner,
                 progress=part_of(progress, k / len(chosen), 1 / len(chosen)),
             )

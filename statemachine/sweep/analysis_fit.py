@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..interface import Array
-from .analysis_gaps import Flags, length
+from .analysis_data import Flags, length
 
 _SCAN = 401  # values that are looked at between the bounds, before the minimum is refined
 _RESAMPLES = 400
@@ -48,10 +48,6 @@ class FittedValue:
     curves: int
     scan: tuple[tuple[float, ...], tuple[float, ...]] = field(repr=False, metadata={"json": False})
     each: Array = field(default_factory=lambda: np.empty(0), repr=False, metadata={"json": False})
-
-    def at(self, value: float) -> float:
-        """The predicted gap at a value within the bounds."""
-        return float(np.interp(value, *self.scan))
 
     def within(self, good: float) -> tuple[float, float] | None:
         """The least and the largest value whose predicted gap is at most so much; None if none."""
@@ -115,21 +111,19 @@ def fit_curves(
     table = gaps(scan)
     centre = table.mean(axis=1)
     value = _refined(lambda x: float(gaps(np.array([x])).mean()), scan, centre)
-    slope = difference.derivative()
     each = np.full(count, np.nan)
     each[chosen] = gaps(np.array([value]))[0]
     own_seeds = np.array(seeds)[chosen]
-    drawn = np.unique(own_seeds)
-    if len(drawn) >= _LEAST_CURVES:
-        by_seed = np.array([table[:, own_seeds == seed].mean(axis=1) for seed in drawn]).T
-        error = float(np.std(_drawn_again(scan, by_seed)))
-        of = f"{len(drawn)} seeds drawn again"
-    elif len(chosen) >= _LEAST_CURVES:
-        error = float(np.std(_drawn_again(scan, table)))
-        of = f"{len(chosen)} curves drawn again"
+    by_seed = [table[:, own_seeds == seed].mean(axis=1) for seed in np.unique(own_seeds)]
+    for what, columns in (("seeds", np.array(by_seed).T), ("curves", table)):
+        if (drawn := columns.shape[1]) >= _LEAST_CURVES:
+            error, of = float(np.std(_drawn_again(scan, columns))), f"{drawn} {what} drawn again"
+            break
     else:
-        error = _curvature(difference(value)[used], slope(value)[used])
-        of = "the curvature"
+        error, of = (
+            _curvature(difference(value)[used], difference.derivative()(value)[used]),
+            "the curvature",
+        )
     return FittedValue(
         value=value,
         error=error,
@@ -206,8 +200,7 @@ def _refined(gap: Any, scan: Array, centre: Array) -> float:
     optimize = importlib.import_module("scipy.optimize")
     found = optimize.minimize_scalar(gap, bounds=(low, high), method="bounded",
                                      options={"xatol": 1e-6 * (scan[-1] - scan[0])})  # fmt: skip
-    value = float(found.x) if found.fun < centre[place] else float(scan[place])
-    return value
+    return float(found.x) if found.fun < centre[place] else float(scan[place])
 
 
 def _drawn_again(scan: Array, table: Array) -> Array:

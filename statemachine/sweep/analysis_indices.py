@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -11,10 +10,11 @@ import numpy as np
 
 from ..installed import require_extra
 from ..interface import Array
-from .analysis_gaps import median
-from .design import Design, DesignPoint
+from .analysis_data import SweepData, median
+from .design import Design
 
-_RESAMPLES, _LEVEL = 400, 0.95
+_RESAMPLES = 400
+_TAIL = 50 * (1 - 0.95)  # percent, on each side of an interval
 _LEAST_SEEDS = 3  # of which a bootstrap says something
 _LEAST_SAMPLES = 4
 
@@ -59,43 +59,28 @@ class Sensitivity:
     notes: tuple[str, ...] = ()
 
 
-def require_stats() -> Any:
-    """SciPy's statistics.
-
-    Raises:
-        MissingEngineError: SciPy is not installed; the message names the extra.
-    """
-    return require_extra("scipy.stats", "a report of a sweep", "SciPy", "sweep")
-
-
-def sensitivity(
-    design: Design, points: Sequence[DesignPoint], figures: Array
-) -> Sensitivity | None:
-    """What a figure of a design's points is sensitive to; None where nothing can be said.
+def sensitivity(data: SweepData, figures: Array) -> Sensitivity | None:
+    """What a figure of a sweep's points is sensitive to; None where nothing can be said.
 
     Args:
-        design: Of the sweep.
-        points: Its points (p).
+        data: Of the sweep.
         figures: (p, s) at each point and seed; NaN where there is none. Of the seeds the median
             counts.
     """
-    if not design.factors or len(points) < 2:
-        return None
     centre = median(figures)
     known = centre[np.isfinite(centre)]
     if len(known) < 2 or not np.ptp(known) > 1e-12 * np.abs(known).max():
         return None
-    if design.indices:
-        return _sobol(design, points, centre)
-    return _rank(design, points, centre) if design.sampled else _factorial(design, figures)
+    if data.design.indices:
+        return _sobol(data.design, centre)
+    return _rank(data, centre) if data.design.sampled else _factorial(data.design, figures)
 
 
-def _sobol(design: Design, points: Sequence[DesignPoint], centre: Array) -> Sensitivity | None:
+def _sobol(design: Design, centre: Array) -> Sensitivity | None:
     """Saltelli's design: blocks A, B and A with one range from B."""
     labels = [vary.label for vary in design.sampled]
-    combinations = len(points) // ((len(labels) + 2) * design.samples)
     # The samples change slowest: blocks, then samples, then the combinations of lists.
-    cube = centre.reshape(len(labels) + 2, design.samples, combinations).mean(axis=2)
+    cube = centre.reshape(len(labels) + 2, design.samples, -1).mean(axis=2)
     whole = np.flatnonzero(np.isfinite(cube).all(axis=0))
     notes: list[str] = []
     if design.listed:
@@ -110,37 +95,20 @@ def _sobol(design: Design, points: Sequence[DesignPoint], centre: Array) -> Sens
         )
     if count < _LEAST_SAMPLES:
         return None
-    cube = cube[:, whole[:count]]
-    stats = require_stats()
-    found = stats.sobol_indices(
-        func={"f_A": cube[:1], "f_B": cube[1:2], "f_AB": cube[2:, None, :]}, n=count
-    )
-    first, total = np.atleast_1d(found.first_order), np.atleast_1d(found.total_order)
-    drawn = _resampled(found, count)
-    return Sensitivity(
-        "sobol",
-        _ordered(labels, first, total, drawn[:, 0], drawn[:, 1]),
-        count,
-        "the samples drawn again",
-        tuple(notes),
-    )
-
-
-def _resampled(found: Any, count: int) -> Array:
-    """(n, 2, d) the indices of samples that are drawn again from those there are."""
-    draw = np.random.default_rng(0)
-    made = []
+    a, b, *mixed = cube[:, None, whole[:count]]
+    found = _stats().sobol_indices(func={"f_A": a, "f_B": b, "f_AB": np.array(mixed)}, n=count)
+    # (2, d) each: of all samples, and of samples that are drawn again from those there are.
+    shares = np.array([found.first_order, found.total_order]).reshape(2, -1)
+    draw, drawn = np.random.default_rng(0), []
     for _ in range(_RESAMPLES):
         rows = draw.integers(0, count, count)
-        a, b, ab = found._f_A[:, rows], found._f_B[:, rows], found._f_AB[..., rows]
-        pair = np.array(found._indices_method(a, b, ab))
-        made.append(pair.reshape(2, -1))
-    return np.array(made)
+        blocks = found._f_A[:, rows], found._f_B[:, rows], found._f_AB[..., rows]
+        drawn.append(np.reshape(found._indices_method(*blocks), shares.shape))
+    return _result("sobol", labels, shares, count, drawn, "the samples drawn again", notes)
 
 
 def _factorial(design: Design, figures: Array) -> Sensitivity | None:
     """Every combination of lists and grids: the variance over the whole of it."""
-    labels = [vary.label for vary in design.factors]
     cube = figures.reshape(*(len(vary.values) for vary in design.factors), -1)
     cube, left_out = _whole(cube)
     if cube.size == 0 or cube[..., 0].size < 2:
@@ -158,31 +126,29 @@ def _factorial(design: Design, figures: Array) -> Sensitivity | None:
     centre = median(cube)
     if not np.ptp(centre) > 0:
         return None
-    first, total = variance_shares(centre)
-    seeds, error = cube.shape[-1], ""
-    drawn = None
+    seeds, error, drawn = cube.shape[-1], "", []
     if seeds >= _LEAST_SEEDS:
         draw = np.random.default_rng(0)
         again = (median(cube[..., draw.integers(0, seeds, seeds)]) for _ in range(_RESAMPLES))
-        drawn = np.array([variance_shares(each) for each in again if np.ptp(each) > 0])
+        drawn = [variance_shares(each) for each in again if np.ptp(each) > 0]
         error = f"the {seeds} seeds drawn again"
-    pair = (None, None) if drawn is None else (drawn[:, 0], drawn[:, 1])
-    indices = _ordered(labels, first, total, *pair)
-    return Sensitivity("factorial", indices, centre.size, error, tuple(notes))
+    labels = [vary.label for vary in design.factors]
+    shares = variance_shares(centre)
+    return _result("factorial", labels, shares, centre.size, drawn, error, notes)
 
 
-def variance_shares(cube: Array) -> tuple[Array, Array]:
-    """First-order and total shares (k,) of the variance of a full factorial (n1, …, nk).
+def variance_shares(cube: Array) -> Array:
+    """First-order and total shares (2, k) of the variance of a full factorial (n1, …, nk).
 
     Every level counts the same. First: Var(E[f | x_i]) / Var f; total: E[Var(f | all but x_i)] /
     Var f (T. Homma and A. Saltelli, Reliability Engineering & System Safety 52, 1996).
     """
     variance, axes = cube.var(), range(cube.ndim)
     if not variance:
-        return np.zeros(cube.ndim), np.zeros(cube.ndim)
+        return np.zeros((2, cube.ndim))
     first = [cube.mean(axis=tuple(a for a in axes if a != k)).var() / variance for k in axes]
     total = [cube.var(axis=k).mean() / variance for k in axes]
-    return np.array(first), np.array(total)
+    return np.array([first, total])
 
 
 def _whole(cube: Array) -> tuple[Array, list[list[int]]]:
@@ -190,64 +156,56 @@ def _whole(cube: Array) -> tuple[Array, list[list[int]]]:
     kept = [list(range(n)) for n in cube.shape[:-1]]
     gone: list[list[int]] = [[] for _ in kept]
     while cube.size and (holes := ~np.isfinite(median(cube))).any():
-        shares = [
-            (holes.mean(axis=tuple(a for a in range(holes.ndim) if a != k))).tolist()
-            for k in range(holes.ndim)
-        ]
-        axis, level = max(
-            itertools.chain.from_iterable(
-                ((k, n) for n in range(len(share))) for k, share in enumerate(shares)
-            ),
-            key=lambda place: shares[place[0]][place[1]],
-        )
+        axes = range(holes.ndim)
+        shares = [holes.mean(axis=tuple(a for a in axes if a != k)) for k in axes]
+        axis = max(axes, key=lambda k: shares[k].max())
+        level = int(shares[axis].argmax())
         gone[axis].append(kept[axis].pop(level))
         cube = np.delete(cube, level, axis=axis)
     return cube, gone
 
 
-def _rank(design: Design, points: Sequence[DesignPoint], centre: Array) -> Sensitivity | None:
+def _rank(data: SweepData, centre: Array) -> Sensitivity | None:
     """Where the design allows no indices: which parameter the figure goes with."""
-    stats = require_stats()
     known = np.isfinite(centre)
-    found = []
-    for place, vary in enumerate(design.factors):
-        if not vary.numeric:
-            continue
-        values = np.array([float(point.values[place]) for point in points])[known]
-        rho = 0.0
+    labels = [vary.label for vary in data.design.factors if vary.numeric]
+    shares = np.zeros((2, len(labels)))
+    for k, label in enumerate(labels):
+        values = np.array(data.values(label), dtype=float)[known]
         if len(values) > 2 and np.ptp(values):
-            rho = float(stats.spearmanr(values, centre[known]).statistic)
-        share = 0.0 if np.isnan(rho) else rho**2
-        found.append(ParameterIndex(vary.label, share, share))
-    found.sort(key=lambda each: -each.total)
+            rho = float(_stats().spearmanr(values, centre[known]).statistic)
+            shares[:, k] = np.nan_to_num(rho) ** 2
     note = (
         "The design is none that indices can be computed from: run it with --indices. These are "
         "squares of Spearman's rank correlation, and see only what goes up or down."
     )
-    return Sensitivity("rank", tuple(found), int(known.sum()), "", (note,)) if found else None
+    return _result("rank", labels, shares, int(known.sum()), [], "", [note]) if labels else None
 
 
-def _ordered(
+def _stats() -> Any:
+    return require_extra("scipy.stats", "a report of a sweep", "SciPy", "sweep")
+
+
+def _result(
+    method: Literal["sobol", "factorial", "rank"],
     labels: Sequence[str],
-    first: Array,
-    total: Array,
-    first_drawn: Array | None,
-    total_drawn: Array | None,
-) -> tuple[ParameterIndex, ...]:
-    """One for each parameter, the largest total first."""
-
-    def interval(drawn: Array | None, place: int) -> tuple[float, float] | None:
-        if drawn is None or not len(drawn):
-            return None
-        tail = 50 * (1 - _LEVEL)
-        low, high = np.percentile(drawn[:, place], (tail, 100 - tail))
-        return float(low), float(high)
-
+    shares: Array,
+    samples: int,
+    drawn: Sequence[Array],
+    error: str,
+    notes: Sequence[str],
+) -> Sensitivity:
+    """The largest total first; `shares` (2, k) and `drawn`, many of them, are first and total."""
+    intervals: Any = np.full((2, 2, len(labels)), None)
+    if len(drawn):
+        intervals = np.percentile(drawn, (_TAIL, 100 - _TAIL), axis=0)
     found = [
         ParameterIndex(
-            label, float(first[k]), float(total[k]), interval(first_drawn, k),
-            interval(total_drawn, k),
+            label,
+            *shares[:, k].tolist(),
+            *(None if None in pair else tuple(pair) for pair in intervals[..., k].T.tolist()),
         )
         for k, label in enumerate(labels)
-    ]  # fmt: skip
-    return tuple(sorted(found, key=lambda each: -each.total))
+    ]
+    found.sort(key=lambda each: -each.total)
+    return Sensitivity(method, tuple(found), samples, error, tuple(notes))

@@ -1,8 +1,9 @@
-"""What the report of a sweep runs: perturbed starts, a side at the model's own value, a check."""
+"""What the report of a sweep runs beside its dataset, and what it asks of the model."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -10,20 +11,24 @@ from typing import Any
 import numpy as np
 
 from ..backends import load
+from ..compare.perturbed import ROUNDING
 from ..errors import StateMachineError
-from ..interface import Ints, JointType, Model, forward, make_data, reset
+from ..interface import Array, Ints, JointType, Model, forward, make_data, reset
 from ..processes import checked_jobs
 from ..runs.controllers import is_function
 from ..runs.drive import Progress, silent
-from .analysis_gaps import SweepRuns, runs_of
+from .analysis_data import Runs, SweepData, gap_between, read_runs
 from .apart import apart
-from .cell import CellRules, SweepCell
+from .cell import SweepCell
 from .factors import UNITS, Value, Vary
 from .prepare import prepared
 from .request import REQUEST, PreparedSweep, Sweep
+from .rows import require_parquet, schema_of
 from .settings import options_at
 
-Setting = tuple[tuple[Value, ...], int]  # values of the factors, and a seed
+NUDGES = 2  # perturbed runs at a setting, for the chaos floor
+# A backend, the values of the factors and a seed; a value that is None is the model's own.
+AskedCell = tuple[str, tuple[Value | None, ...], int]
 
 
 @dataclass(frozen=True)
@@ -34,69 +39,47 @@ class CellRunner:
         ready: The sweep, as its folder tells it.
         hinges: Which numbers of qpos are angles; None for all.
         jobs: How many processes.
+        kind: The type of the runs of the dataset.
     """
 
     ready: PreparedSweep
     hinges: tuple[int, ...] | None
     jobs: int
+    kind: Any
 
     def run(
         self,
-        backends: Sequence[str],
-        settings: Sequence[Setting],
-        *,
+        asked: Sequence[AskedCell],
         nudges: Sequence[int] = (),
-        own: Vary | None = None,
         progress: Progress = silent,
-    ) -> SweepRuns:
-        """Runs (n,) at settings.
+    ) -> Runs:
+        """Runs (n,) of cells.
 
         Args:
-            backends: The engine of each.
-            settings: Values and seed of each.
+            asked: The cells.
             nudges: For each what a change of its start and commands by rounding is drawn from.
-            own: A factor that is as the model has it, whatever the settings say.
             progress: Told the fraction that is done.
         """
-        rules = self.ready.rules
-        if own is not None:
-            rules, settings = _without(rules, own, settings)
+        nudges = nudges or [0] * len(asked)
         cells = [
-            SweepCell(f"{k}", "", values, seed, backends[k], nudges[k] if nudges else 0)
-            for k, (values, seed) in enumerate(settings)
+            SweepCell(f"{k}", "", values, seed, backend, nudges[k])  # pyright: ignore
+            for k, (backend, values, seed) in enumerate(asked)
         ]
-        rows = _run(rules, cells, self.jobs, progress)
-        return runs_of([rows[cell.id] for cell in cells], self.hinges)
-
-
-def _without(
-    rules: CellRules, own: Vary, settings: Sequence[Setting]
-) -> tuple[CellRules, list[Setting]]:
-    """Rules and settings without a factor."""
-    place = [vary.label for vary in rules.factors].index(own.label)
-    factors = tuple(vary for vary in rules.factors if vary.label != own.label)
-    rest = [(values[:place] + values[place + 1 :], seed) for values, seed in settings]
-    return replace(rules, factors=factors), rest
-
-
-def _run(
-    rules: CellRules, cells: Sequence[SweepCell], jobs: int, progress: Progress
-) -> Mapping[str, Mapping[str, Any]]:
-    """The row of each cell, by its id."""
-    found: dict[str, Mapping[str, Any]] = {}
-    size = max(1, len(cells) // (4 * jobs))
-    batches: Iterable[Sequence[SweepCell]] = (
-        cells[k : k + size] for k in range(0, len(cells), size)
-    )
-    for rows in apart(rules, batches, min(jobs, max(1, len(cells)))):
-        found.update((row["cell"], row) for row in rows)
-        progress(len(found) / len(cells))
-    return found
+        size = max(1, len(cells) // (4 * self.jobs))
+        batches = [cells[k : k + size] for k in range(0, len(cells), size)]
+        rows: dict[str, dict[str, Any]] = {}
+        for done in apart(self.ready.rules, batches, min(self.jobs, len(batches))):
+            rows.update((row["cell"], row) for row in done)
+            progress(len(rows) / len(cells))
+        table = require_parquet()[0].Table.from_pylist(
+            [rows[cell.id] for cell in cells], schema_of((), {})
+        )
+        return read_runs(table, self.ready.sweep.moments, self.hinges, self.kind)
 
 
 def runner_of(
     manifest: Mapping[str, Any],
-    sides: tuple[str, str],
+    data: SweepData,
     hinges: tuple[int, ...] | None,
     menagerie: str | None = None,
     jobs: int | None = None,
@@ -106,29 +89,83 @@ def runner_of(
     what = request["what"]
     if is_function(what) and not Path(what.rpartition(":")[0]).is_file():
         return f"{what.rpartition(':')[0]} is not in this folder"
+    given = {name: design[name] for name in ("vary", "seeds", "samples", "indices", "design_seed")}
+    given |= {name: request[name] for name in REQUEST if request.get(name) is not None}
     try:
-        ready = prepared(
-            Sweep(
-                what,
-                vary=design["vary"],
-                backends=sides,
-                seeds=design["seeds"],
-                samples=design["samples"],
-                indices=design["indices"],
-                design_seed=design["design_seed"],
-                menagerie=menagerie,
-                **{name: request[name] for name in REQUEST if request.get(name) is not None},
-            )
-        )
+        ready = prepared(Sweep(what, backends=data.sides, menagerie=menagerie, **given))
     except StateMachineError as error:
         return str(error)
     now = ready.manifest()
     if (now["files"], now["function"]) != (manifest["files"], manifest["function"]):
         return "the model or the function is another one than that of the sweep"
-    others = [name for name in sides if now["versions"].get(name) != manifest["versions"].get(name)]
+    versions = now["versions"], manifest["versions"]
+    others = [name for name in data.sides if versions[0].get(name) != versions[1].get(name)]
     if others:
         return f"{' and '.join(others)} here is of another version than that of the sweep"
-    return CellRunner(ready, hinges, checked_jobs(jobs))
+    return CellRunner(ready, hinges, checked_jobs(jobs), data.runs.dtype)
+
+
+@dataclass(frozen=True, eq=False)
+class SweepFloor:
+    """The chaos floor at each setting of a sweep.
+
+    Attributes:
+        backend: The side that was run again.
+        settings: At how many settings; the others have that of the one nearest to them.
+        cells: How many runs it is made of.
+        seconds: What they took.
+        rounding: What starts and commands were changed by, relative.
+        width: (p) of each quantity [SI]; infinite where a perturbed run failed.
+    """
+
+    backend: str
+    settings: int
+    cells: int
+    seconds: float
+    rounding: float = ROUNDING
+    width: Mapping[str, Array] = field(default_factory=dict, metadata={"json": False})
+
+
+def floor_of(
+    data: SweepData, runner: CellRunner, most: int, progress: Progress = silent
+) -> SweepFloor | None:
+    """The chaos floor, from cells of the left side, perturbed as `compare` does it.
+
+    Args:
+        data: Of the sweep.
+        runner: Runs its cells.
+        most: How many cells may be run.
+        progress: Told the fraction that is done.
+    """
+    began = time.monotonic()
+    done = np.isfinite(data.runs["time"][0])
+    seed = int(done.any(axis=0).argmax())
+    known = np.flatnonzero(done[:, seed])
+    if not len(known) or most < NUDGES:
+        return None
+    chosen = known[evenly(len(known), most // NUDGES)]
+    again = np.repeat(chosen, NUDGES)
+    cells = [(data.sides[0], data.points[k].values, seed) for k in again]
+    runs = runner.run(cells, [1 + n for _ in chosen for n in range(NUDGES)], progress)
+    nearest = _nearest(data, chosen)
+    width = {}
+    for name in data.gaps:
+        gap = gap_between(name, data.runs[0, again, seed], runs).reshape(len(chosen), NUDGES)
+        gap = np.where(np.isnan(gap), np.inf, gap)  # one of them failed
+        width[name] = gap.max(axis=1)[nearest]
+    return SweepFloor(data.sides[0], len(chosen), len(cells), time.monotonic() - began, width=width)
+
+
+def _nearest(data: SweepData, chosen: Ints) -> Ints:
+    """(p) which of the chosen settings is nearest to each, every parameter as wide as any."""
+    place = np.zeros((len(data.points), len(data.design.factors)))
+    for k, vary in enumerate(data.design.factors):
+        values = data.values(vary.label)
+        if not vary.numeric:  # by its place in the list
+            values = [vary.values.index(value) for value in values]
+        wide = float(np.ptp(values))
+        place[:, k] = (np.array(values) - min(values)) / wide if wide else 0.0
+    return np.array([((place[chosen] - each) ** 2).sum(axis=1).argmin() for each in place])
 
 
 @dataclass(frozen=True)

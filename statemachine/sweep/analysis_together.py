@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
-from ..interface import Array, Ints
+from ..interface import Array
 from ..runs.drive import Progress, silent
+from .analysis_data import Runs, SweepData, gap_between, median, vectors
 from .analysis_fit import FittedValue, Verdict, fit_curves, fit_scatter
-from .analysis_gaps import SweepGaps, SweepRuns, alike, gap_between, joined, median
-from .analysis_runs import CellRunner, Setting, evenly
-from .factors import Vary
+from .analysis_runs import CellRunner, evenly
+from .factors import Value, Vary
 
+Setting = tuple[tuple[Value | None, ...], int]  # values of the factors, and a seed
 Varied = Literal["right", "both"]
 MOST_REFERENCES = 24  # runs of the left side at the model's own value
 CHECKED = 4  # pairs of runs at a value
@@ -73,7 +74,7 @@ class BroughtTogether:
     pairs: int = 0
     verdict: Verdict | Literal[""] = ""
     why_not: str = ""
-    cells: int = field(default=0)
+    cells: int = 0
     best: BestRun | None = None
 
     @property
@@ -99,7 +100,7 @@ class BroughtTogether:
 
 
 def brought_together(
-    gaps: SweepGaps,
+    data: SweepData,
     vary: Vary,
     quantity: str,
     good: float,
@@ -112,7 +113,7 @@ def brought_together(
     """The value of a parameter that brings the two sides of a sweep together.
 
     Args:
-        gaps: Of the sweep.
+        data: Of the sweep.
         vary: One of its factors, with numbers.
         quantity: Whose gap.
         good: The gap that is as good as none [SI].
@@ -121,21 +122,31 @@ def brought_together(
         runner: Runs what the dataset has not; None for nothing.
         progress: Told the fraction that is done.
     """
-    case = _Case(gaps, vary, quantity, varied, own, runner, progress)
+    nothing = BroughtTogether(vary.label, vary.times, varied, own)
     if varied == "right" and vary.kind != "option":
-        return case.told("the model has no value of its own that the left side could keep")
+        why = "the model has no value of its own that the left side could keep"
+        return replace(nothing, why_not=why)
+    case = _Case(data, vary, quantity, varied, own, runner, progress)
+    if runner is None and case.lacks_references:
+        why = (
+            "the design has no run of the left side at the model's own value, and nothing may be "
+            "run"
+        )
+        return replace(nothing, why_not=why)
     fit = case.scatter() if vary.bounds is not None else case.grid()
     if fit is None:
-        return case.told(case.why_not or "it needs three values of the parameter with runs")
-    measured = case.check(fit) if runner is not None else None
-    best, gap, there = None, fit.gap, fit
+        why = "it needs three values of the parameter with runs"
+        return replace(nothing, why_not=why, cells=case.cells)
+    before, measured, best, gap, there = case.own_gap(), None, None, fit.gap, fit
+    if runner is not None:
+        run_before, measured = case.check(fit)
+        before = before if run_before is None else run_before
     if measured is not None:
-        gap = measured[0]
-        if abs(measured[1] - gap) > max(_NEAR * gap, good):
+        gap, predicted, _ = measured
+        if abs(predicted - gap) > max(_NEAR * gap, good):
             best = case.refined(fit, gap)
             gap = best.gap
             there = replace(fit, edge=best.value in fit.bounds)
-    before = case.before if case.before is not None else case.own_gap()
     return BroughtTogether(
         vary.label, vary.times, varied, own, before, fit,
         *(measured or (None, None, 0)),
@@ -145,160 +156,107 @@ def brought_together(
     )  # fmt: skip
 
 
-@dataclass
 class _Case:
-    """One parameter of one sweep, and what was run for it."""
+    """One parameter of one sweep, and what was run for it.
 
-    gaps: SweepGaps
-    vary: Vary
-    quantity: str
-    varied: Varied
-    own: float | None
-    runner: CellRunner | None
-    progress: Progress
-    why_not: str = ""
-    before: float | None = None
-    cells: int = 0
-    kept: list[Setting] = field(default_factory=list)
+    Attributes:
+        lacks_references: Whether the left side is to keep the model's own value, and the dataset
+            has no such run.
+        cells: How many were run.
+    """
 
-    def told(self, why_not: str) -> BroughtTogether:
-        return BroughtTogether(
-            self.vary.label, self.vary.times, self.varied, self.own, why_not=why_not,
-            cells=self.cells,
-        )  # fmt: skip
-
-    @property
-    def place(self) -> int:
-        return [vary.label for vary in self.gaps.design.factors].index(self.vary.label)
+    def __init__(
+        self,
+        data: SweepData,
+        vary: Vary,
+        quantity: str,
+        varied: Varied,
+        own: float | None,
+        runner: CellRunner | None,
+        progress: Progress,
+    ) -> None:
+        self._data, self._vary, self._quantity, self._both = data, vary, quantity, varied == "both"
+        self._own, self._runner, self._progress, self.cells = own, runner, progress, 0
+        self._place = [each.label for each in data.design.factors].index(vary.label)
+        self._levels = np.sort(np.array(vary.values, dtype=float))
+        self._near = np.flatnonzero(np.isclose(self._levels, np.nan if own is None else own))[:1]
+        self.lacks_references = not (self._both or len(self._near))
+        self._kept: list[Setting] = []  # those that the fit is of
 
     def _curves(self, values: Array) -> Array:
         """(c, k, …) of what is (p, s, …): by the other values and seeds, and by the parameter."""
-        design = self.gaps.design
-        lengths = [len(vary.values) for vary in design.listed]
-        samples = len(self.gaps.points) // int(np.prod(lengths))
-        axis = 1 + [vary.label for vary in design.listed].index(self.vary.label)
-        rest = values.shape[2:]
-        cube = values.reshape(samples, *lengths, values.shape[1], *rest)
-        cube = np.moveaxis(cube, axis, len(lengths) + 1)
-        order = np.argsort([float(value) for value in self.vary.values])
-        return cube.reshape(-1, lengths[axis - 1], *rest)[:, order]
-
-    def _settings(self) -> list[Setting]:
-        """(c) the values and the seed of each curve, the parameter at its least value."""
-        points, seeds = len(self.gaps.points), len(self.gaps.seeds)
-        number = np.arange(points * seeds).reshape(points, seeds)
-        first = self._curves(number.astype(float))[:, 0].astype(int)
-        return [
-            (self.gaps.points[k // seeds].values, self.gaps.seeds[k % seeds])
-            for k in first.tolist()
-        ]
+        listed = self._data.design.listed
+        lengths = [len(vary.values) for vary in listed]
+        axis = [vary.label for vary in listed].index(self._vary.label)
+        cube = values.reshape(-1, *lengths, *values.shape[1:])
+        cube = np.moveaxis(cube, axis + 1, len(lengths) + 1)
+        order = np.argsort([float(value) for value in self._vary.values])
+        return cube.reshape(-1, lengths[axis], *values.shape[2:])[:, order]
 
     def grid(self) -> FittedValue | None:
         """From the values of a list or a grid."""
-        levels = np.sort(np.array(self.vary.values, dtype=float))
-        one, two = (each.vectors(self.quantity) for each in (self.gaps.left, self.gaps.right))
-        left, right = self._curves(one), self._curves(two)
-        settings = self._settings()
-        if self.varied == "right":
-            near = np.flatnonzero(np.isclose(levels, np.nan if self.own is None else self.own))
-            if len(near):
-                left = left[:, near[:1]]
-            else:
-                chosen = evenly(len(settings), MOST_REFERENCES)
-                runs = self._references([settings[k] for k in chosen])
-                if runs is None:
-                    return None
-                runs, others = alike(runs, self.gaps.right)
-                left = runs.vectors(self.quantity)[:, None]
-                right = self._curves(others.vectors(self.quantity))[chosen]
-                settings = [settings[k] for k in chosen]
-        self.kept = settings
-        seeds = [seed for _, seed in settings]
-        return fit_curves(self.quantity, levels, left, right, seeds)
+        left, right = (self._curves(vectors(self._quantity, runs)) for runs in self._data.runs)
+        points, seeds = self._data.runs.shape[1:]
+        # The first point of each curve, its parameter at the least value.
+        first = self._curves(np.arange(points * seeds).reshape(points, seeds))[:, 0]
+        chosen = evenly(len(first), MOST_REFERENCES if self.lacks_references else len(first))
+        self._kept = [
+            (self._data.points[k // seeds].values, k % seeds) for k in first[chosen].tolist()
+        ]
+        if self.lacks_references:
+            (runs,) = self._run([(0, self._at(self._kept, self._own))], 0.0)
+            left, right = vectors(self._quantity, runs)[:, None], right[chosen]
+        elif not self._both:
+            left = left[:, self._near]
+        seeds = [seed for _, seed in self._kept]
+        return fit_curves(self._quantity, self._levels, left, right, seeds)
 
     def scatter(self) -> FittedValue | None:
         """From samples of a range."""
-        values = np.array([float(point.values[self.place]) for point in self.gaps.points])
-        if self.varied == "both":
-            self.kept = [(point.values, self.gaps.seeds[0]) for point in self.gaps.points]
-            return fit_scatter(values, median(self.gaps.gap(self.quantity)))
-        chosen = evenly(len(values), MOST_REFERENCES)
-        self.kept = [(self.gaps.points[k].values, self.gaps.seeds[0]) for k in chosen]
-        runs = self._references(self.kept)
-        if runs is None:
-            return None
-        gap = gap_between(self.quantity, *alike(runs, self.gaps.right[chosen, 0]))
+        values = np.array(self._data.values(self._vary.label), dtype=float)
+        chosen = evenly(len(values), len(values) if self._both else MOST_REFERENCES)
+        self._kept = [(self._data.points[k].values, 0) for k in chosen]
+        if self._both:
+            return fit_scatter(values, median(self._data.gaps[self._quantity]))
+        (runs,) = self._run([(0, self._at(self._kept, self._own))], 0.0)
+        gap = gap_between(self._quantity, runs, self._data.runs[1, chosen, 0])
         return fit_scatter(values[chosen], gap)
 
-    def _references(self, settings: Sequence[Setting]) -> SweepRuns | None:
-        """The left side at the model's own value."""
-        if self.runner is None:
-            self.why_not = (
-                "the design has no run of the left side at the model's own value, and nothing "
-                "may be run"
-            )
-            return None
-        return self._run([(self.gaps.sides[0], settings, True)], 0.0)
+    def _at(self, settings: Sequence[Setting], value: float | None) -> list[Setting]:
+        """Settings with a value of the parameter; None is what the model has."""
+        k = self._place
+        return [((*values[:k], value, *values[k + 1 :]), seed) for values, seed in settings]
 
-    def _run(
-        self, groups: Sequence[tuple[str, Sequence[Setting], bool]], start: float
-    ) -> SweepRuns:
-        """Runs (n,) of groups of a backend, settings, and whether the model's own value is meant.
+    def _run(self, groups: Sequence[tuple[int, Sequence[Setting]]], start: float) -> list[Runs]:
+        """Runs of each group of settings on a side; all at once, as processes start slowly."""
+        assert self._runner is not None
+        asked = [(self._data.sides[side], *each) for side, settings in groups for each in settings]
+        self.cells += len(asked)
+        runs = self._runner.run(asked, progress=lambda f: self._progress(start + f / 4))
+        return np.split(runs, np.cumsum([len(settings) for _, settings in groups])[:-1])
 
-        Groups of the same kind go together: each start of processes takes a second.
+    def check(self, fit: FittedValue) -> tuple[float | None, tuple[float, float, int] | None]:
+        """Run both sides at the value.
+
+        Returns:
+            The gap at the model's own value, if it has one and it was run; and the gap, what the
+            fit says of it, and of how many pairs, if any ended.
         """
-        assert self.runner is not None
-        told: list[tuple[str, Setting]] = []
-        apart: list[tuple[str, Setting]] = []
-        order: list[tuple[bool, int]] = []
-        for backend, settings, is_own in groups:
-            for values, seed in settings:
-                without = is_own and self.own is None
-                kept = values
-                if is_own and self.own is not None:
-                    kept = self._with(values, self.own)
-                into = apart if without else told
-                order.append((without, len(into)))
-                into.append((backend, (kept, seed)))
-        found = {}
-        for k, (batch, without) in enumerate(((told, False), (apart, True))):
-            if batch:
-                found[without] = self.runner.run(
-                    [backend for backend, _ in batch],
-                    [setting for _, setting in batch],
-                    own=self.vary if without else None,
-                    progress=lambda f, k=k: self.progress(min(1.0, start + (f + k) / 4)),
-                )
-        self.cells += len(order)
-        rows = [k + (len(told) if without else 0) for without, k in order]
-        return joined([found[key] for key in sorted(found)])[rows]
-
-    def check(self, fit: FittedValue) -> tuple[float, float, int] | None:
-        """Run both sides at the value: the gap, what the fit says, and of how many pairs."""
-        assert self.runner is not None
         picked = self._picked(fit)
-        chosen = [self.kept[k] for k in picked]
-        left, right = self.gaps.sides
-        at = [(self._with(values, fit.value), seed) for values, seed in chosen]
-        groups = [(right, at, False)]
-        groups.append((left, chosen, True) if self.varied == "right" else (left, at, False))
-        own = self.vary.kind == "option"
-        if own:
-            groups.append((right, chosen, True))
-            if self.varied == "both":
-                groups.append((left, chosen, True))
-        runs = self._run(groups, 0.5)
-        found = [runs[k * len(chosen) : (k + 1) * len(chosen)] for k in range(len(groups))]
-        gap = gap_between(self.quantity, found[1], found[0])
-        if own:
-            other = found[3] if self.varied == "both" else found[1]
-            before = gap_between(self.quantity, other, found[2])
-            if np.isfinite(before).any():
-                self.before = float(np.nanmean(before))
-        if not np.isfinite(gap).any():
-            return None
+        chosen = [self._kept[k] for k in picked]
+        at, own = self._at(chosen, fit.value), self._at(chosen, self._own)
+        groups = [(1, at), (0, at if self._both else own)]
+        if self._vary.kind == "option":
+            groups += [(1, own), (0, own)] if self._both else [(1, own)]
+        right, left, *others = self._run(groups, 0.5)
+        gap = gap_between(self._quantity, left, right)
+        before = np.array([])
+        if others:
+            before = gap_between(self._quantity, others[-1] if self._both else left, others[0])
         predicted = np.mean(fit.each[picked]) if len(fit.each) else fit.gap
-        return float(np.nanmean(gap)), float(predicted), int(np.isfinite(gap).sum())
+        count = int(np.isfinite(gap).sum())
+        measured = (float(np.nanmean(gap)), float(predicted), count) if count else None
+        return _mean(before), measured
 
     def refined(self, fit: FittedValue, measured: float) -> BestRun:
         """Run both sides between the neighbours of the value, and keep the best.
@@ -306,20 +264,17 @@ class _Case:
         A gap over a contact has jumps, which neither an interpolation nor a search for one
         minimum stands; values side by side do.
         """
-        chosen = [self.kept[k] for k in self._picked(fit)]
+        chosen = [self._kept[k] for k in self._picked(fit)]
         low, high = self._around(fit)
-        values = np.linspace(low, high, REFINED)
-        at = [(self._with(v, value), seed) for value in values.tolist() for v, seed in chosen]
-        left, right = self.gaps.sides
-        own = self.varied == "right"
-        runs = self._run([(right, at, False), (left, chosen if own else at, own)], 0.75)
-        other = np.tile(np.arange(len(chosen)), REFINED) if own else np.arange(len(at))
-        gap = gap_between(self.quantity, runs[len(at) + other], runs[: len(at)])
-        tried = [*values.tolist(), fit.value]
-        by_value = gap.reshape(REFINED, -1)
+        values = np.linspace(low, high, REFINED).tolist()
+        at = [setting for value in values for setting in self._at(chosen, value)]
+        left_at = at if self._both else self._at(chosen, self._own)
+        right, left = self._run([(1, at), (0, left_at)], 0.75)
+        pairs = right.reshape(REFINED, -1)
+        by_value = gap_between(self._quantity, left.reshape(-1, len(chosen)), pairs)
         stood = np.isfinite(by_value).all(axis=0)  # the same pairs at every value
         means = by_value[:, stood].mean(axis=1) if stood.any() else np.full(REFINED, np.nan)
-        gaps = [*means.tolist(), measured]
+        tried, gaps = [*values, fit.value], [*means.tolist(), measured]
         place = int(np.nanargmin(gaps))
         apart = (high - low) / (REFINED - 1)
         return BestRun(tried[place], gaps[place], apart, (tuple(tried), tuple(gaps)))
@@ -327,27 +282,29 @@ class _Case:
     def _around(self, fit: FittedValue) -> tuple[float, float]:
         """The values of the design on both sides; of a range an eighth of it to each side."""
         (low, high), eighth = fit.bounds, (fit.bounds[1] - fit.bounds[0]) / 8
-        if self.vary.bounds is not None:
+        if self._vary.bounds is not None:
             return max(low, fit.value - eighth), min(high, fit.value + eighth)
-        levels = np.sort(np.array(self.vary.values, dtype=float))
-        below, above = levels[levels < fit.value], levels[levels > fit.value]
-        return float(below[-1]) if len(below) else low, float(above[0]) if len(above) else high
-
-    def _picked(self, fit: FittedValue) -> Ints:
-        """The settings that are run at a value."""
-        known = (
-            np.flatnonzero(np.isfinite(fit.each)) if len(fit.each) else np.arange(len(self.kept))
+        levels = self._levels.tolist()
+        return (
+            max((level for level in levels if level < fit.value), default=low),
+            min((level for level in levels if level > fit.value), default=high),
         )
-        return known[evenly(len(known), CHECKED)]
 
-    def _with(self, values: tuple[Any, ...], value: float) -> tuple[Any, ...]:
-        return (*values[: self.place], value, *values[self.place + 1 :])
+    def _picked(self, fit: FittedValue) -> list[int]:
+        """The settings that are run at a value."""
+        known = np.arange(len(self._kept))
+        if len(fit.each):
+            known = np.flatnonzero(np.isfinite(fit.each))
+        return known[evenly(len(known), CHECKED)].tolist()
 
     def own_gap(self) -> float | None:
         """The gap of the dataset with the parameter as the model has it."""
-        if self.own is None:
+        if self._own is None:
             return None
-        values = np.array([float(value) for value in self.gaps.values(self.vary.label)])
-        near = np.isclose(values, self.own)
-        gap = self.gaps.gap(self.quantity)[near]
-        return float(np.nanmean(gap)) if np.isfinite(gap).any() else None
+        values = np.array(self._data.values(self._vary.label), dtype=float)
+        return _mean(self._data.gaps[self._quantity][np.isclose(values, self._own)])
+
+
+def _mean(gaps: Array) -> float | None:
+    """Of what is a number; None where nothing is."""
+    return float(np.nanmean(gaps)) if np.isfinite(gaps).any() else None

@@ -5,12 +5,12 @@ from __future__ import annotations
 import importlib
 import os
 import signal
-import threading
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from concurrent.futures import TimeoutError as WaitedTooLong
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from itertools import islice
+from queue import SimpleQueue
 from typing import Any
 
 from ..errors import WorkerEndedError
@@ -37,29 +37,26 @@ def require_joblib() -> Any:
     return require_extra("joblib", "a sweep", "joblib", "sweep")
 
 
-@contextmanager
-def deaf() -> Iterator[None]:
-    """Processes that begin in here never take a Ctrl-C: it is for the driver to answer it."""
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
-        yield
-        return
-    # Before, as they would take the block away when they begin. What a sweep that is stopped
-    # leaves they remove; they need not tell.
+def _begin_trackers() -> None:
+    """Begin the processes that remove what others leave, before any thread blocks Ctrl-C.
+
+    They would take the block away when they begin. What a sweep that is stopped leaves they
+    remove; they need not tell.
+    """
     told = os.environ.get("PYTHONWARNINGS")
     os.environ["PYTHONWARNINGS"] = ",".join(filter(None, (told, "ignore:resource_tracker")))
     try:
         for name in _TRACKERS:
             importlib.import_module(name).ensure_running()
     finally:
-        if told is None:
-            del os.environ["PYTHONWARNINGS"]
-        else:
-            os.environ["PYTHONWARNINGS"] = told
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        del os.environ["PYTHONWARNINGS"]
+        os.environ.update({} if told is None else {"PYTHONWARNINGS": told})
+
+
+def _deaf() -> None:
+    """Processes that this thread begins never take a Ctrl-C: it is for the driver to answer it."""
+    if hasattr(signal, "pthread_sigmask"):  # not on Windows
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
 class _Process:
@@ -86,10 +83,9 @@ class _Process:
             return [failed_row(batch[0], timed_out(self._rules.timeout) if late else error)]
 
     def _run(self, batch: Batch) -> list[Row]:
-        with deaf():
-            if self._pool is None:
-                self._pool = self._loky.ProcessPoolExecutor(max_workers=1, env=ALONE)
-            future: Future[list[Row]] = self._pool.submit(run_batch, self._rules, batch, True)
+        if self._pool is None:
+            self._pool = self._loky.ProcessPoolExecutor(max_workers=1, env=ALONE)
+        future: Future[list[Row]] = self._pool.submit(run_batch, self._rules, batch, True)
         try:
             return future.result(self._rules.timeout * len(batch) + _GRACE)
         except (self._loky.BrokenProcessPool, WaitedTooLong) as error:
@@ -105,29 +101,33 @@ class _Process:
 
 
 def apart(rules: CellRules, batches: Iterable[Batch], jobs: int) -> Results:
-    """The rows of each batch, as they are ready, in processes that nothing else depends on."""
+    """The rows of each batch, as they are ready, in processes that nothing else depends on.
+
+    Where one dies, what it was running is run again, cell by cell if need be; the others go on.
+    """
     processes = [_Process(rules) for _ in range(jobs)]
-    free, lock = list(processes), threading.Lock()
+    free = SimpleQueue[_Process]()
+    for process in processes:
+        free.put(process)
 
     def run(batch: Batch) -> list[Row]:
-        with lock:
-            process = free.pop()
+        process = free.get()
         try:
             return process.rows(batch)
         finally:
-            with lock:
-                free.append(process)
+            free.put(process)
 
-    work: Callable[[Batch], list[Row]] = run
-    with ThreadPoolExecutor(jobs) as threads:
+    if os.name != "nt":
+        _begin_trackers()
+    with ThreadPoolExecutor(jobs, initializer=_deaf) as threads:
         try:
             coming = iter(batches)
-            waiting = {threads.submit(work, batch) for batch in islice(coming, jobs)}
+            waiting = {threads.submit(run, batch) for batch in islice(coming, jobs)}
             while waiting:
                 done, waiting = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
+                waiting |= {threads.submit(run, batch) for batch in islice(coming, len(done))}
                 for future in done:
                     yield future.result()
-                waiting |= {threads.submit(work, batch) for batch in islice(coming, len(done))}
         finally:
             for process in processes:
                 process.close()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 import os
-import threading
 import time
 import warnings
 from collections import Counter
@@ -15,18 +14,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInputError, StateMachineError
+from ..errors import BadInputError
 from ..grading.unwinding import unwinding
 from ..installed import require_extra
 from ..processes import checked_jobs
 from ..runs.drive import Progress, silent
-from .apart import Batch, Results, apart, deaf, require_joblib
+from .apart import Batch, Results, apart, require_joblib
 from .cell import DONE, CellRules
-from .folder import SCRATCH, check_folder, locked, settle_manifest
+from .folder import check_folder, locked, settle_manifest
 from .prepare import prepared
 from .request import PreparedSweep, Sweep
 from .rows import CELLS, RowWriter, counted, remove_failed
-from .worker import Row, differing, probe, run_batch
+from .worker import differing, probe, run_batch
 
 _BATCH, _MOST = 1.0, 500  # a task takes about so many seconds, and has at most so many cells
 _TASKS = 4  # at least so many for each job, so that none is idle at the end
@@ -115,9 +114,14 @@ def run_sweep(
         kinds = Counter(known.values())
         ran = 0
         batches = _batches(ready, known, jobs if client is None else _workers(client))
+        results = (
+            apart(ready.rules, batches, jobs)
+            if client is None
+            else _on_dask(client, ready.rules, batches)
+        )
         with unwinding():
             try:
-                with closing(_results(ready.rules, batches, jobs, client, folder)) as found:
+                with closing(results) as found:
                     for rows in found:
                         writer.add(rows)
                         kinds.update(row.get("error_class") or row["status"] for row in rows)
@@ -166,94 +170,34 @@ def _batches(ready: PreparedSweep, known: Mapping[str, str], jobs: int) -> Itera
     return (batch for turn in turns for batch in turn if batch is not None)
 
 
-def _results(
-    rules: CellRules, batches: Iterator[Batch], jobs: int, client: Any, folder: Path
-) -> Results:
-    """The rows of all batches, as they are ready.
+def _on_dask(client: Any, rules: CellRules, batches: Iterator[Batch]) -> Results:
+    """The rows of all batches, as they are ready, from the workers of Dask.
 
-    Where a worker dies, what was being run is run again apart from everything else, cell by cell
-    if need be, and the rest goes on with new workers.
+    A batch that its worker does not survive is run here, apart from everything else.
+
+    Raises:
+        BadInputError: The scheduler went away.
     """
-    if jobs == 1 and client is None:
-        yield from apart(rules, batches, 1)
-        return
-    feed = _Feed(batches)
-    while True:
+    distributed = require_extra("distributed", "--scheduler", "Dask", "cluster")
+    finished, out = distributed.as_completed(loop=client.loop), {}
+
+    def hand_out(count: int) -> None:
+        for batch in itertools.islice(batches, count):
+            future = client.submit(run_batch, rules, batch, False, pure=False)
+            out[future.key] = batch
+            finished.add(future)
+
+    hand_out(2 * _workers(client))
+    for future in finished:
+        batch = out.pop(future.key)
         try:
-            with closing(_parallel(rules, feed, jobs, client, folder)) as found:
-                yield from found
-            return
-        except StateMachineError:
-            raise
+            rows = future.result()
         except Exception as error:
-            if client is not None and client.status != "running":
+            if client.status != "running":
                 raise BadInputError("the scheduler went away; what was done is kept") from error
-            lost = feed.lost()
-            if not lost:
-                raise
-            with closing(apart(rules, lost, min(jobs, len(lost)))) as found:
-                yield from found
-
-
-class _Feed:
-    """Batches for joblib, which takes them from threads of its own, and which of them are out."""
-
-    def __init__(self, batches: Iterator[Batch]) -> None:
-        self._batches, self._lock = enumerate(batches), threading.Lock()
-        self._out: dict[int, Batch] = {}
-        self._round = 0
-
-    def tasks(self, rules: CellRules, own: bool) -> Iterator[Any]:
-        """Calls of `_numbered`, until the batches end or are lost."""
-        delayed = require_joblib().delayed
-        now = self._round
-        while True:
-            with self._lock:
-                if now != self._round or (item := next(self._batches, None)) is None:
-                    return
-                number, batch = item
-                self._out[number] = batch
-            yield delayed(_numbered)(number, rules, batch, own)
-
-    def back(self, number: int) -> None:
-        """A batch has its rows."""
-        self._out.pop(number)
-
-    def lost(self) -> list[Batch]:
-        """The batches that are out, of which nothing more is expected."""
-        with self._lock:
-            self._round += 1
-            lost, self._out = list(self._out.values()), {}
-        return lost
-
-
-def _numbered(number: int, rules: CellRules, batch: Batch, own: bool) -> tuple[int, list[Row]]:
-    return number, run_batch(rules, batch, own)
-
-
-def _parallel(rules: CellRules, feed: _Feed, jobs: int, client: Any, folder: Path) -> Results:
-    """The rows of the batches of a feed, through joblib."""
-    joblib = require_joblib()
-    if client is None:
-        how = joblib.parallel_config(
-            backend="loky",
-            n_jobs=jobs,
-            inner_max_num_threads=1,
-            temp_folder=os.fspath(folder / SCRATCH),
-        )
-    else:
-        how = joblib.parallel_config(backend="dask", client=client)
-    with how, warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a worker that ends is dealt with
-        parallel = joblib.Parallel(
-            return_as="generator_unordered", batch_size=1, pre_dispatch="2 * n_jobs"
-        )
-        with deaf():
-            started = parallel(feed.tasks(rules, client is None))
-        with closing(started) as found:
-            for number, rows in found:
-                feed.back(number)
-                yield rows
+            (rows,) = apart(rules, [batch], 1)
+        hand_out(1)
+        yield rows
 
 
 @contextmanager

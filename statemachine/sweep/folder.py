@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,7 +18,6 @@ from .rows import CELLS
 
 MANIFEST = "sweep.json"
 SCHEMA = 1
-SCRATCH = ".joblib"  # where joblib puts large arguments of its workers
 _LOCK = ".lock"  # with the number of the process that holds it
 # What a dataset is of, whatever its design: another of these is another sweep.
 _SAME = ("request", "files", "function", "versions")
@@ -38,15 +36,14 @@ def locked(folder: Path) -> Iterator[None]:
     try:
         if not _taken(handle):
             raise BadInputError(f"another sweep runs in {folder}: one at a time")
-        _remove_left(folder, handle)
+        _remove_left(handle)
         yield
     finally:
         os.close(handle)
 
 
-def _remove_left(folder: Path, handle: int) -> None:
-    """Remove what joblib keeps for a driver, of one that was killed with all of its processes."""
-    shutil.rmtree(folder / SCRATCH, ignore_errors=True)
+def _remove_left(handle: int) -> None:
+    """Remove the semaphores of a driver that was killed with all of its processes."""
     if os.name == "nt":
         return
     driver = os.pread(handle, 20, 0).decode(errors="replace")

@@ -104,7 +104,7 @@ def _model(
 ) -> tuple[Model, dict[str, Any], Scenario]:
     """The Model of a cell, the options that it was made with, and what is done on it."""
     name = rules.model_of(cell)
-    varied = rules.settings(cell, "option")
+    varied = [(v, value) for v, value in rules.settings(cell, "option") if value is not None]
     # A switch may be what lets an engine take the file at all: `load` is told.
     first = {**doing.options, **{v.name: value for v, value in varied if isinstance(value, bool)}}
     rest = [(v, value) for v, value in varied if not isinstance(value, bool)]

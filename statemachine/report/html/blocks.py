@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import base64
 import itertools
 from collections.abc import Callable, Iterable, Sequence
 
-from ...errors import MissingEngineError
 from ...page import (
-    LETTERS,
     Bars,
     Block,
     Code,
@@ -26,7 +23,7 @@ from ...page import (
     Traces,
     Verdict,
 )
-from ..figures import svg
+from ..robot_pictures import inline
 from .markup import Html, joined, kept, tag
 
 _SIGNS = {"agrees": "○", "settles": "◐", "differs": "●"}  # so that a verdict needs no colour
@@ -80,13 +77,10 @@ def _block(block: Block, draw: Draw, level: int) -> Html:
 
 def _picture(picture: HeatMap | Bars | Traces) -> Html:
     """What matplotlib draws, as an image within the page; nothing where it is not installed."""
-    try:
-        drawing = svg(picture)
-    except MissingEngineError:
-        return Html("")
-    source = base64.b64encode(drawing.encode()).decode()
-    image = tag("img", src=f"data:image/svg+xml;base64,{source}", alt=picture.title)
-    return tag("figure", image, tag("figcaption", picture.title), class_="drawn")
+    source = inline(picture)
+    image = tag("img", src=source, alt=picture.title)
+    figure = tag("figure", image, tag("figcaption", picture.title), class_="drawn")
+    return figure if source else Html("")
 
 
 def _section(block: Section, draw: Draw, level: int) -> Html:
@@ -102,16 +96,14 @@ def _section(block: Section, draw: Draw, level: int) -> Html:
 
 
 def _question(block: Question) -> Html:
-    choices = [f"{letter}) {c}" for letter, c in zip(LETTERS, block.choices, strict=False)]
-    right = "none of them" if block.right is None else choices[block.right]
     return joined(
         (
             tag("p", block.text),
-            tag("ul", *(tag("li", choice) for choice in choices)),
+            tag("ul", *(tag("li", choice) for choice in block.lettered)),
             tag(
                 "details",
                 tag("summary", "What the run says"),
-                tag("p", f"{right}. {block.because}"),
+                tag("p", f"{block.answer}. {block.because}"),
             ),
         )
     )

@@ -1,0 +1,230 @@
+"""Two engines of a sweep as arrays, read once from its dataset: runs, and how far apart they are.
+
+A run is an element of a structured array, whose fields are
+
+    tip (m, 3) fingertip at the moments that are kept [m]
+    qpos (m, n) angles then [rad]
+    touch when something first touched [s]; infinite if nothing did
+    time simulated time at the end [s]
+    timestep [s]
+
+All are NaN where there is no run. A run that keeps fewer moments has NaN before them.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import BadInputError
+from ..interface import Array
+from .cell import DONE
+from .design import Design, DesignPoint
+from .rows import require_parquet
+
+Flags = NDArray[np.bool_]
+Runs = NDArray[Any]  # structured, as above
+
+
+@dataclass(frozen=True)
+class RunQuantity:
+    """What the gap of two runs is a gap of.
+
+    Attributes:
+        kind: As a tolerance calls it; `measures.QUANTITIES` has its unit.
+        says: In words.
+        end: Whether it is that of the last moment; else the largest of the moments that are kept.
+    """
+
+    kind: str
+    says: str
+    end: bool = False
+
+
+RUN_QUANTITIES = {
+    "tip": RunQuantity("tip", "fingertip"),
+    "tip-end": RunQuantity("tip", "fingertip at the end", True),
+    "qpos": RunQuantity("joint", "joint angles"),
+    "qpos-end": RunQuantity("joint", "joint angles at the end", True),
+    "touch": RunQuantity("contact", "first touch"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class SweepData:
+    """Two engines of a sweep at every point and seed.
+
+    Attributes:
+        sides: Their names.
+        design: Of the sweep; points: its points (p), each a setting.
+        points: See design.
+        runs: (2, p, s) runs of each side.
+        gaps: (p, s) of each quantity that the dataset has, by name [SI]; NaN where either side
+            has no run.
+        failed: How many cells of either failed, by the class of the error; missing: have not run.
+        missing: See failed.
+    """
+
+    sides: tuple[str, str]
+    design: Design
+    points: tuple[DesignPoint, ...]
+    runs: Runs
+    gaps: Mapping[str, Array]
+    failed: Mapping[str, int]
+    missing: int
+
+    def values(self, label: str) -> list[Any]:
+        """(p) the value of a factor at each point."""
+        place = [vary.label for vary in self.design.factors].index(label)
+        return [point.values[place] for point in self.points]
+
+
+def sweep_data(
+    table: Any,
+    design: Design,
+    sides: tuple[str, str],
+    seeds: int,
+    moments: int,
+    hinges: Sequence[int] | None = None,
+) -> SweepData:
+    """What the dataset of a sweep has of two engines.
+
+    Args:
+        table: As `read_cells` gives it.
+        design: Of the sweep.
+        sides: Two of its backends.
+        seeds: How many the sweep has.
+        moments: How many of a run it keeps.
+        hinges: Which numbers of qpos are angles; None for all.
+
+    Raises:
+        BadInputError: No setting has a run on both.
+    """
+    points = tuple(design.points())
+    place = {point.id: k for k, point in enumerate(points)}
+    keys = [table[name].to_pylist() for name in ("backend", "point", "seed")]
+    at = {
+        row: (sides.index(backend), place[point], seed)
+        for row, (backend, point, seed) in enumerate(zip(*keys, strict=True))
+        if backend in sides and point in place and seed < seeds
+    }
+    table = table.take(np.array([*at], dtype=int))
+    read = read_runs(table, moments, hinges)
+    runs = np.full((2, len(points), seeds), np.nan, read.dtype)
+    runs[tuple(np.array([*at.values()], dtype=int).reshape(-1, 3).T)] = read
+    if not np.isfinite(runs["time"]).all(axis=0).any():
+        raise BadInputError(
+            f"no setting of this sweep has a run on both {sides[0]} and {sides[1]}; of cells that "
+            "failed, the column error says why"
+        )
+    gaps = {name: gap_between(name, *runs) for name in RUN_QUANTITIES}
+    figures = {**gaps, "touch": runs["touch"]}
+    failed = Counter(kind for kind in table["error_class"].to_pylist() if kind)
+    return SweepData(
+        sides, design, points, runs,
+        {name: gap for name, gap in gaps.items() if np.isfinite(figures[name]).any()},
+        dict(failed.most_common()), 2 * len(points) * seeds - len(at),
+    )  # fmt: skip
+
+
+def read_runs(
+    table: Any, moments: int, hinges: Sequence[int] | None = None, kind: Any = None
+) -> Runs:
+    """Runs (n,) from a table with the columns of a dataset; of a cell that failed there is none.
+
+    Args:
+        table: A pyarrow Table.
+        moments: How many of a run are kept.
+        hinges: Which numbers of qpos are angles; None for all.
+        kind: The type of runs that these are compared with; None for their own.
+    """
+    tip, qpos = (_nested(table[name], moments) for name in ("sample_tip", "sample_qpos"))
+    qpos = qpos if hinges is None else qpos[..., list(hinges)]
+    if kind is None:
+        fields: list[Any] = [("tip", float, (tip.shape[1], 3)), ("qpos", float, qpos.shape[1:])]
+        kind = np.dtype(fields + [(name, float) for name in ("touch", "time", "timestep")])
+    runs = np.full(table.num_rows, np.nan, kind)
+    for name, values in (("tip", tip), ("qpos", qpos)):
+        runs[name][..., : values.shape[-1]] = values[..., : runs[name].shape[-1]]
+    time, steps, touch = (
+        np.array(table[name].to_numpy(), dtype=float) for name in ("time", "steps", "first_touch")
+    )
+    runs["touch"] = np.where(np.isnan(touch), np.inf, touch)
+    runs["time"], runs["timestep"] = time, time / np.maximum(steps, 1)
+    runs[[status != DONE for status in table["status"].to_pylist()]] = np.nan
+    return runs
+
+
+def _nested(column: Any, moments: int) -> Array:
+    """A column of lists of lists as an array (n, m, d), without a loop; NaN where one is short.
+
+    The last moment of a run stays the last.
+    """
+    compute = require_parquet()[0].compute
+    column = column.combine_chunks()
+    counts, inner = _lengths(column), compute.list_flatten(column)
+    numbers = _lengths(inner)
+    moments = max(moments, counts.max(initial=0))
+    there = np.arange(moments) >= moments - counts[:, None]
+    lengths = np.zeros(there.shape, dtype=int)
+    lengths[there] = numbers
+    wide = np.arange(numbers.max(initial=1)) < lengths[..., None]
+    values: Array = np.full(wide.shape, np.nan)
+    values[wide] = compute.list_flatten(inner).to_numpy(zero_copy_only=False)
+    return values
+
+
+def _lengths(lists: Any) -> NDArray[np.int64]:
+    """How many elements each has; 0 of what is missing."""
+    compute = require_parquet()[0].compute
+    found = compute.fill_null(compute.list_value_length(lists), 0)
+    return found.to_numpy(zero_copy_only=False).astype(np.int64)
+
+
+def vectors(name: str, runs: Runs) -> Array:
+    """(…, m, d): what the gap of a quantity is the length of a difference of."""
+    quantity = RUN_QUANTITIES[name]
+    if quantity.kind == "contact":
+        return np.where(np.isinf(runs["touch"]), np.nan, runs["touch"])[..., None, None]
+    values: Array = runs["tip" if quantity.kind == "tip" else "qpos"]
+    return values[..., -1:, :] if quantity.end else values
+
+
+def length(name: str, difference: Array) -> Array:
+    """The gap (…) that a difference (…, m, d) is: the largest of the moments."""
+    if RUN_QUANTITIES[name].kind == "tip":
+        return largest(np.linalg.norm(difference, axis=-1))
+    return largest(largest(np.abs(difference)))
+
+
+def gap_between(name: str, one: Runs, two: Runs) -> Array:
+    """The gap (…) of a quantity between runs.
+
+    Of a first touch that only one side has it is the length of the run, and 0 if neither has one.
+    """
+    if RUN_QUANTITIES[name].kind != "contact":
+        return length(name, vectors(name, one) - vectors(name, two))
+    until = np.minimum(one["time"], two["time"])
+    never = np.isinf(one["touch"]).astype(int) + np.isinf(two["touch"])
+    with np.errstate(invalid="ignore"):
+        gap = np.abs(one["touch"] - two["touch"])
+    return np.where(never == 2, 0.0 * until, np.where(never == 1, until, gap))
+
+
+def largest(values: Array) -> Array:
+    """Over the last axis, of what is a number; NaN where nothing is."""
+    return np.fmax.reduce(values, axis=-1, initial=np.nan)
+
+
+def median(values: Array, axis: int = -1) -> Array:
+    """Of what is a number; NaN where nothing is."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found: Array = np.nanmedian(values, axis=axis)
+    return found
