@@ -31,7 +31,7 @@ from statemachine.conventions import (
     probe,
 )
 from statemachine.conventions.answers import closest
-from statemachine.engines import part
+from statemachine.engines import room
 from statemachine.engines.mujoco import pile
 from statemachine.engines.samples import pendulum
 from statemachine.errors import BadInputError, MissingEngineError, UnknownNameError
@@ -572,10 +572,11 @@ def test_every_call_works(engine: str) -> None:
 
 def test_the_cells_of_an_engine_are_a_program(engine: str, tmp_path: Path) -> None:
     """As a reader would type them, with nothing of ours."""
-    module: Any = part(engine, "phrasebook")
-    file = tmp_path / module.FILE[0]
-    file.write_text(module.FILE[1])
-    lines = [f"file = {str(file)!r}", *(module.CELLS[name].code for name in phrasebook.CONCEPTS)]
+    own = room(engine).phrases()
+    assert own
+    file = tmp_path / own.file[0]
+    file.write_text(own.file[1])
+    lines = [f"file = {str(file)!r}", *(own.cells[name].code for name in phrasebook.CONCEPTS)]
     done = subprocess.run(
         [sys.executable, "-c", "\n".join([*lines, "print(len(worlds))"])],
         capture_output=True,
@@ -591,10 +592,8 @@ def test_the_cells_of_an_engine_are_a_program(engine: str, tmp_path: Path) -> No
 def test_a_cell_that_does_nothing_is_found_out(
     engine: str, concept: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    module: Any = part(engine, "phrasebook")
-    monkeypatch.setitem(
-        module.CELLS, concept, dataclasses.replace(module.CELLS[concept], code="pass")
-    )
+    cells: Any = getattr(room(engine).phrases(), "cells", None)
+    monkeypatch.setitem(cells, concept, dataclasses.replace(cells[concept], code="pass"))
     found = {call.concept: call for call in phrasebook.run([engine]).engines[engine]}
     assert not found[concept].works
     page = report.calls_page(phrasebook.run([engine]))
@@ -754,22 +753,23 @@ def test_an_engine_without_a_room_is_not_asked(
     assert any(line.split()[:4] == ["mujoco", "0", "0", "-9.81"] for line in lines)
 
 
-def test_a_room_of_another_package_may_have_a_part_of_the_parts(
+def test_a_room_of_another_package_may_have_some_of_the_methods(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    room = tmp_path / "their_room"
-    room.mkdir()
-    (room / "__init__.py").touch()
-    (room / "conventions.py").write_text("def gravity(steps): return (0, 0, -steps), (0, 0, -1)")
-    (room / "phrasebook.py").write_text(
-        "from statemachine.engines.phrases import Cell\n"
-        "FILE = ('a.txt', '7')\n"
-        "def close(names): pass\n"
-        "CELLS = {'load': Cell('a = int(open(file).read())', lambda n: n.a == 7)}"
+    (tmp_path / "their_room.py").write_text(
+        "from statemachine.engines import RawEngine\n"
+        "from statemachine.engines.measured import Cell, Phrases\n"
+        "class Theirs(RawEngine):\n"
+        "    def measurement(self, question):\n"
+        "        gravity = lambda steps: ((0, 0, -steps), (0, 0, -1))\n"
+        "        return gravity if question == 'gravity' else None\n"
+        "    def phrases(self):\n"
+        "        load = Cell('a = int(open(file).read())', lambda n: n.a == 7)\n"
+        "        return Phrases(('a.txt', '7'), {'load': load})\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(engines, "_ROOMS", dict(engines._ROOMS))
-    engines.register("theirs", "their_room")
+    engines.register("theirs", "their_room:Theirs")
     assert answers("gravity", "theirs") == {"": "told 0 0 -50, felt 0 0 -1"}
     assert ask("timestep", "theirs") is None
     (phrase,) = phrasebook.run(["theirs"]).engines["theirs"]
@@ -783,7 +783,7 @@ def test_a_room_that_cannot_be_imported_is_left_out(
 ) -> None:
     monkeypatch.setattr(engines, "_ROOMS", dict(engines._ROOMS))
     engines.register("broken", "no_such_package")
-    assert "broken" not in engines.rooms_with("conventions")
+    assert "broken" not in engines.rooms_with("measurement")
     with pytest.raises(MissingEngineError, match="room of 'broken' cannot be loaded"):
         ask("gravity", "broken")
     assert main(("conventions", "gravity")) == 0

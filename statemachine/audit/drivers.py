@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from ..engines import part
+from ..engines import room
 from ..engines.auditing import Driver
-from ..engines.parts import AuditPart
 from ..interface import Model
 from .interface_driver import InterfaceDriver
 
 
 def drivers_of(model: Model, seed: int) -> tuple[Driver, ...]:
     """The engine behind a Model, where its room has a driver, and the interface to it."""
-    room: AuditPart | None = part(model.backend, "audit")
-    engine = (room.driver(model, seed),) if room else ()
-    return (*engine, InterfaceDriver(model, seed))
+    engine = room(model.backend).driver(model, seed)
+    return (*((engine,) if engine else ()), InterfaceDriver(model, seed))

@@ -15,7 +15,7 @@ from contextlib import redirect_stdout
 from dataclasses import dataclass
 from typing import Any
 
-from ..engines import needed_part, rooms_with
+from ..engines import room, rooms_with
 from ..errors import BadInputError, StateMachineError, unknown_name
 from ..installed import engine_version, require
 from ..interface import Model
@@ -82,7 +82,7 @@ class CallRecording:
 
 def recorded_engines() -> list[str]:
     """Engines whose rooms say how their calls are watched; none of them is imported."""
-    return rooms_with("calls")
+    return rooms_with("call_watch")
 
 
 def record(code: str, engine: str) -> CallRecording:
@@ -106,8 +106,8 @@ def record(code: str, engine: str) -> CallRecording:
     if engine not in recorded_engines():
         raise unknown_name("engine whose calls can be recorded", engine, recorded_engines())
     require(engine)
-    helpers = needed_part(engine, "calls").WORDS.helpers
-    watches = [needed_part(name, "calls").watch() for name in (engine, *helpers)]
+    watch = room(engine).call_watch()
+    watches = [watch, *(room(helper).call_watch() for helper in watch.words.helpers)]
     namespace: dict[str, Any] = {"__name__": "__main__"}
     done: list[Statement] = []
     error = None

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..engines import part, room_names
+from ..engines import room, room_names
 from ..engines.measured import Absent, Measurement
 from ..errors import unknown_name
 from ..installed import ENGINES, engine_version, require
@@ -85,7 +85,7 @@ def ask(question: str, engine: str) -> Answers | None:
     """
     check_questions((question,))
     check_engine(engine)
-    measure = getattr(part(engine, "conventions"), question, None)
+    measure = room(engine).measurement(question)
     if measure is None:
         return None
     asked = _module(question)
@@ -141,7 +141,7 @@ def check_engine(name: str) -> None:
     """
     if name in ENGINES or name not in room_names():
         require(name)
-    part(name, "conventions")
+    room(name)
 
 
 def versions(engines: Sequence[str]) -> dict[str, str]:

@@ -1,7 +1,7 @@
 """Which call does what on each engine: a table whose every cell is run before it is shown.
 
-The cells of one engine, one after the other, are a program; `CELLS` of its room's part
-"phrasebook" has them by concept. After each, a check looks at the engine for what the concept
+The cells of one engine, one after the other, are a program; its room's `phrases` has
+them by concept. After each, a check looks at the engine for what the concept
 says. An engine without a cell for a concept is not asked.
 """
 
@@ -14,8 +14,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from ..engines import part
-from ..engines.phrases import PhrasebookPart
+from ..engines import room
+from ..engines.measured import Phrases
 from ..silence import silence
 from . import check_engine, versions
 
@@ -74,28 +74,28 @@ def run(
     phrases: dict[str, tuple[Phrase, ...]] = {}
     for done, engine in enumerate(engines):
         check_engine(engine)
-        own: PhrasebookPart | None = part(engine, "phrasebook")
-        concepts = [concept for concept in CONCEPTS if own and concept in own.CELLS]
+        own = room(engine).phrases()
+        concepts = [concept for concept in CONCEPTS if own and concept in own.cells]
         said = []
-        for count in range(1, len(concepts) + 1):
+        for count in range(1, len(concepts) + 1) if own else ():
             said.append(_phrase(own, concepts[:count]))
             progress((done + count / len(concepts)) / len(engines))
         phrases[engine] = tuple(said)
     return Phrasebook(versions(engines), phrases)
 
 
-def _phrase(own: Any, concepts: Sequence[str]) -> Phrase:
+def _phrase(own: Phrases, concepts: Sequence[str]) -> Phrase:
     """Run the cells up to the last concept, so that its check may do what it likes."""
     names: dict[str, Any] = {}
-    cell = own.CELLS[concepts[-1]]
+    cell = own.cells[concepts[-1]]
     said = ""
     with tempfile.TemporaryDirectory() as folder, silence():
-        file = Path(folder) / own.FILE[0]
-        file.write_text(own.FILE[1], encoding="utf-8")
+        file = Path(folder) / own.file[0]
+        file.write_text(own.file[1], encoding="utf-8")
         names["file"] = str(file)
         try:
             for concept in concepts:
-                exec(own.CELLS[concept].code, names)
+                exec(own.cells[concept].code, names)
             if not cell.happened(SimpleNamespace(**names)):
                 said = "it ran, and what it should do did not happen"
         except Exception as error:  # whatever an engine raises is the finding

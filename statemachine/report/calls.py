@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby, zip_longest
 
 from ..calls import Call, CallRecording, Statement
-from ..engines import needed_part
+from ..engines import room
 from ..engines.call_watch import CallWords
 from ..interface import DERIVED
 from ..page import Block, Code, Table, Text
@@ -138,7 +138,7 @@ def _names(changed: Sequence[str]) -> str:
 
 
 def _words(engine: str) -> CallWords:
-    return needed_part(engine, "calls").WORDS
+    return room(engine).call_watch().words
 
 
 def _legend(recordings: Mapping[str, CallRecording]) -> Iterator[Text]:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..backends import backend_names, load
-from ..engines import part
+from ..engines import room
 from ..engines.auditing import SavePoint
 from ..errors import (
     BadInputError,
@@ -162,12 +162,12 @@ class _Examination:
         self.row = replace(self.row, **sizes)
 
     def _equals_engine(self, model: Model) -> bool | None:
-        plain = part(model.backend, "plain")
-        if plain is None:
+        own = room(model.backend)
+        if not own.can("plain_run"):
             return None
         orders = gaps.commands(model, _SAME, self.seed)
         ours = gaps.run(model, orders)
-        theirs = plain.run(self.path, orders[: len(ours.qpos) - 1], gaps.keyframe_of(model))
+        theirs = own.plain_run(self.path, orders[: len(ours.qpos) - 1], gaps.keyframe_of(model))
         if theirs is None:
             return None
         rows = np.hstack((ours.qpos, ours.qvel))
@@ -216,10 +216,9 @@ class _Examination:
 
     def _cost(self, model: Model) -> float | None:
         """Time of a step over that of the engine, driven by its own functions, in turns."""
-        audit = part(model.backend, "audit")
-        if audit is None or not model.nv:
+        engine = room(model.backend).driver(model, self.seed) if model.nv else None
+        if engine is None:
             return None
-        engine = audit.driver(model, self.seed)
         ctrl = gaps.commands(model, 1, self.seed)[0]
         with make_data(model) as data:
             reset(model, data, gaps.keyframe_of(model))

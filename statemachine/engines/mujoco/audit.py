@@ -29,11 +29,6 @@ class Simulation:
     data: Any
 
 
-def driver(model: Model, seed: int) -> Driver:
-    """The engine itself, to be audited with a model; `seed`: of what it does of its own."""
-    return MujocoDriver(model, seed)
-
-
 class MujocoDriver(Driver):
     """The engine through its own functions."""
 

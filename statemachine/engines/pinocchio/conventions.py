@@ -13,7 +13,16 @@ from ...installed import require
 from ...interface import Array
 from ..measured import Absent, LetGo, Measurement, Past, ReadTwice
 from ..samples import joint_tree, marked, pendulum
-from .names import names_with
+
+
+def names_with(pin: Any, *words: str) -> tuple[str, ...]:
+    """Public names of Pinocchio's, and of its Data's, that have one of the words in them."""
+    names = (*vars(pin), *vars(pin.Data))
+    return tuple(
+        sorted(
+            name for name in names if name[0] != "_" and any(word in name.lower() for word in words)
+        )
+    )
 
 
 def _marks(pin: Any, model: Any, data: Any, q: Array) -> Array:

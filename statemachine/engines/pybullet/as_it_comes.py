@@ -18,7 +18,7 @@ from ...backends._bullet_plan import Plan
 from ...backends._bullet_world import ENGINE_TIMESTEP, Tree, World
 from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model
-from ..parts import LeftAlone, Term, WayBack
+from ..records import LeftAlone, Term, WayBack
 from .world import aim, fresh_world, gravity_of, limp, read_into, servos_of
 
 # Before a state is taken, while the jaws still touch what they hold; and after it.

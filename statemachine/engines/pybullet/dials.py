@@ -26,7 +26,7 @@ from ...backends._bullet_world import UNCLAMPED, World
 from ...backends.pybullet_backend import PybulletData, PybulletModel
 from ...errors import EngineError
 from ...interface import Model
-from ..parts import Setting
+from ..records import Setting
 
 # What a fresh body has: a single-precision literal in the engine.
 BODY_DAMPING = float(np.float32(0.04))
@@ -151,12 +151,6 @@ class PybulletDials:
             world = data.raw
             told = [pb.getDynamicsInfo(b, link, world.client)[1] for b, link, _ in world.solids()]
         return np.array(told)
-
-
-def dials(model: Model, options: Mapping[str, Any]) -> PybulletDials | None:
-    """The dials of a Model of PyBullet as it comes; None of any other."""
-    as_it_comes = isinstance(model, PybulletModel) and model.defaults == "engine"
-    return PybulletDials(model, options) if as_it_comes else None
 
 
 def frictionless(model: Model) -> Model:
