@@ -15,13 +15,21 @@ import mujoco
 import numpy as np
 import pytest
 
-from statemachine import backends, calls, installed
+from statemachine import backends, installed
 from statemachine.backends.mujoco_backend import MujocoData
-from statemachine.calls import CLOSED, NEW, CallRecording, Statement, record, recorded_engines
-from statemachine.calls.recorder import CallRecorder
 from statemachine.cli import main
 from statemachine.errors import BadInputError, UnknownNameError
 from statemachine.page import Page, Table
+from statemachine.probes import calls
+from statemachine.probes.calls import (
+    CLOSED,
+    NEW,
+    CallRecorder,
+    CallRecording,
+    Statement,
+    record,
+    recorded_engines,
+)
 from statemachine.report import calls as words
 from statemachine.report import terminal
 from statemachine.report.as_json import dumps
@@ -154,7 +162,7 @@ def is_a_look(frame: Any) -> bool:
     """Whether code is the recorder's own, or that with which an engine's room looks."""
     file = Path(frame.f_code.co_filename)
     of_a_room = file.parts[-3::2] == ("engines", "calls.py")
-    return of_a_room or file.parent == Path(calls.__file__).parent
+    return of_a_room or file == Path(calls.__file__)
 
 
 @pytest.mark.slow
@@ -516,7 +524,7 @@ def test_what_cannot_be_recorded_is_refused() -> None:
     need_engine("pybullet")
     with pytest.raises(BadInputError, match="on pybullet"):
         record(SHORT.format(engine="pybullet", code=""), "mujoco")
-    nested = 'from statemachine.calls import record\nrecord("", "mujoco")'
+    nested = 'from statemachine.probes.calls import record\nrecord("", "mujoco")'
     assert "cannot record another" in str(record(nested, "mujoco").error)
 
 

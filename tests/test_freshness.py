@@ -24,12 +24,11 @@ from statemachine.errors import (
 from statemachine.interface import DERIVED, POSES, Data, Model
 from statemachine.measures import Gap
 from statemachine.measures.readings import readings
+from statemachine.probes import freshness
+from statemachine.probes.freshness import Scratch, back
+from statemachine.probes.stale_rows import gaps, table, told
 from statemachine.report.as_json import plain
 from statemachine.rotations import matrix_from_quat
-from statemachine.staleness import age
-from statemachine.staleness.age import Scratch, back
-from statemachine.staleness.gaps import gaps, told
-from statemachine.staleness.result import table
 
 from .conftest import ROOT, need_engine
 
@@ -333,7 +332,7 @@ def test_every_scratch_is_closed(backend: str, monkeypatch: pytest.MonkeyPatch) 
         made.append(sm.make_data(model))
         return made[-1]
 
-    monkeypatch.setattr(age, "make_data", make_data)
+    monkeypatch.setattr(freshness, "make_data", make_data)
     model = sm.load("so101", backend=backend)
     with sm.make_data(model) as data:
         sm.freshness(model, data)
@@ -791,7 +790,7 @@ def test_a_watched_run_is_the_run(box: Model) -> None:
 def test_the_module_is_not_loaded_unless_it_is_asked_for() -> None:
     code = (
         "import sys, statemachine as sm; m = sm.load('so101'); d = sm.make_data(m); "
-        "sm.step(m, d); sm.forward(m, d); print('statemachine.staleness' in sys.modules)"
+        "sm.step(m, d); sm.forward(m, d); print('statemachine.probes' in sys.modules)"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True
@@ -799,7 +798,7 @@ def test_the_module_is_not_loaded_unless_it_is_asked_for() -> None:
     assert done.stdout.strip() == "False"
 
 
-@pytest.mark.parametrize("first", ["import statemachine.staleness", "pass"])
+@pytest.mark.parametrize("first", ["import statemachine.probes.freshness", "pass"])
 def test_the_name_is_the_function(first: str) -> None:
     code = f"import statemachine as sm\n{first}\nprint(callable(sm.freshness))"
     done = subprocess.run(

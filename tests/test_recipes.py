@@ -23,7 +23,7 @@ PLACES = {
     "statemachine/measures/quantities.py, in _SUFFIXES": "_SUFFIXES = (",
     "statemachine/compare/series.py, in series": "            found += _joint(",
     "statemachine/compare/tolerances.py, in tolerance_for": "        return Tolerance(given[",
-    "statemachine/conventions/__init__.py, in QUESTIONS": '    "timestep",',
+    "statemachine/probes/conventions/__init__.py, in QUESTIONS": '    "timestep": ',
 }
 
 

@@ -138,9 +138,11 @@ class RawEngine:
         """What measures the answer to a question of `probes.conventions`; None if nothing does."""
         return None
 
-    def phrases(self) -> Phrases | None:
+    def phrases(self) -> Phrases:
         """Which of its calls does what, as lines to type."""
-        return None
+        from .measured import Phrases
+
+        return Phrases(("", ""), {})
 
     def driver(self, model: Model, seed: int) -> Driver | None:
         """What starts, steps, saves and restores by its own functions; `seed`: of what it draws."""

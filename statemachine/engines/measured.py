@@ -46,69 +46,16 @@ class Absent:
     figures: tuple[Measurement, ...] = ()
 
 
-@dataclass(frozen=True)
-class Past:
-    """The engine's Data holds no state: all that it computes is of what it is handed.
-
-    Attributes:
-        difference: By how much a used Data computes an acceleration otherwise than a new one
-            [rad/s²].
-    """
-
-    difference: float
-
-
-@dataclass(frozen=True)
-class OneStep:
-    """A body at 1 m/s, one step.
-
-    Attributes:
-        told: The engine's timestep, as it tells it [s].
-        moved: How far the body came [m].
-        clock: What the engine calls its time, if it has one.
-        ticked: By how much that went on [s].
-    """
-
-    told: float
-    moved: float
-    clock: str
-    ticked: float
-
-
-@dataclass(frozen=True)
-class LetGo:
-    """The pendulum of `samples`, let go straight out.
-
-    Attributes:
-        part: How it was loaded.
-        moved: Its angle at the end [rad], or its first acceleration [rad/s²].
-        seconds: Simulated time until then; None for the acceleration.
-        figures: What acts on it.
-    """
-
-    part: str
-    moved: float
-    seconds: float | None
-    figures: tuple[Measurement, ...] = ()
-
-
-@dataclass(frozen=True)
-class ReadTwice:
-    """Something that follows from the state [m], read, and read again once recomputed.
-
-    Attributes:
-        part: What it is.
-        read: A number, or a place (3,).
-        recomputed: The same after the engine was asked to compute it.
-        true: What it must be in the state that the engine is in.
-    """
-
-    part: str
-    read: float | Array
-    recomputed: float | Array
-    true: float | tuple[float, float, float]
-
-
+# A body at 1 m/s, one step: the engine's timestep, as it tells it [s]; how far the body came [m];
+# what the engine calls its time, if it has one; by how much that went on [s].
+OneStep = tuple[float, float, str, float]
+# The pendulum of `samples`, let go straight out: how it was loaded; its angle at the end [rad], or
+# its first acceleration [rad/s²]; simulated time until then [s], None for the acceleration; what
+# acts on it.
+LetGo = tuple[str, float, float | None, tuple[Measurement, ...]]
+# Something that follows from the state [m]: what it is; a number or a place (3,) as it is read; the
+# same after the engine was asked to compute it; what it must be in the engine's state.
+ReadTwice = tuple[str, float | Array, float | Array, float | tuple[float, float, float]]
 # Speed [m/s] of a block of one friction on a floor of another, with gravity leaning by a
 # tangent.
 Sliding = Callable[[float, float, float], float]

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import conventions
 from ..engines import room
 from ..interface import INPUTS, Array, Data, Model, forward, make_data, step
 from ..measures import largest
 from ..measures.text import count, millimetres, short_time
 from ..page import Block, Heading, Pipeline, Table, Text, Traces, Verdict
+from ..probes import conventions
 from ..runs.commands import hold_ctrl
 from ..runs.drive import Progress
 from ..runs.provenance import Provenance, provenance

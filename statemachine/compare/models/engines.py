@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ... import conventions
 from ...engines import room
+from ...probes import conventions
 
 # Of the conventions, those that stand between a description and what comes of it.
 _ASKED = ("actuation", "damping", "friction")

@@ -59,7 +59,7 @@ def timestep() -> OneStep:
     mj, model, data = _loaded(marked.MJCF)
     data.qvel[0] = 1
     mj.mj_step(model, data)
-    return OneStep(model.opt.timestep, float(data.qpos[0]), "data.time", float(data.time))
+    return (model.opt.timestep, float(data.qpos[0]), "data.time", float(data.time))
 
 
 def actuation(seconds: float) -> list[LetGo]:
@@ -72,7 +72,7 @@ def actuation(seconds: float) -> list[LetGo]:
         mj, model, data = _loaded(pendulum.MJCF % actuator)
         mj.mj_step(model, data, round(seconds / model.opt.timestep))
         torque = Measurement("it exerts", float(data.qfrc_actuator[0]), "N·m")
-        runs.append(LetGo(part, float(data.qpos[0]), data.time, (torque,) if actuator else ()))
+        runs.append((part, float(data.qpos[0]), data.time, (torque,) if actuator else ()))
     return runs
 
 
@@ -112,14 +112,14 @@ def write(angle: float, deep: float) -> list[ReadTwice]:
     data.qpos[0] = angle
     read = np.array(data.site("tip").xpos)
     mj.mj_forward(model, data)
-    tip = ReadTwice("the tip", read, np.array(data.site("tip").xpos), pendulum.tip_at(angle))
+    tip = ("the tip", read, np.array(data.site("tip").xpos), pendulum.tip_at(angle))
 
     mj, model, data = _loaded(floor.BALL)
     mj.mj_forward(model, data)
     data.qpos[2] = floor.RADIUS - deep
     depth = _depth(data)
     mj.mj_forward(model, data)
-    return [tip, ReadTwice("the contact", depth, _depth(data), deep)]
+    return [tip, ("the contact", depth, _depth(data), deep)]
 
 
 def step(speed: float, deep: float) -> list[ReadTwice]:
@@ -130,7 +130,7 @@ def step(speed: float, deep: float) -> list[ReadTwice]:
     read = np.array(data.site("tip").xpos)
     mj.mj_kinematics(model, data)
     true = pendulum.tip_at(data.qpos[0])
-    tip = ReadTwice("the tip", read, np.array(data.site("tip").xpos), true)
+    tip = ("the tip", read, np.array(data.site("tip").xpos), true)
 
     mj, model, data = _loaded(floor.BALL)
     data.qpos[2], data.qvel[2] = floor.RADIUS - deep, speed
@@ -138,7 +138,7 @@ def step(speed: float, deep: float) -> list[ReadTwice]:
     depth = _depth(data)
     mj.mj_forward(model, data)
     now = max(floor.RADIUS - float(data.qpos[2]), 0.0)
-    return [tip, ReadTwice("the contact", depth, _depth(data), now)]
+    return [tip, ("the contact", depth, _depth(data), now)]
 
 
 def joints() -> dict[str, list[str]]:

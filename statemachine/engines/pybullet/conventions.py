@@ -75,7 +75,7 @@ def timestep() -> OneStep:
         after = pb.getPhysicsEngineParameters(client)
         changed = {name: after[name] - told[name] for name in told if after[name] != told[name]}
         name, ticked = next(iter(changed.items()), ("", 0.0))
-        return OneStep(told["fixedTimeStep"], moved, name, ticked)
+        return (told["fixedTimeStep"], moved, name, ticked)
 
 
 def actuation(seconds: float) -> list[LetGo]:
@@ -96,7 +96,7 @@ def actuation(seconds: float) -> list[LetGo]:
                 Measurement("its motor exerts", torque, "N·m"),
                 Measurement("gravity", pendulum.TORQUE, "N·m"),
             )
-            runs.append(LetGo(part, angle, steps * step, forces))
+            runs.append((part, angle, steps * step, forces))
     return runs
 
 
@@ -161,7 +161,7 @@ def write(angle: float, deep: float) -> list[ReadTwice]:
         _tip(client, body, compute=True)
         pb.resetJointState(body, 0, angle, 0, client)
         read = _tip(client, body)
-        tip = ReadTwice("the tip", read, _tip(client, body, compute=True), pendulum.tip_at(angle))
+        tip = ("the tip", read, _tip(client, body, compute=True), pendulum.tip_at(angle))
     with fresh_world() as client:
         ball = _put_ball(client, 1)
         pb.performCollisionDetection(client)
@@ -169,7 +169,7 @@ def write(angle: float, deep: float) -> list[ReadTwice]:
         pb.resetBasePositionAndOrientation(ball, at, (0, 0, 0, 1), client)
         depth = _depth(client)
         pb.performCollisionDetection(client)
-        return [tip, ReadTwice("the contact", depth, _depth(client), deep)]
+        return [tip, ("the contact", depth, _depth(client), deep)]
 
 
 def step(speed: float, deep: float) -> list[ReadTwice]:
@@ -181,7 +181,7 @@ def step(speed: float, deep: float) -> list[ReadTwice]:
         pb.stepSimulation(client)
         read, again = _tip(client, body), _tip(client, body, compute=True)
         angle = pb.getJointState(body, 0, client)[0]
-        tip = ReadTwice("the tip", read, again, pendulum.tip_at(angle))
+        tip = ("the tip", read, again, pendulum.tip_at(angle))
     with fresh_world() as client:
         ball = _put_ball(client, floor.RADIUS - deep)
         pb.resetBaseVelocity(ball, (0, 0, speed), (0, 0, 0), client)
@@ -189,7 +189,7 @@ def step(speed: float, deep: float) -> list[ReadTwice]:
         depth = _depth(client)
         pb.performCollisionDetection(client)
         now = max(floor.RADIUS - pb.getBasePositionAndOrientation(ball, client)[0][2], 0.0)
-        return [tip, ReadTwice("the contact", depth, _depth(client), now)]
+        return [tip, ("the contact", depth, _depth(client), now)]
 
 
 def joints() -> dict[str, list[str]]:

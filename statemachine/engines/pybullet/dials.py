@@ -25,7 +25,7 @@ from ...backends._bullet_surfaces import Surfaces
 from ...backends._bullet_world import UNCLAMPED, World
 from ...backends.pybullet_backend import PybulletData, PybulletModel
 from ...errors import EngineError
-from ...interface import Model
+from ...interface import Array, Model
 from ..records import Setting
 
 # What a fresh body has: a single-precision literal in the engine.
@@ -145,7 +145,7 @@ class PybulletDials:
         return inertias
 
     @cached_property
-    def frictions(self) -> np.ndarray:
+    def frictions(self) -> Array:
         """(nsolid,) lateral friction that the engine tells of each link that touches."""
         with cast("PybulletData", self.model._make_data()) as data:
             world = data.raw

@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ..engines.auditing import STIR, SavePoint, within
-from ..errors import UnsupportedError
-from ..interface import Array, JointType, Keyframe, Model, make_data
+from ...engines.auditing import STIR, SavePoint, within
+from ...errors import UnsupportedError
+from ...interface import Array, JointType, Keyframe, Model, make_data
 
 _SETTLE, _FALL, _WAY = 1.0, 0.8, 0.1  # seconds before a run is saved
 _LONGEST = 400  # steps before it, at most

@@ -20,9 +20,8 @@ from ..interface import INPUTS, Array, Contacts, Data, Model, State, get_state
 from ..measures import Gap
 from ..measures.readings import Readings, readings
 from ..measures.text import few
-from .age import DEPEND, Age, Scratch, age_of, row, stale_row
-from .gaps import told
-from .result import Row, StaleRead, table
+from .freshness import DEPEND, Age, Scratch, age_of, row, stale_row
+from .stale_rows import Row, StaleRead, table, told
 
 _PACKAGE = str(Path(os.path.abspath(__file__)).parent.parent) + os.sep
 

@@ -1,24 +1,22 @@
-"""What each engine takes for granted: one question a file, each asked of the raw engines.
+"""What each engine takes for granted: questions, each asked of the raw engines.
 
-A question is a module with its words, `QUESTION`; what the engines are given for it, `GIVEN`;
-and `answer`, which lets the answer follow from what an engine did: one that behaved otherwise
-would get another answer. What the engine does is measured in its room, by the function with the
-question's name in the part "conventions" (see `engines.measured`). Nothing goes through the
-adapters that keep our contract. An engine whose room has no such function is not asked.
+A question is a `Convention`: its words, what the engines are given for it, and a function that
+lets the answer follow from what an engine did, so that one that behaved otherwise would get another
+answer. What the engine does is measured in its room (`RawEngine.measurement`). Nothing goes through
+the adapters that keep our contract. An engine whose room measures nothing is not asked.
 """
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from ..engines import room, room_names
-from ..engines.measured import Absent, Measurement
-from ..errors import unknown_name
-from ..installed import ENGINES, engine_version, require
-from .answers import NO_ANSWER, UNDECIDED, Answers, EngineAnswer, EngineQuestion
+from ...engines import room, room_names
+from ...engines.measured import Absent, Measurement
+from ...errors import unknown_name
+from ...installed import ENGINES, engine_version, require
+from . import frames, memory, motion
+from .answers import NO_ANSWER, UNDECIDED, Answers, Convention, EngineAnswer, EngineQuestion
 
 __all__ = [
     "NO_ANSWER",
@@ -36,23 +34,23 @@ __all__ = [
     "versions",
 ]
 
-# In the order in which a newcomer meets them; each is a module of this package.
-QUESTIONS = (
-    "quaternion",
-    "velocity",
-    "gravity",
-    "timestep",
-    "actuation",
-    "command",
-    "damping",
-    "write",
-    "step",
-    "joints",
-    "reset",
-    "friction",
-    "save",
-    "future",
-)
+# In the order in which a newcomer meets them.
+QUESTIONS: dict[str, Convention] = {
+    "quaternion": frames.quaternion,
+    "velocity": frames.velocity,
+    "gravity": motion.gravity,
+    "timestep": motion.timestep,
+    "actuation": motion.actuation,
+    "command": motion.command,
+    "damping": motion.damping,
+    "write": memory.write,
+    "step": memory.step,
+    "joints": frames.joints,
+    "reset": memory.reset,
+    "friction": motion.friction,
+    "save": memory.save,
+    "future": memory.future,
+}
 
 
 @dataclass(frozen=True)
@@ -88,8 +86,8 @@ def ask(question: str, engine: str) -> Answers | None:
     measure = room(engine).measurement(question)
     if measure is None:
         return None
-    asked = _module(question)
-    measured = measure(*asked.GIVEN)
+    asked = QUESTIONS[question]
+    measured = measure(*asked.given)
     return _absent(measured) if isinstance(measured, Absent) else asked.answer(measured)
 
 
@@ -101,7 +99,7 @@ def _absent(looked: Absent) -> Answers:
 
 def probe(
     engines: Sequence[str],
-    questions: Sequence[str] = QUESTIONS,
+    questions: Sequence[str] = tuple(QUESTIONS),
     progress: Callable[[float], None] = lambda _fraction: None,
 ) -> Conventions:
     """Ask each engine each question.
@@ -123,7 +121,7 @@ def probe(
         asked[name][engine] = ask(name, engine)
     return Conventions(
         versions(engines),
-        tuple(Answered(name, _module(name).QUESTION, found) for name, found in asked.items()),
+        tuple(Answered(name, QUESTIONS[name].question, found) for name, found in asked.items()),
     )
 
 
@@ -147,7 +145,3 @@ def check_engine(name: str) -> None:
 def versions(engines: Sequence[str]) -> dict[str, str]:
     """Version of each engine; "" of one of another package."""
     return {name: engine_version(name) if name in ENGINES else "" for name in engines}
-
-
-def _module(question: str) -> Any:
-    return importlib.import_module(f".{question}", __name__)

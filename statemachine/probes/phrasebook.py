@@ -17,7 +17,7 @@ from typing import Any
 from ..engines import room
 from ..engines.measured import Phrases
 from ..silence import silence
-from . import check_engine, versions
+from .conventions import check_engine, versions
 
 # In the order in which a program has them.
 CONCEPTS = (
@@ -75,9 +75,9 @@ def run(
     for done, engine in enumerate(engines):
         check_engine(engine)
         own = room(engine).phrases()
-        concepts = [concept for concept in CONCEPTS if own and concept in own.cells]
+        concepts = [concept for concept in CONCEPTS if concept in own.cells]
         said = []
-        for count in range(1, len(concepts) + 1) if own else ():
+        for count in range(1, len(concepts) + 1):
             said.append(_phrase(own, concepts[:count]))
             progress((done + count / len(concepts)) / len(engines))
         phrases[engine] = tuple(said)

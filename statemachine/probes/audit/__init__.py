@@ -3,7 +3,7 @@
 A run is saved at several moments, goes on, is set back and goes on again: the same bytes at
 every step? Each candidate for the state is tried on the engine itself, by its own functions,
 and beside it the promise of our interface. And what should change nothing (several steps in one
-call, forward, threads, another process) is tried in the same way. A file for each question.
+call, forward, threads, another process) is tried in the same way.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-from ..engines.auditing import Driver, Measured, ReferenceRun, SavePoint
-from ..errors import BadInputError, DivergedError
-from ..interface import Model
-from ..interface.checks import as_count
-from ..runs.drive import Progress, silent
-from ..runs.provenance import Provenance, provenance
-from . import apart, elsewhere, falls, look, repeat, restore
+from ...engines import room
+from ...engines.auditing import Driver, Measured, ReferenceRun, SavePoint
+from ...errors import BadInputError, DivergedError
+from ...interface import Model
+from ...interface.checks import as_count
+from ...runs.drive import Progress, silent
+from ...runs.provenance import Provenance, provenance
+from . import elsewhere, trials
 from .conclusions import Conclusion, conclude
-from .drivers import drivers_of
-from .findings import AuditFinding
 from .interface_driver import InterfaceDriver
 from .points import points
+from .trials import AuditFinding
 
 STEPS = 60  # of each future
 
@@ -105,12 +105,12 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
                 findings[driver] += question(driver, run)
         for done, driver in enumerate(drivers, start=len(work)):
             progress(done / (len(work) + len(drivers)))
-            findings[driver] += restore.smallest(driver, runs[driver], findings[driver])
-            findings[driver] += restore.forgets(driver, runs[driver])
-            findings[driver] += apart.threads(driver, runs[driver])
+            findings[driver] += trials.smallest(driver, runs[driver], findings[driver])
+            findings[driver] += trials.forgets(driver, runs[driver])
+            findings[driver] += trials.threads(driver, runs[driver])
             findings[driver] += elsewhere.findings(child.result(), driver, runs[driver])
             if driver.layer == "engine":
-                findings[driver] += falls.findings(driver)
+                findings[driver] += trials.falls(driver)
         findings[interface] += elsewhere.pickled(child.result(), interface, runs[interface], states)
     audited = []
     for driver in drivers:
@@ -125,15 +125,21 @@ def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = si
 
 # A question to a driver about one save point, given the run from there that nothing disturbed.
 _OF_A_RUN: tuple[Callable[[Driver, ReferenceRun], Iterator[AuditFinding]], ...] = (
-    repeat.again,
-    repeat.after_reset,
-    repeat.pieces,
-    look.ask,
-    apart.beside,
-    apart.pools,
-    restore.ask,
-    restore.contacts_off,
+    trials.again,
+    trials.after_reset,
+    trials.pieces,
+    trials.look,
+    trials.beside,
+    trials.pools,
+    trials.restored,
+    trials.contacts_off,
 )
+
+
+def drivers_of(model: Model, seed: int) -> tuple[Driver, ...]:
+    """The engine behind a Model, where its room has a driver, and the interface to it."""
+    engine = room(model.backend).driver(model, seed)
+    return (*((engine,) if engine else ()), InterfaceDriver(model, seed))
 
 
 def _runs(

@@ -5,10 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from ..engines.auditing import ONLY
-from ..engines.futures import FutureGap, worst
-from .findings import EACH_OTHER, AuditFinding
-from .restore import FORGETS, ITSELF, NO_CONTACTS, NOT_RESTORED, RESTORE, WITHOUT
+from ...engines.auditing import ONLY
+from ...engines.futures import FutureGap, worst
+from .trials import (
+    EACH_OTHER,
+    FORGETS,
+    ITSELF,
+    NO_CONTACTS,
+    NOT_RESTORED,
+    RESTORE,
+    WITHOUT,
+    AuditFinding,
+)
 
 _NEARLY = 1e-6  # of a difference: what is left of it is rounding
 

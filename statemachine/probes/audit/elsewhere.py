@@ -10,13 +10,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..engines.auditing import Driver, ReferenceRun
-from ..engines.futures import gap
-from ..errors import EngineError
-from ..interface import Array, Model, State
-from ..processes import fresh_python
-from .findings import AuditFinding, finding_of
+from ...engines.auditing import Driver, ReferenceRun
+from ...engines.futures import gap
+from ...errors import EngineError
+from ...interface import Array, Model, State
+from ...processes import fresh_python
 from .interface_driver import InterfaceDriver
+from .trials import AuditFinding, finding_of
 
 PROCESS, PICKLED = "process", "pickled State"
 _PATIENCE = 300.0  # seconds

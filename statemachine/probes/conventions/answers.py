@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
-from ..engines.measured import Measurement
+from ...engines.measured import Measurement
 
 NO_ANSWER = "–"  # the question does not arise on this engine
 UNDECIDED = "undecided"  # no hypothesis explains what was measured
@@ -40,6 +41,26 @@ class EngineAnswer:
 
 
 Answers = tuple[EngineAnswer, ...]
+
+
+@dataclass(frozen=True)
+class Convention:
+    """A question, what the engines are given for it, and how an answer follows.
+
+    Attributes:
+        question: Its words.
+        given: The arguments of an engine's measurement.
+        answer: From what was measured to the answer; called, it is that.
+    """
+
+    question: EngineQuestion
+    given: tuple[Any, ...]
+    answer: Callable[[Any], Answers]
+
+
+def question(title: str, why: str, *given: Any) -> Callable[[Callable[[Any], Answers]], Convention]:
+    """The Convention of a function that lets the answer follow from a measurement."""
+    return lambda answer: Convention(EngineQuestion(title, why), given, answer)
 
 
 def closest(distances: Mapping[str, float], part: float = 0.25) -> tuple[str, float, float]:

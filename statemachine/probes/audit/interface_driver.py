@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ..engines.auditing import Disturbance, Driver, Measured, Restore, SaveMethod, SavePoint
-from ..engines.futures import Coordinates, coordinates_of
-from ..errors import UnsupportedError
-from ..interface import (
+from ...engines.auditing import Disturbance, Driver, Measured, Restore, SaveMethod, SavePoint
+from ...engines.futures import Coordinates, coordinates_of
+from ...errors import UnsupportedError
+from ...interface import (
     DERIVED,
     INPUTS,
     Array,
