@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator, Mapping
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -144,7 +144,7 @@ class PybulletDials:
                 inertias[b] = pb.getDynamicsInfo(body, link, world.client)[2]
         return inertias
 
-    @cached_property
+    @property
     def frictions(self) -> Array:
         """(nsolid,) lateral friction that the engine tells of each link that touches."""
         with cast("PybulletData", self.model._make_data()) as data:
