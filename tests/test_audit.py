@@ -407,7 +407,7 @@ def noise(monkeypatch: pytest.MonkeyPatch) -> None:
     right = MujocoDriver.advance
 
     def faulty(self: MujocoDriver, machine: Any, nstep: int = 1) -> None:
-        machine.data.qvel[0] += 1e-12 * hidden.random()
+        machine.qvel[0] += 1e-12 * hidden.random()
         right(self, machine, nstep)
 
     monkeypatch.setattr(MujocoDriver, "advance", faulty)
@@ -544,7 +544,7 @@ def test_a_thread_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch) -> No
 
     def faulty(self: MujocoDriver, machine: Any, nstep: int = 1) -> None:
         if threading.current_thread() is not threading.main_thread():
-            nudge(machine.data)
+            nudge(machine)
         right(self, machine, nstep)
 
     def found() -> list[AuditFinding]:
@@ -587,7 +587,7 @@ def test_another_process_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch
 
     def faulty(self: MujocoDriver, machine: Any, point: Any) -> None:
         right(self, machine, point)
-        machine.data.qfrc_applied[1] = 1e-9
+        machine.qfrc_applied[1] = 1e-9
 
     monkeypatch.setattr(MujocoDriver, "start", faulty)
     result = audit.run(sm.load(SCENE), steps=10)

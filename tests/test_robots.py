@@ -229,9 +229,10 @@ def test_an_error_in_one_part_costs_that_part(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from statemachine.engines import room
+    from statemachine.probes.audit import interface_driver
     from statemachine.robots import examine, gaps
 
-    monkeypatch.setattr(examine, "get_state", lambda *_: 1 / 0)
+    monkeypatch.setattr(interface_driver, "get_state", lambda *_: 1 / 0)
     told: list[str] = []
     row = examine.examine(
         folder / "good.xml", ExaminedModel("good.xml", "", ""), True, 0, lambda _, s: told.append(s)

@@ -191,7 +191,7 @@ def check_divergence_is_caught_every_time(lab: Lab) -> None:
 def check_zero_quaternion_is_refused(lab: Lab) -> None:
     """A quaternion of zeros names no rotation: step and forward refuse, unchanged."""
     model, data = lab.box, lab.data(lab.box)
-    start = int(model.jnt_qposadr[model.joint_id("box")]) + 3
+    start = lab.box_at[0] + 3
     data.qpos[start : start + 4] = 0.0
     before = data.qpos.copy()
     for verb in (step, forward):

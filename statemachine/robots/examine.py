@@ -28,8 +28,10 @@ from ..errors import (
     UnsupportedError,
 )
 from ..installed import DEFAULT, WITNESS, require
-from ..interface import Model, get_state, make_data, reset, set_state, step
+from ..interface import Model, make_data, reset, step
 from ..lessons.in_turns import Ratio, in_turns
+from ..probes.audit import trials
+from ..probes.audit.interface_driver import InterfaceDriver
 from ..runs import record_scenario
 from ..runs.scenarios import scenario
 from . import gaps
@@ -175,24 +177,18 @@ class _Examination:
 
     def _restores(self, model: Model) -> bool | None:
         """Whether two futures of a State are one, and that of the run itself if promised."""
-        orders = gaps.commands(model, 2 * _FUTURE, self.seed)
-        ends = []
+        driver = InterfaceDriver(model, self.seed)
+        point = self._start(model, _FUTURE)
+        way = replace(driver.save_methods(point)[-1], travels=False)
+        found = trials.tried(driver, driver.run(point, _FUTURE), way)
+        return all(finding.holds for finding in found)
+
+    def _start(self, model: Model, run_in: int) -> SavePoint:
+        """The start of a run, under the first command."""
+        ctrl = gaps.commands(model, 1, self.seed)[0]
         with make_data(model) as data:
             reset(model, data, gaps.keyframe_of(model))
-            for ctrl in orders[:_FUTURE]:
-                data.ctrl[:] = ctrl
-                step(model, data)
-            state = get_state(model, data)
-            for again in range(3):
-                if again:
-                    set_state(model, data, state)
-                for ctrl in orders[_FUTURE:]:
-                    data.ctrl[:] = ctrl
-                    step(model, data)
-                ends.append(get_state(model, data))
-        if model.capabilities.exact_restore and ends[0] != ends[1]:
-            return False
-        return ends[1] == ends[2]
+            return SavePoint("start", "", model, data.qpos.copy(), data.qvel.copy(), ctrl, run_in)
 
     def _gaps(self) -> None:
         """Each other backend against the default one."""
@@ -219,24 +215,20 @@ class _Examination:
         engine = room(model.backend).driver(model, self.seed) if model.nv else None
         if engine is None:
             return None
-        ctrl = gaps.commands(model, 1, self.seed)[0]
-        with make_data(model) as data:
-            reset(model, data, gaps.keyframe_of(model))
-            point = SavePoint("start", "", model, data.qpos.copy(), data.qvel.copy(), ctrl, 0)
-            data.ctrl[:] = ctrl
-            with engine.at(point) as machine:
+        point = self._start(model, 0)
+        with InterfaceDriver(model, self.seed).at(point) as data, engine.at(point) as machine:
 
-                def ours(steps: int) -> None:
-                    for _ in range(steps):
-                        step(model, data)
+            def ours(steps: int) -> None:
+                for _ in range(steps):
+                    step(model, data)
 
-                first = in_turns({"": lambda: ours(3)}, 2)[""][-1] / 3
-                steps = max(1, min(500, round(_TURN / max(first, 1e-7))))
-                ways = {
-                    "ours": lambda: ours(steps),
-                    "alone": lambda: engine.advance(machine, steps),
-                }
-                times = in_turns(ways, _ROUNDS, seed=self.seed)
+            first = in_turns({"": lambda: ours(3)}, 2)[""][-1] / 3
+            steps = max(1, min(500, round(_TURN / max(first, 1e-7))))
+            ways = {
+                "ours": lambda: ours(steps),
+                "alone": lambda: engine.advance(machine, steps),
+            }
+            times = in_turns(ways, _ROUNDS, seed=self.seed)
         return round(Ratio.of("", times["ours"], times["alone"]).median, 3)
 
 

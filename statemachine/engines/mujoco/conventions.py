@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -10,9 +10,9 @@ import numpy as np
 
 from ...installed import require
 from ...interface import Array
-from ..measured import Futures, LetGo, Measurement, OneStep, ReadTwice, Sliding
+from ..measured import LetGo, Measurement, OneStep, ReadTwice, Sliding
 from ..samples import floor, joint_tree, marked, pendulum
-from . import pile
+from .pile import MujocoPile
 
 
 def _loaded(text: str) -> tuple[Any, Any, Any]:
@@ -151,17 +151,6 @@ def joints() -> dict[str, list[str]]:
     return names
 
 
-def reset() -> dict[str, dict[str, bool]]:
-    """Every quantity changed, then mj_resetData."""
-    mj, model, data = pile.build()
-    bodies = model.nbody
-    mj.mj_step(model, data, 300)
-    written = pile.write(model, data, 0.125)
-    mj.mj_resetData(model, data)
-    same = pile.same(written, pile.read(model, data))
-    return {"mj_resetData": {**same, "bodies": model.nbody == bodies}}
-
-
 def friction() -> dict[str, Sliding]:
     """A block on a floor, with elliptic cones: the same friction in every direction."""
 
@@ -181,38 +170,4 @@ def friction() -> dict[str, Sliding]:
     return {"equal priority": speed, "the block has priority": partial(speed, priority=1)}
 
 
-def save() -> dict[str, dict[str, bool]]:
-    """Every quantity changed, saved, changed again, restored."""
-    mj, model, data = pile.build()
-    mj.mj_step(model, data, 100)
-    back = {}
-    for name, way in pile.ways_to_save(mj, model, data).items():
-        before = pile.write(model, data, 0.125)
-        restore = way()
-        pile.write(model, data, 0.125)
-        restore()
-        back[name] = pile.same(before, pile.read(model, data))
-    return back
-
-
-def future(moments: Sequence[float], steps: int) -> Mapping[str, Sequence[Futures]]:
-    """Boxes that fall, set back to the start or to moments in the middle."""
-    mj, model, data = pile.build()
-
-    def run(count: int = steps) -> Array:
-        return pile.run(mj, model, data, count)
-
-    def middle(save: Callable[[], Callable[[], None]], moment: float) -> Futures:
-        mj.mj_resetData(model, data)
-        run(round(moment / model.opt.timestep))
-        restore = save()
-        first = run()
-        restore()
-        return first, run()
-
-    first = run()
-    mj.mj_resetData(model, data)
-    trials = {"mj_resetData": [(first, run())]}
-    for name, save in pile.ways_to_save(mj, model, data).items():
-        trials[name] = [middle(save, moment) for moment in moments]
-    return trials
+reset, save, future = MujocoPile.reset, MujocoPile.save, MujocoPile.future

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from ...backends._bullet_client import pb
 from ...interface import Array
-from ..measured import Futures, LetGo, Measurement, OneStep, ReadTwice, Sliding
+from ..measured import LetGo, Measurement, OneStep, ReadTwice, Sliding
 from ..samples import floor, joint_tree, marked, pendulum
-from . import pile
+from .pile import BulletPile
 from .world import fresh_world, gravity_of, limp, load, put_floor
 from .world import timestep as step_of
 
@@ -200,21 +200,6 @@ def joints() -> dict[str, list[str]]:
         return {"URDF": [pb.getJointInfo(body, k, client)[1].decode() for k in range(count)]}
 
 
-def reset() -> dict[str, dict[str, bool]]:
-    """Every quantity changed, then resetSimulation, or everything put where it began."""
-    return {name: _kept_after(way) for name, way in pile.RESETS.items()}
-
-
-def _kept_after(way: pile.Restart) -> dict[str, bool]:
-    # Half of anything is not what it has at the start.
-    kept = {quantity: pile.survives(quantity, 0.5, way) for quantity in pile.QUANTITIES}
-    with fresh_world() as client:
-        scene = pile.build(client)
-        bodies = pb.getNumBodies(client)
-        way.call(scene)
-        return {**kept, "bodies": pb.getNumBodies(client) == bodies}
-
-
 def friction() -> dict[str, Sliding]:
     """A block on a floor."""
 
@@ -238,48 +223,4 @@ def friction() -> dict[str, Sliding]:
     return {"": speed}
 
 
-def save() -> dict[str, dict[str, bool]]:
-    """Each quantity changed, saved, changed again, restored, in a world of its own."""
-
-    def comes_back(quantity: str, saved: pile.Saved) -> bool:
-        def there_and_back(scene: pile.Pile) -> pile.Pile:
-            with saved(scene) as restore:
-                if quantity == "applied force":  # there is one until the next step
-                    pb.stepSimulation(scene.client)
-                else:
-                    pile.QUANTITIES[quantity].write(scene, -0.25)
-                restore()
-            return scene
-
-        return pile.survives(quantity, 0.5, there_and_back)
-
-    return {
-        name: {quantity: comes_back(quantity, saved) for quantity in pile.QUANTITIES}
-        for name, saved in pile.WAYS_TO_SAVE.items()
-    }
-
-
-def future(moments: Sequence[float], steps: int) -> Mapping[str, Sequence[Futures]]:
-    """Boxes that fall, set back to the start or to the middle; each trial in its own world."""
-
-    def middle(saved: pile.Saved, moment: float) -> Futures:
-        with fresh_world() as client:
-            scene = pile.build(client)
-            pile.run(scene, round(moment / step_of(client)))
-            with saved(scene) as restore:
-                first = pile.run(scene, steps)
-                restore()
-                return first, pile.run(scene, steps)
-
-    def start(way: pile.Restart) -> Futures:
-        with fresh_world() as client:
-            scene = pile.build(client)
-            return pile.run(scene, steps), pile.run(way(scene), steps)
-
-    return {
-        **{name: [start(way)] for name, way in pile.RESETS.items()},
-        **{
-            name: [middle(saved, moment) for moment in moments]
-            for name, saved in pile.WAYS_TO_SAVE.items()
-        },
-    }
+reset, save, future = BulletPile.reset, BulletPile.save, BulletPile.future

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from ...engines.auditing import ONLY
+from ...engines.auditing import ITSELF, ONLY
 from ...engines.futures import FutureGap, worst
 from .trials import (
     EACH_OTHER,
     FORGETS,
-    ITSELF,
     NO_CONTACTS,
     NOT_RESTORED,
     RESTORE,

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from functools import cached_property
 
 import numpy as np
 
 from ...engines.auditing import Disturbance, Driver, Measured, Restore, SaveMethod, SavePoint
-from ...engines.futures import Coordinates, coordinates_of
 from ...errors import UnsupportedError
 from ...interface import (
     DERIVED,
@@ -40,33 +38,14 @@ class InterfaceDriver(Driver):
         super().__init__(model, seed)
         self.name = f"this interface on {model.backend}"
 
-    @cached_property
-    def coordinates(self) -> Coordinates:
-        return coordinates_of(self.model)
-
     def fresh(self, point: SavePoint) -> Data:
         return make_data(point.model)
-
-    def close(self, machine: Data) -> None:
-        machine.close()
 
     def reset(self, machine: Data) -> None:
         reset(machine.model, machine)
 
-    def start(self, machine: Data, point: SavePoint) -> None:
-        machine.qpos, machine.qvel, machine.ctrl = point.qpos, point.qvel, point.ctrl
-
-    def command(self, machine: Data, ctrl: Array) -> None:
-        machine.ctrl[:] = ctrl
-
     def advance(self, machine: Data, nstep: int = 1) -> None:
         step(machine.model, machine, nstep)
-
-    def read(self, machine: Data) -> Array:
-        return np.concatenate((machine.qpos, machine.qvel))
-
-    def time(self, machine: Data) -> float:
-        return machine.time
 
     def _measure(self, point: SavePoint) -> Measured:
         with self.at(point) as machine:

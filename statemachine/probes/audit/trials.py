@@ -17,6 +17,7 @@ import numpy as np
 
 from ...backends import load
 from ...engines.auditing import (
+    FRESH,
     Driver,
     Layer,
     Machine,
@@ -32,10 +33,7 @@ from ...interface import Array, Model
 AGAIN, RESET, PIECES, LOOK = "again", "reset", "step(n)", "look"
 BESIDE, THREADS, POOLS = "two at once", "threads", "pools"
 RESTORE, WITHOUT, FORGETS, NO_CONTACTS = "restore", "leave one out", "forgets", "contacts off"
-# What is restored.
-ITSELF, FRESH, USED = "the run itself", "a fresh one", "a used one"
 NOT_RESTORED = "not restored"
-ITSELF_AGAIN = "the run itself, again"  # where nothing else can be
 EACH_OTHER = "each other"  # the futures of several restores, instead of one and the reference
 _PIECES = (7, 1, 22)  # steps a call, over and over
 _THREADS = 4
@@ -178,7 +176,7 @@ def pools(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
 def restored(driver: Driver, run: ReferenceRun) -> Iterator[AuditFinding]:
     """Each way to save, restored into the run itself, a fresh machine and a used one."""
     for way in driver.save_methods(run.point):
-        yield from _tried(driver, run, way)
+        yield from tried(driver, run, way)
 
 
 def smallest(
@@ -193,33 +191,18 @@ def smallest(
     way = driver.only(tuple(dict.fromkeys(broke)))
     if way is not None:
         for run in runs:
-            yield from _tried(driver, run, way)
+            yield from tried(driver, run, way)
 
 
-def _tried(driver: Driver, run: ReferenceRun, way: SaveMethod) -> Iterator[AuditFinding]:
+def tried(driver: Driver, run: ReferenceRun, way: SaveMethod) -> Iterator[AuditFinding]:
     """One way to save, against the future of the run that was saved, and against itself."""
     experiment, case = (WITHOUT, way.left_out) if way.left_out else (RESTORE, way.name)
-    futures = _futures(driver, run, way)
+    futures = driver.futures(run.point, run.steps, way)
     for into, future in futures.items():
         off = driver.gap(run, future)
         yield finding_of(driver, experiment, run, case, into, off, way.promised)
     among = worst([gap(*pair, driver.coordinates) for pair in combinations(futures.values(), 2)])
     yield finding_of(driver, experiment, run, case, EACH_OTHER, among, way.agree)
-
-
-def _futures(driver: Driver, run: ReferenceRun, way: SaveMethod) -> dict[str, Array]:
-    """What follows from a restore, by what was restored."""
-    point, futures = run.point, {}
-    with driver.at(point) as machine, way.save(machine) as restore:
-        driver.drive(machine, point, run.steps)
-        for into in (ITSELF,) if way.travels else (ITSELF, ITSELF_AGAIN):
-            restore(machine)
-            futures[into] = driver.drive(machine, point, run.steps)
-        for into, other in ((FRESH, driver.new), (USED, driver.used)) if way.travels else ():
-            with other(point) as target:
-                restore(target)
-                futures[into] = driver.drive(target, point, run.steps)
-    return futures
 
 
 def forgets(driver: Driver, runs: Sequence[ReferenceRun]) -> Iterator[AuditFinding]:
