@@ -220,27 +220,13 @@ _SLOTS: Mapping[str, Any] = {name: vars(Data)[name] for name in INPUTS}
 def _guarded(kind: type[Data], watch: Watch) -> type[Data]:
     """A subclass whose instances tell a Watch what is done with them."""
 
-    def derive(self: Any, name: str) -> Array:
-        value = kind._derive(self, name)
-        watch.check(name, value)
-        return value
+    def after(name: str, tell: Callable[..., None]) -> Callable[..., Any]:
+        def hook(self: Any, *arguments: Any) -> Any:
+            value = getattr(kind, name)(self, *arguments)
+            tell(value, *arguments)
+            return value
 
-    def find_contacts(self: Any) -> Contacts:
-        value = kind._find_contacts(self)
-        watch.check("contacts", value)
-        return value
-
-    def recompute(self: Any) -> None:
-        kind._recompute(self)
-        watch.computed()
-
-    def reset(self: Any, key: int | None) -> None:
-        kind._reset(self, key)
-        watch.forgotten()
-
-    def set_state(self: Any, state: State) -> None:
-        kind._set_state(self, state)
-        watch.forgotten()
+        return hook
 
     def seen(slot: Any) -> property:
         def get(self: Any) -> Array:
@@ -249,13 +235,14 @@ def _guarded(kind: type[Data], watch: Watch) -> type[Data]:
 
         return property(get, slot.__set__)
 
-    hooks = {
-        "_derive": derive,
-        "_find_contacts": find_contacts,
-        "_recompute": recompute,
-        "_reset": reset,
-        "_set_state": set_state,
+    tells: dict[str, Callable[..., None]] = {
+        "_derive": lambda value, name: watch.check(name, value),
+        "_find_contacts": lambda value: watch.check("contacts", value),
+        "_recompute": lambda _: watch.computed(),
+        "_reset": lambda *_: watch.forgotten(),
+        "_set_state": lambda *_: watch.forgotten(),
     }
+    hooks = {name: after(name, tell) for name, tell in tells.items()}
     inputs = {name: seen(slot) for name, slot in _SLOTS.items()}
     # Without slots of its own it has the layout that a change of class needs.
     members = {"__slots__": (), "_watch": watch, **hooks, **inputs}
