@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import functools
 import io
 import sys
 from collections import Counter
@@ -165,40 +166,33 @@ def is_a_look(frame: Any) -> bool:
     return of_a_room or file == Path(calls.__file__)
 
 
-@pytest.mark.slow
-def test_no_call_goes_round_the_recorder(engine: str) -> None:
-    """What holds on to an engine's function from before would not be heard."""
-    around: set[str] = set()
+def around(engine: str, run: Callable[[], object]) -> set[str]:
+    """The engine's functions that are called while a run is recorded, past the recorder."""
+    names: set[str] = set()
 
     def heard(frame: Any, name: str) -> None:
         if CallRecorder._active and not is_a_look(frame):  # at its end, Data are collected
-            around.add(name)
+            names.add(name)
 
     with profiled(engine, heard):
-        record(WHOLE.format(engine=engine), engine)
-    assert not around
+        run()
+    return names
+
+
+@pytest.mark.slow
+def test_no_call_goes_round_the_recorder(engine: str) -> None:
+    """What holds on to an engine's function from before would not be heard."""
+    assert not around(engine, lambda: record(WHOLE.format(engine=engine), engine))
 
 
 def test_early_hold_of_a_function_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """That the test above can fail."""
-    early = mujoco.mj_forward
+    early, lines = mujoco.mj_forward, list[Statement]()
     monkeypatch.setattr(MujocoData, "_recompute", lambda self: early(self._home.raw, self.raw))
-    around: set[str] = set()
-
-    def heard(frame: Any, name: str) -> None:
-        if CallRecorder._active and not is_a_look(frame):  # at its end, Data are collected
-            around.add(name)
-
-    with profiled("mujoco", heard):
-        (forward,) = short("mujoco", "sm.forward(model, data)")
-    assert around == {"mj_forward"}
-    assert forward.calls == ()
-    assert "data.xpos" in forward.changed
-
-
-def test_a_recorded_run_ends_at_the_same_bits(engine: str) -> None:
-    code = WHOLE.format(engine=engine)
-    assert record(code, engine).printed == run_plainly(code)
+    run = functools.partial(short, "mujoco", "sm.forward(model, data)")
+    assert around("mujoco", lambda: lines.extend(run())) == {"mj_forward"}
+    assert lines[0].calls == ()
+    assert "data.xpos" in lines[0].changed
 
 
 def test_looks_disturb_nothing_for_long(engine: str) -> None:

@@ -27,7 +27,6 @@ from statemachine.errors import (
     DivergedError,
     EngineError,
     EngineWarning,
-    ReadOnlyError,
     UnsupportedError,
 )
 from statemachine.interface import DERIVED
@@ -1144,20 +1143,6 @@ def _interrupted_at(at: int, call: Callable[[], Any]) -> str:
     finally:
         sys.settrace(None)
     return place
-
-
-@pytest.mark.parametrize("name", ["qpos", "qvel"])
-def test_an_input_that_is_read_only_is_found_before_the_world_moves(name: str) -> None:
-    model = load("so101/scene_box")
-    with started(model) as data, started(model) as other:
-        getattr(data, name).setflags(write=False)
-        for verb in (sm.step, sm.reset):
-            with pytest.raises(ReadOnlyError, match=f"{name} was made read-only"):
-                verb(model, data)
-        getattr(data, name).setflags(write=True)
-        for each in (data, other):
-            sm.step(model, each, 30)
-        assert sm.get_state(model, data) == sm.get_state(model, other)
 
 
 def test_an_interrupted_reset_of_the_engines_own_can_be_repeated(
