@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from .interface import set_state as set_state
     from .interface import step as step
     from .kinematics import Kinematics as Kinematics
-    from .staleness import freshness as freshness
-    from .staleness import watch_freshness as watch_freshness
+    from .probes.freshness import freshness as freshness
+    from .probes.watch import watch_freshness as watch_freshness
 
 _HOMES = {
     "load": "backends",
@@ -54,8 +54,8 @@ _HOMES = {
     "Data": "interface",
     "State": "interface",
     "Kinematics": "kinematics",
-    "freshness": "staleness",
-    "watch_freshness": "staleness",
+    "freshness": "probes.freshness",
+    "watch_freshness": "probes.watch",
 }
 _MODULES = (
     "backends", "compare", "conformance", "errors", "kinematics", "models",

@@ -18,7 +18,7 @@ from statemachine.backends import backend_engine, backend_names
 from statemachine.cli import main
 from statemachine.errors import MissingEngineError
 from statemachine.installed import ENGINES, require
-from statemachine.interface import Model
+from statemachine.interface import Data, Model, make_data, reset
 from statemachine.lessons import LESSONS
 from statemachine.lessons.session import take
 
@@ -47,6 +47,14 @@ def need_engine(name: str) -> None:
         if name in REQUIRED:
             pytest.fail(f"STATEMACHINE_REQUIRE names {name}: {error}")
         pytest.skip(str(error))
+
+
+@contextmanager
+def started(model: Model) -> Iterator[Data]:
+    """A Data in keyframe 0."""
+    with make_data(model) as data:
+        reset(model, data, keyframe=0)
+        yield data
 
 
 def lesson_result(name: str, model: Model, **options: Any) -> Any:

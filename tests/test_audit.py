@@ -20,12 +20,6 @@ import pytest
 from rich.cells import cell_len
 
 import statemachine as sm
-from statemachine import audit
-from statemachine.audit import apart, elsewhere, falls, look, repeat, restore
-from statemachine.audit.conclusions import conclude
-from statemachine.audit.drivers import drivers_of
-from statemachine.audit.findings import AuditFinding
-from statemachine.audit.points import points
 from statemachine.backends import mujoco_backend
 from statemachine.backends.mujoco_backend import MujocoData
 from statemachine.cli import main
@@ -34,6 +28,11 @@ from statemachine.engines.futures import Coordinates, FutureGap, gap
 from statemachine.engines.mujoco.audit import MujocoDriver
 from statemachine.errors import BadInputError, EngineWarning
 from statemachine.installed import require
+from statemachine.probes import audit
+from statemachine.probes.audit import drivers_of, elsewhere, trials
+from statemachine.probes.audit.conclusions import conclude
+from statemachine.probes.audit.points import points
+from statemachine.probes.audit.trials import AuditFinding
 from statemachine.report import audit as report
 
 from .conftest import Cli, need_engine, registered
@@ -156,7 +155,7 @@ def test_pybullet_forgets_its_contacts(of_pybullet: audit.Audit) -> None:
     exact = {
         each.point
         for each in engine.findings
-        if each.experiment == restore.RESTORE
+        if each.experiment == trials.RESTORE
         and each.case == "saveState + targets"
         and each.gap.exact
     }
@@ -175,16 +174,16 @@ def test_a_call_that_is_harmless_here_moves_falling_boxes(of_pybullet: audit.Aud
     """By 0.6 mm to 13 cm, as was measured on the raw engine, where contacts come and go."""
     call, engine = "performCollisionDetection", of_pybullet.audited[0]
     found = [each for each in engine.findings if each.case == call]
-    drops = [each for each in found if each.point.startswith(falls.FALL)]
-    assert len(drops) == falls.DROPS < len(found)
+    drops = [each for each in found if each.point.startswith(trials.FALL)]
+    assert len(drops) == trials.DROPS < len(found)
     assert all(each.gap.exact for each in found if each not in drops)
     assert {each.promised for each in found} == {False}
-    assert all(each.gap.steps == falls.STEPS for each in drops)
+    assert all(each.gap.steps == trials.STEPS for each in drops)
     assert 1e-3 < max(each.gap.length for each in drops) < 0.3
     # What only reads is asked in the same falls, and leaves no trace there either.
     for case in ("getContactPoints", "saveState"):
-        asked = [e for e in engine.findings if e.case == case and e.point.startswith(falls.FALL)]
-        assert len(asked) == falls.DROPS
+        asked = [e for e in engine.findings if e.case == case and e.point.startswith(trials.FALL)]
+        assert len(asked) == trials.DROPS
         assert all(each.gap.exact for each in asked)
     text = _text(of_pybullet)
     off = max(each.gap.length for each in drops)
@@ -195,10 +194,10 @@ def test_a_call_that_is_harmless_here_moves_falling_boxes(of_pybullet: audit.Aud
 
 def test_no_call_of_mujoco_moves_falling_boxes(of_mujoco: audit.Audit) -> None:
     engine, interface = of_mujoco.audited
-    drops = [each for each in engine.findings if each.point.startswith(falls.FALL)]
+    drops = [each for each in engine.findings if each.point.startswith(trials.FALL)]
     assert {each.case for each in drops} >= {"mj_forward", "mj_inverse"}
     assert all(each.gap.exact for each in drops)
-    assert not any(each.point.startswith(falls.FALL) for each in interface.findings)
+    assert not any(each.point.startswith(trials.FALL) for each in interface.findings)
 
 
 def _experiments(one: audit.Audited) -> set[str]:
@@ -300,12 +299,12 @@ def test_a_backend_without_a_driver_is_audited_through_the_interface() -> None:
 # Faults. Each is put into an engine or a backend, and one question must notice it.
 
 QUESTIONS = {
-    "again": repeat.again,
-    "reset": repeat.after_reset,
-    "step(n)": repeat.pieces,
-    "look": look.ask,
-    "two at once": apart.beside,
-    "restore": restore.ask,
+    "again": trials.again,
+    "reset": trials.after_reset,
+    "step(n)": trials.pieces,
+    "look": trials.look,
+    "two at once": trials.beside,
+    "restore": trials.restored,
 }
 
 
@@ -408,7 +407,7 @@ def noise(monkeypatch: pytest.MonkeyPatch) -> None:
     right = MujocoDriver.advance
 
     def faulty(self: MujocoDriver, machine: Any, nstep: int = 1) -> None:
-        machine.data.qvel[0] += 1e-12 * hidden.random()
+        machine.qvel[0] += 1e-12 * hidden.random()
         right(self, machine, nstep)
 
     monkeypatch.setattr(MujocoDriver, "advance", faulty)
@@ -545,12 +544,12 @@ def test_a_thread_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch) -> No
 
     def faulty(self: MujocoDriver, machine: Any, nstep: int = 1) -> None:
         if threading.current_thread() is not threading.main_thread():
-            nudge(machine.data)
+            nudge(machine)
         right(self, machine, nstep)
 
     def found() -> list[AuditFinding]:
         driver, runs = _engine()
-        return list(apart.threads(driver, runs))
+        return list(trials.threads(driver, runs))
 
     assert broken(found()) == set()
     monkeypatch.setattr(MujocoDriver, "advance", faulty)
@@ -567,7 +566,7 @@ def _engine() -> tuple[Driver, tuple[ReferenceRun, ...]]:
 
 def test_a_pool_of_the_engine_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
     driver, runs = _engine()
-    assert broken(apart.pools(driver, runs[0])) == set()
+    assert broken(trials.pools(driver, runs[0])) == set()
     right = driver.pools
 
     def faulty() -> dict[str, Any]:
@@ -577,7 +576,7 @@ def test_a_pool_of_the_engine_that_computes_otherwise(monkeypatch: pytest.Monkey
         return {"cold": cold}
 
     monkeypatch.setattr(driver, "pools", faulty)
-    assert broken(apart.pools(driver, runs[0])) == {("engine", "cold")}
+    assert broken(trials.pools(driver, runs[0])) == {("engine", "cold")}
 
 
 @pytest.mark.slow
@@ -588,7 +587,7 @@ def test_another_process_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch
 
     def faulty(self: MujocoDriver, machine: Any, point: Any) -> None:
         right(self, machine, point)
-        machine.data.qfrc_applied[1] = 1e-9
+        machine.qfrc_applied[1] = 1e-9
 
     monkeypatch.setattr(MujocoDriver, "start", faulty)
     result = audit.run(sm.load(SCENE), steps=10)

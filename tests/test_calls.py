@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import functools
 import io
 import sys
 from collections import Counter
@@ -15,13 +16,21 @@ import mujoco
 import numpy as np
 import pytest
 
-from statemachine import backends, calls, installed
+from statemachine import backends, installed
 from statemachine.backends.mujoco_backend import MujocoData
-from statemachine.calls import CLOSED, NEW, CallRecording, Statement, record, recorded_engines
-from statemachine.calls.recorder import CallRecorder
 from statemachine.cli import main
 from statemachine.errors import BadInputError, UnknownNameError
 from statemachine.page import Page, Table
+from statemachine.probes import calls
+from statemachine.probes.calls import (
+    CLOSED,
+    NEW,
+    CallRecorder,
+    CallRecording,
+    Statement,
+    record,
+    recorded_engines,
+)
 from statemachine.report import calls as words
 from statemachine.report import terminal
 from statemachine.report.as_json import dumps
@@ -154,43 +163,36 @@ def is_a_look(frame: Any) -> bool:
     """Whether code is the recorder's own, or that with which an engine's room looks."""
     file = Path(frame.f_code.co_filename)
     of_a_room = file.parts[-3::2] == ("engines", "calls.py")
-    return of_a_room or file.parent == Path(calls.__file__).parent
+    return of_a_room or file == Path(calls.__file__)
+
+
+def around(engine: str, run: Callable[[], object]) -> set[str]:
+    """The engine's functions that are called while a run is recorded, past the recorder."""
+    names: set[str] = set()
+
+    def heard(frame: Any, name: str) -> None:
+        if CallRecorder._active and not is_a_look(frame):  # at its end, Data are collected
+            names.add(name)
+
+    with profiled(engine, heard):
+        run()
+    return names
 
 
 @pytest.mark.slow
 def test_no_call_goes_round_the_recorder(engine: str) -> None:
     """What holds on to an engine's function from before would not be heard."""
-    around: set[str] = set()
-
-    def heard(frame: Any, name: str) -> None:
-        if CallRecorder._active and not is_a_look(frame):  # at its end, Data are collected
-            around.add(name)
-
-    with profiled(engine, heard):
-        record(WHOLE.format(engine=engine), engine)
-    assert not around
+    assert not around(engine, lambda: record(WHOLE.format(engine=engine), engine))
 
 
 def test_early_hold_of_a_function_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """That the test above can fail."""
-    early = mujoco.mj_forward
+    early, lines = mujoco.mj_forward, list[Statement]()
     monkeypatch.setattr(MujocoData, "_recompute", lambda self: early(self._home.raw, self.raw))
-    around: set[str] = set()
-
-    def heard(frame: Any, name: str) -> None:
-        if CallRecorder._active and not is_a_look(frame):  # at its end, Data are collected
-            around.add(name)
-
-    with profiled("mujoco", heard):
-        (forward,) = short("mujoco", "sm.forward(model, data)")
-    assert around == {"mj_forward"}
-    assert forward.calls == ()
-    assert "data.xpos" in forward.changed
-
-
-def test_a_recorded_run_ends_at_the_same_bits(engine: str) -> None:
-    code = WHOLE.format(engine=engine)
-    assert record(code, engine).printed == run_plainly(code)
+    run = functools.partial(short, "mujoco", "sm.forward(model, data)")
+    assert around("mujoco", lambda: lines.extend(run())) == {"mj_forward"}
+    assert lines[0].calls == ()
+    assert "data.xpos" in lines[0].changed
 
 
 def test_looks_disturb_nothing_for_long(engine: str) -> None:
@@ -516,7 +518,7 @@ def test_what_cannot_be_recorded_is_refused() -> None:
     need_engine("pybullet")
     with pytest.raises(BadInputError, match="on pybullet"):
         record(SHORT.format(engine="pybullet", code=""), "mujoco")
-    nested = 'from statemachine.calls import record\nrecord("", "mujoco")'
+    nested = 'from statemachine.probes.calls import record\nrecord("", "mujoco")'
     assert "cannot record another" in str(record(nested, "mujoco").error)
 
 

@@ -18,24 +18,19 @@ import pytest
 from rich.cells import cell_len
 
 from statemachine import engines
-from statemachine.calls import record
 from statemachine.cli import main
 from statemachine.compare.models.engines import own_ways
-from statemachine.conventions import (
-    NO_ANSWER,
-    QUESTIONS,
-    UNDECIDED,
-    ask,
-    joints,
-    phrasebook,
-    probe,
-)
-from statemachine.conventions.answers import closest
-from statemachine.engines import part
+from statemachine.engines import room
 from statemachine.engines.mujoco import pile
 from statemachine.engines.samples import pendulum
+from statemachine.engines.samples.joint_tree import TREE
 from statemachine.errors import BadInputError, MissingEngineError, UnknownNameError
 from statemachine.installed import ENGINES, require
+from statemachine.probes import phrasebook
+from statemachine.probes.calls import record
+from statemachine.probes.conventions import NO_ANSWER, QUESTIONS, UNDECIDED, ask, probe
+from statemachine.probes.conventions.answers import closest
+from statemachine.probes.conventions.frames import FIXED, ORDERS
 from statemachine.report import conventions as report
 
 from .conftest import ROOT, Cli, need_engine
@@ -215,7 +210,7 @@ def test_the_engines_are_as_they_were(question: str, engine: str) -> None:
 
 
 def test_every_question_has_facts() -> None:
-    assert tuple(FACTS) == QUESTIONS
+    assert list(FACTS) == list(QUESTIONS)
 
 
 def test_the_figures_are_those_of_closed_forms(mj: ModuleType, pb: Any) -> None:
@@ -260,8 +255,8 @@ def test_the_limp_pendulum_keeps_its_energy() -> None:
 
 
 def test_no_two_orders_of_the_joints_are_the_same() -> None:
-    moving = [[name for name in order if name != joints.FIXED] for order in joints.ORDERS.values()]
-    assert len({tuple(order) for order in moving}) == len(joints.ORDERS)
+    moving = [[name for name in order if name != FIXED] for order in ORDERS.values()]
+    assert len({tuple(order) for order in moving}) == len(ORDERS)
     assert all(sorted(order) == sorted(moving[0]) for order in moving)
 
 
@@ -445,7 +440,7 @@ def test_a_recomputation_that_does_nothing(mj: Any, monkeypatch: pytest.MonkeyPa
 
 def test_joints_in_another_order(pb: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     tell = pb.getJointInfo
-    names = sorted(name for name, _, _ in joints.TREE)
+    names = sorted(name for name, _, _ in TREE)
     monkeypatch.setattr(
         pb,
         "getJointInfo",
@@ -572,10 +567,10 @@ def test_every_call_works(engine: str) -> None:
 
 def test_the_cells_of_an_engine_are_a_program(engine: str, tmp_path: Path) -> None:
     """As a reader would type them, with nothing of ours."""
-    module: Any = part(engine, "phrasebook")
-    file = tmp_path / module.FILE[0]
-    file.write_text(module.FILE[1])
-    lines = [f"file = {str(file)!r}", *(module.CELLS[name].code for name in phrasebook.CONCEPTS)]
+    own = room(engine).phrases()
+    file = tmp_path / own.file[0]
+    file.write_text(own.file[1])
+    lines = [f"file = {str(file)!r}", *(own.cells[name].code for name in phrasebook.CONCEPTS)]
     done = subprocess.run(
         [sys.executable, "-c", "\n".join([*lines, "print(len(worlds))"])],
         capture_output=True,
@@ -591,10 +586,8 @@ def test_the_cells_of_an_engine_are_a_program(engine: str, tmp_path: Path) -> No
 def test_a_cell_that_does_nothing_is_found_out(
     engine: str, concept: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    module: Any = part(engine, "phrasebook")
-    monkeypatch.setitem(
-        module.CELLS, concept, dataclasses.replace(module.CELLS[concept], code="pass")
-    )
+    cells: Any = room(engine).phrases().cells
+    monkeypatch.setitem(cells, concept, dataclasses.replace(cells[concept], code="pass"))
     found = {call.concept: call for call in phrasebook.run([engine]).engines[engine]}
     assert not found[concept].works
     page = report.calls_page(phrasebook.run([engine]))
@@ -754,22 +747,23 @@ def test_an_engine_without_a_room_is_not_asked(
     assert any(line.split()[:4] == ["mujoco", "0", "0", "-9.81"] for line in lines)
 
 
-def test_a_room_of_another_package_may_have_a_part_of_the_parts(
+def test_a_room_of_another_package_may_have_some_of_the_methods(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    room = tmp_path / "their_room"
-    room.mkdir()
-    (room / "__init__.py").touch()
-    (room / "conventions.py").write_text("def gravity(steps): return (0, 0, -steps), (0, 0, -1)")
-    (room / "phrasebook.py").write_text(
-        "from statemachine.engines.phrases import Cell\n"
-        "FILE = ('a.txt', '7')\n"
-        "def close(names): pass\n"
-        "CELLS = {'load': Cell('a = int(open(file).read())', lambda n: n.a == 7)}"
+    (tmp_path / "their_room.py").write_text(
+        "from statemachine.engines import RawEngine\n"
+        "from statemachine.engines.measured import Cell, Phrases\n"
+        "class Theirs(RawEngine):\n"
+        "    def measurement(self, question):\n"
+        "        gravity = lambda steps: ((0, 0, -steps), (0, 0, -1))\n"
+        "        return gravity if question == 'gravity' else None\n"
+        "    def phrases(self):\n"
+        "        load = Cell('a = int(open(file).read())', lambda n: n.a == 7)\n"
+        "        return Phrases(('a.txt', '7'), {'load': load})\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(engines, "_ROOMS", dict(engines._ROOMS))
-    engines.register("theirs", "their_room")
+    engines.register("theirs", "their_room:Theirs")
     assert answers("gravity", "theirs") == {"": "told 0 0 -50, felt 0 0 -1"}
     assert ask("timestep", "theirs") is None
     (phrase,) = phrasebook.run(["theirs"]).engines["theirs"]
@@ -783,7 +777,7 @@ def test_a_room_that_cannot_be_imported_is_left_out(
 ) -> None:
     monkeypatch.setattr(engines, "_ROOMS", dict(engines._ROOMS))
     engines.register("broken", "no_such_package")
-    assert "broken" not in engines.rooms_with("conventions")
+    assert "broken" not in engines.rooms_with("measurement")
     with pytest.raises(MissingEngineError, match="room of 'broken' cannot be loaded"):
         ask("gravity", "broken")
     assert main(("conventions", "gravity")) == 0

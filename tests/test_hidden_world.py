@@ -116,27 +116,18 @@ def test_a_coordinate_that_diverges_is_named(
         assert np.array_equal(data.qvel, before[1])
 
 
+@pytest.mark.parametrize(
+    ("name", "said"), [("qfrc_limit", "forces by part"), ("contacts", "contacts")]
+)
 def test_what_an_engine_does_not_tell_is_refused(
-    model: sm.Model, monkeypatch: pytest.MonkeyPatch
+    model: sm.Model, monkeypatch: pytest.MonkeyPatch, name: str, said: str
 ) -> None:
-    monkeypatch.setattr(ExampleWorld, "untold", frozenset({"qfrc_limit"}))
+    monkeypatch.setattr(ExampleWorld, "untold", frozenset({name}))
     with held(model) as data:
         for verb in (sm.step, sm.forward):
             verb(model, data)
-            with pytest.raises(UnsupportedError, match="forces by part"):
-                _ = data.qfrc_limit
-            assert data.qfrc_bias.any()
-
-
-def test_contacts_that_an_engine_does_not_tell_are_refused(
-    model: sm.Model, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(ExampleWorld, "untold", frozenset({"contacts"}))
-    with held(model) as data:
-        for verb in (sm.step, sm.forward):
-            verb(model, data)
-            with pytest.raises(UnsupportedError, match="contacts"):
-                _ = data.contacts
+            with pytest.raises(UnsupportedError, match=said):
+                getattr(data, name)
             assert data.qfrc_bias.any()
 
 

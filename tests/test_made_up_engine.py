@@ -52,9 +52,9 @@ def engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 @pytest.fixture
 def room(engine: Path) -> None:
-    """It has a room, in which some parts are."""
+    """It has a room, in which some methods are."""
     with (engine / "made_up-1.0.dist-info" / "entry_points.txt").open("a") as file:
-        file.write(f"[statemachine.engines]\n{NAME} = tests.made_up\n")
+        file.write(f"[statemachine.engines]\n{NAME} = tests.made_up:MyEngine\n")
 
 
 Output = pytest.CaptureFixture[str]

@@ -21,8 +21,8 @@ import statemachine as sm
 from statemachine.compare import compare
 from statemachine.drawing.camera import Camera, framed
 from statemachine.drawing.shots import Shot
+from statemachine.engines import pybullet as pybullet_room
 from statemachine.engines.mujoco import _opengl
-from statemachine.engines.pybullet import rendering as pybullet_rendering
 from statemachine.errors import BadInputError, MissingEngineError, TraceError, UnknownNameError
 from statemachine.rendering import Timing, frames, motion_of, probe, timing_of
 from statemachine.rendering.compose import compose, halved
@@ -414,11 +414,11 @@ def test_what_draws_is_chosen_by_what_works(monkeypatch: pytest.MonkeyPatch) -> 
         if name == "pybullet":
             raise MissingEngineError("pybullet is not installed here", engine=name)
 
-    monkeypatch.setattr(pybullet_rendering, "require", require)
+    monkeypatch.setattr(pybullet_room, "require", require)
     with pytest.raises(MissingEngineError, match="nothing here can draw") as caught:
         probe.renderer_here()
     assert "\n" not in str(caught.value)
-    monkeypatch.setattr(pybullet_rendering, "require", lambda name: None)
+    monkeypatch.setattr(pybullet_room, "require", lambda name: None)
     assert probe.renderer_here() == probe.Renderer("pybullet")
 
 

@@ -11,7 +11,7 @@ import pytest
 import statemachine as sm
 from statemachine.errors import EngineWarning, UnsupportedError
 
-from .conftest import need_engine
+from .conftest import need_engine, started
 
 IMPLICIT = '<option timestep="0.002" integrator="implicitfast"/>'
 FLOOR = '<geom name="floor" type="plane" size="1 1 .1"/>'
@@ -341,8 +341,7 @@ def test_a_reset_forgets_what_the_links_of_one_arm_touched() -> None:
     model = sm.load("so101/scene_box", backend="pybullet")
     ends = []
     for wild in (False, True):
-        with sm.make_data(model) as data:
-            sm.reset(model, data, keyframe=0)
+        with started(model) as data:
             if wild:
                 data.qvel[:6] = 100
                 sm.step(model, data, 200)

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from statemachine.conventions import QUESTIONS
 from statemachine.grading.judges import JUDGES
 from statemachine.grading.mutants.faults import FAULTS
 from statemachine.lessons import STATIONS
 from statemachine.lessons.questions import _ASKED
+from statemachine.probes.conventions import QUESTIONS
 
 from .conftest import ROOT, Cli, need_engine
 

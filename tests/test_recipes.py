@@ -22,7 +22,7 @@ PLACES = {
     "statemachine/measures/quantities.py, in QUANTITIES": '        Quantity("force"',
     "statemachine/measures/quantities.py, in _SUFFIXES": "_SUFFIXES = (",
     "statemachine/compare/series.py, in series": "            found += _joint(",
-    "statemachine/conventions/__init__.py, in QUESTIONS": '    "timestep",',
+    "statemachine/probes/conventions/__init__.py, in QUESTIONS": '    "timestep": ',
 }
 
 

@@ -229,9 +229,11 @@ def test_scenarios_and_costs(folder: Path) -> None:
 def test_an_error_in_one_part_costs_that_part(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    from statemachine.engines import room
+    from statemachine.probes.audit import interface_driver
     from statemachine.robots import examine, gaps
 
-    monkeypatch.setattr(examine, "get_state", lambda *_: 1 / 0)
+    monkeypatch.setattr(interface_driver, "get_state", lambda *_: 1 / 0)
     told: list[str] = []
     row = examine.examine(
         folder / "good.xml", ExaminedModel("good.xml", "", ""), True, 0, lambda _, s: told.append(s)
@@ -242,9 +244,11 @@ def test_an_error_in_one_part_costs_that_part(
     assert row.wrong("mujoco")
     # What is not the engine's own is seen.
     monkeypatch.setattr(gaps, "commands", lambda m, n, _: gaps.np.full((n, m.nu), 0.5))
-    plain = examine.part("mujoco", "plain")
-    real = plain.run
-    monkeypatch.setattr(plain, "run", lambda path, ctrl, key: real(path, ctrl + 1e-15, key))
+    engine = type(room("mujoco"))
+    real = engine.plain_run
+    monkeypatch.setattr(
+        engine, "plain_run", lambda own, path, ctrl, key: real(own, path, ctrl + 1e-15, key)
+    )
     row = examine.examine(folder / "good.xml", row, True, 0, lambda *_: None)
     assert row.backends["mujoco"].equals_engine is False
     assert "mujoco: not the bits of the engine without us" in row.wrong("mujoco")

@@ -17,9 +17,9 @@ import tests.exercises.forward
 import tests.exercises.gravity
 import tests.exercises.replay
 import tests.exercises.state  # noqa: F401  (they fill WRONG)
-from statemachine.conventions.phrasebook import CONCEPTS
 from statemachine.grading.mutants.faults import FAULTS
 from statemachine.lessons import LESSONS
+from statemachine.probes.phrasebook import CONCEPTS
 from statemachine.report.cheat_sheet import OURS, REMEMBER
 
 from .conftest import ROOT

@@ -320,11 +320,11 @@ def values_of(model: Model) -> dict[str, Any]:
 @pytest.mark.usefixtures("bullet")
 @pytest.mark.parametrize("name", ["hold", "gravity", "box"])
 def test_the_ends_of_the_dials_are_the_two_models(name: str) -> None:
-    from statemachine.engines.pybullet.dials import dials
+    from statemachine.engines import room
 
     experiment = replace(scenario(name), seconds=0.7)
     fresh = quietly(experiment.model, defaults="engine")
-    found = dials(fresh, experiment.options)
+    found = room("pybullet").dials(fresh, experiment.options)
     assert found
     raw = fresh.replace(**experiment.options)
     np.testing.assert_array_equal(
@@ -333,7 +333,7 @@ def test_the_ends_of_the_dials_are_the_two_models(name: str) -> None:
     emulated = quietly(experiment.model).replace(**experiment.options)
     whole = found.build(dict.fromkeys(SETTINGS, "model"), values_of(emulated))
     np.testing.assert_array_equal(path_of(whole, experiment), path_of(emulated, experiment))
-    assert dials(emulated, {}) is None
+    assert room("pybullet").dials(emulated, {}) is None
 
 
 @pytest.mark.usefixtures("bullet")
@@ -341,11 +341,11 @@ def test_as_it_comes_is_what_a_user_of_pybullet_gets(tmp_path: Path) -> None:
     """Bit for bit the run of a script that knows nothing of this library but the URDF."""
     import pybullet as pb
 
-    from statemachine.engines.pybullet.dials import dials
+    from statemachine.engines import room
     from statemachine.runs.commands import TARGET
 
     fresh = quietly("so101/scene", defaults="engine")
-    found = dials(fresh, {})
+    found = room("pybullet").dials(fresh, {})
     assert found
     ours = path_of(found.build({}, {}), HOLD)
     file = tmp_path / "arm.urdf"
@@ -376,11 +376,12 @@ def test_with_everything_dialled_off_the_engines_agree() -> None:
 
     Each of the dials is needed for it, so each acts.
     """
+    from statemachine.engines import room
     from statemachine.engines.pybullet import dials as module
 
     fresh = quietly("so101/scene", defaults="engine")
     limp = {"actuation": False}
-    found = module.dials(fresh, limp)
+    found = room("pybullet").dials(fresh, limp)
     assert found
     bare = {**limp, "timestep": 1e-3, "armature": 0, "frictionloss": 0, "damping": 0}
     one = sm.load("so101/scene").replace(**bare, contacts=False, limits=False)
@@ -480,7 +481,7 @@ def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
 @pytest.mark.usefixtures("bullet")
 def test_links_of_one_robot_meet_where_the_setting_says_so(arm: Model) -> None:
     """In a pose in which the arm is in its own way, by MuJoCo."""
-    from statemachine.engines.pybullet.dials import dials
+    from statemachine.engines import room
 
     def own_ways(model: Model, qpos: np.ndarray, run: Any) -> int:
         with sm.make_data(model) as data:
@@ -493,7 +494,7 @@ def test_links_of_one_robot_meet_where_the_setting_says_so(arm: Model) -> None:
     poses = (random.uniform(*arm.jnt_range.T) for _ in range(200))
     pose = next(pose for pose in poses if own_ways(arm, pose, sm.forward) > 2)
     fresh = quietly("so101/scene", defaults="engine")
-    found = dials(fresh, {})
+    found = room("pybullet").dials(fresh, {})
     assert found
     rest = {name: "model" for name in SETTINGS if name != "surfaces"}
     values = values_of(arm)
@@ -508,10 +509,10 @@ def test_as_it_comes_has_the_engines_figures_in_the_emulated_world() -> None:
     """Read back from the engine: friction, masses, inertias, timestep and gravity."""
     import pybullet as pb
 
-    from statemachine.engines.pybullet.dials import dials
+    from statemachine.engines import room
 
     fresh = quietly("so101/scene", defaults="engine")
-    found = dials(fresh, {})
+    found = room("pybullet").dials(fresh, {})
     assert found
     model: Any = found.build({"servo": "model"}, {})
 
@@ -541,13 +542,13 @@ def test_as_it_comes_has_the_engines_figures_in_the_emulated_world() -> None:
 @pytest.mark.parametrize("name", SETTINGS)
 def test_each_dial_acts_on_the_emulated_side(name: str) -> None:
     """All settings the model's, one as the engine comes: the run is another one."""
-    from statemachine.engines.pybullet.dials import dials
+    from statemachine.engines import room
 
     experiment = {"limits": FALL, "surfaces": replace(scenario("gravity"), seconds=0.8)}.get(
         name, HOLD
     )
     fresh = quietly("so101/scene", defaults="engine")
-    found = dials(fresh, experiment.options)
+    found = room("pybullet").dials(fresh, experiment.options)
     assert found
     emulated = quietly("so101/scene").replace(**experiment.options)
     rest = {each: "model" for each in SETTINGS if each != name}
@@ -563,10 +564,10 @@ def test_each_dial_acts_on_the_emulated_side(name: str) -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_dials_outlive_a_reset() -> None:
-    from statemachine.engines.pybullet.dials import dials
+    from statemachine.engines import room
 
     fresh = quietly("so101/scene", defaults="engine")
-    found = dials(fresh, {})
+    found = room("pybullet").dials(fresh, {})
     assert found
     model = found.build({"inertia": "model"}, {})
     first = path_of(model, HOLD)
@@ -584,11 +585,12 @@ def test_dials_outlive_a_reset() -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_a_dial_that_does_not_act_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    from statemachine.engines import room
     from statemachine.engines.pybullet import dials as module
     from statemachine.errors import EngineError
 
     fresh = quietly("so101/scene", defaults="engine")
-    found = module.dials(fresh, {})
+    found = room("pybullet").dials(fresh, {})
     assert found
     monkeypatch.setattr(module, "_change", lambda *_a, **_k: None)
     for name in ("inertia", "surfaces"):

@@ -44,7 +44,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Try, and show."""
-    from .. import audit
+    from ..probes import audit
     from ..report import audit as report
 
     results = on_each_backend(

@@ -29,8 +29,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Ask, and show."""
-    from .. import conventions
-    from ..conventions import phrasebook
+    from ..probes import conventions, phrasebook
     from ..report import conventions as report
     from ..report.progress import progress
 
@@ -43,15 +42,15 @@ def run(options: argparse.Namespace) -> int:
             table = phrasebook.run(engines, told)
         return show(report.calls_page(table), table, options.json)
     with progress("conventions") as told:
-        result = conventions.probe(engines, options.question or conventions.QUESTIONS, told)
+        result = conventions.probe(engines, options.question or tuple(conventions.QUESTIONS), told)
     footer = f"Which call does what on each engine: {PROGRAM} conventions --calls"
     return show(report.page(result), result, options.json, footer)
 
 
 def _engines(asked: str) -> list[str]:
     """The engine that was asked for; of all, those that load, and a line for each other."""
-    from ..conventions import check_engine
     from ..engines import room_names
+    from ..probes.conventions import check_engine
 
     if asked != "all":
         check_engine(asked)

@@ -14,9 +14,8 @@ import numpy as np
 from ..description.match import Matching, Pair, match, renamed
 from ..description.records import HERE, Robot
 from ..description.tree import GroupTree
-from ..engines import needed_part
-from ..engines.model_differences import BodyPair
-from ..engines.parts import CompilerPart
+from ..engines import room
+from ..engines.records import BodyPair
 from ..errors import BadInputError, unknown_name
 from ..installed import DEFAULT
 from ..interface import Array, Model, make_data, reset
@@ -162,8 +161,7 @@ def _description(model: Model) -> Robot:
             f"{model.backend} does not tell what the bodies of its models are: they cannot be "
             "matched with those of another file"
         )
-    reading: CompilerPart = needed_part(DEFAULT, "reading")
-    return reading.describe(model.compiled, model.path.name)
+    return room(DEFAULT).describe(model.compiled, model.path.name)
 
 
 def _check_names(

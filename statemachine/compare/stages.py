@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..engines import part
-from ..engines.parts import OneStepPart
+from ..engines import room
 from ..errors import UnsupportedError
 from ..interface import Array, Data, Ints, JointType, Model
 from ..measures import ContactNames
@@ -78,7 +77,7 @@ class StageReader:
     def __init__(self, matched: Matched) -> None:
         self._matched = matched
         self._models = matched.one, matched.two
-        self._parts: list[OneStepPart | None] = [part(m.backend, "one_step") for m in self._models]
+        self._rooms = [room(model.backend) for model in self._models]
         one, two = self._models
         self.dofs = (
             _dofs(one, [a for a, _ in matched.joints]),
@@ -125,15 +124,15 @@ class StageReader:
 
         `before` are arrays of the other side.
         """
-        own, model = self._parts[side], self._models[side]
-        if not own or not own.PRIMES:
+        own, model = self._rooms[side], self._models[side]
+        if not own.primes:
             return ""
         given = {}
         for name, values in before.items():
             given[name] = np.zeros(model.nv)
             given[name][self.dofs[side]] = values[self.dofs[1 - side]]
         own.prime(model, data, given)
-        return own.PRIMES
+        return own.primes
 
     def read(self, side: int, data: Data, qpos: Array) -> Reading:
         """The numbers of all groups but the last, and the contacts.
@@ -146,11 +145,7 @@ class StageReader:
         model, dofs = self._models[side], self.dofs[side]
         where, turned = self._poses(side, data)
         found: list[Array] = [where, turned]
-        own = self._parts[side]
-        mass = np.full((model.nv, model.nv), np.nan)
-        if own:
-            mass = own.mass_matrix(model, data, qpos)
-        mass = mass[np.ix_(dofs, dofs)]
+        mass = self._rooms[side].mass_matrix(model, data, qpos)[np.ix_(dofs, dofs)]
         found += [mass[rows, columns] for rows, columns in self._mass_units]
         for arrays in ARRAYS.values():
             values = np.concatenate([_told(data, name, model.nv)[dofs] for name in arrays])

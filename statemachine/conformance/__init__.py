@@ -62,6 +62,7 @@ def run(backend: str) -> list[Outcome]:
                 outcomes.append(Outcome(name, "failed", f"{type(error).__name__}: {error}"))
             else:
                 outcomes.append(Outcome(name, "passed"))
+            lab.close()
     return outcomes
 
 

@@ -15,6 +15,7 @@ from ..interface import (
     Array,
     Contacts,
     Data,
+    Ints,
     Model,
     forward,
     get_state,
@@ -29,7 +30,7 @@ TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
 
 
 class Lab:
-    """Models of one backend, compiled when first used, and Data closed at the end."""
+    """Models of one backend, compiled when first used, and Data closed at the end of a check."""
 
     def __init__(self, backend: str) -> None:
         self.backend = backend
@@ -39,6 +40,10 @@ class Lab:
         return self
 
     def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give back all Data that were made so far; the Models stay."""
         self._open.close()
 
     @cached_property
@@ -61,6 +66,20 @@ class Lab:
         data = self._open.enter_context(make_data(model))
         if keyframe is not None:
             reset(model, data, keyframe=keyframe)
+        return data
+
+    @cached_property
+    def box_at(self) -> tuple[int, int, int]:
+        """Where the free box starts in qpos and qvel, and its body."""
+        joint = self.box.joint_id("box")
+        place, dof = self.box.jnt_qposadr[joint], self.box.jnt_dofadr[joint]
+        return int(place), int(dof), self.box.body_id("box")
+
+    def after(self, model: Model, nstep: int) -> Data:
+        """A new Data after so many steps and a forward."""
+        data = self.data(model)
+        step(model, data, nstep)
+        forward(model, data)
         return data
 
     def rests_on(self, *features: str) -> None:
@@ -150,6 +169,20 @@ def same(one: dict[str, Array], two: dict[str, Array], what: str) -> None:
         require_equal(two[name], array, f"{what}: {name}")
 
 
+def force_on(model: Model, data: Data, body: int) -> tuple[Array, Ints, Array]:
+    """What touches a body: the sum of the forces on it (3,) [N], which contacts, their normals.
+
+    The normals (n, 3) point towards the body.
+    """
+    contacts = data.contacts
+    pairs = model.geom_bodyid[contacts.geom]
+    touching = np.flatnonzero((pairs == body).any(axis=1))
+    # A force is that of geom 0 on geom 1, along the rows of the frame.
+    signs = np.where(pairs[touching, 1] == body, 1.0, -1.0)
+    forces = np.einsum("nij,ni->nj", contacts.frame[touching], contacts.force[touching])
+    return signs @ forces, touching, signs[:, None] * contacts.frame[touching, 0]
+
+
 def inputs_of(model: Model, data: Data) -> Array:
     """time, qpos, qvel and ctrl in one array."""
     state = get_state(model, data)
@@ -158,11 +191,16 @@ def inputs_of(model: Model, data: Data) -> Array:
 
 def run_ctrl(model: Model, data: Data, steps: int, seed: int) -> Array:
     """Step under a ctrl drawn anew each step, within its range; qpos after each."""
-    random = np.random.default_rng(seed)
     low, high = model.actuator_ctrlrange.T
+    commands = np.random.default_rng(seed).uniform(low, high, (steps, model.nu))
+    return run_commands(model, data, commands)
+
+
+def run_commands(model: Model, data: Data, commands: Array) -> Array:
+    """Step under each of the commands (n, nu); qpos (n, nq) after each."""
     poses = []
-    for _ in range(steps):
-        data.ctrl[:] = random.uniform(low, high)
+    for command in commands:
+        data.ctrl[:] = command
         step(model, data)
         poses.append(data.qpos.copy())
     return np.array(poses)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..interface import POSES, JointType, forward, get_state, make_data, reset, set_state, step
+from ..interface import POSES, JointType, forward, get_state, reset, set_state, step
 from ..kinematics import Kinematics
 from ..rotations import matrix_from_quat
 from ._lab import (
@@ -87,10 +87,10 @@ def check_a_step_leaves_values_of_the_state_before(lab: Lab) -> None:
         before = get_state(model, data)
         step(model, data)
         left = snapshot(data)
-        with make_data(model) as other:
-            set_state(model, other, before)
-            forward(model, other)
-            expected = snapshot(other)
+        other = lab.data(model)
+        set_state(model, other, before)
+        forward(model, other)
+        expected = snapshot(other)
         names = list(POSES)
         if model.capabilities.exact_restore:
             # Elsewhere a restored Data may find the same contact at other points.
@@ -157,7 +157,7 @@ def check_xquat_is_wxyz(lab: Lab) -> None:
     model, data = lab.box, lab.data(lab.box)
     quat = np.array([0.5, -0.1, 0.7, 0.5])
     quat /= np.linalg.norm(quat)
-    start, body = int(model.jnt_qposadr[model.joint_id("box")]), model.body_id("box")
+    start, _, body = lab.box_at
     data.qpos[start : start + 3] = (0.3, -0.2, 0.5)
     data.qpos[start + 3 : start + 7] = quat
     forward(model, data)

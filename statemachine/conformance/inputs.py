@@ -69,6 +69,9 @@ def check_bad_assignment_changes_nothing(lab: Lab) -> None:
         ("ctrl", ["a"] * 6),
         ("ctrl", [None] * 6),
         ("ctrl", [1j] * 6),
+        ("ctrl", [True] * 6),
+        ("ctrl", [2e10] * 6),
+        ("ctrl", np.arange(6).astype(object)),
         ("ctrl", [[1.0], [1.0, 2.0]]),
         ("ctrl", [np.nan] + [0.0] * 5),
         ("qpos", [np.inf] * model.nq),
@@ -191,7 +194,7 @@ def check_divergence_is_caught_every_time(lab: Lab) -> None:
 def check_zero_quaternion_is_refused(lab: Lab) -> None:
     """A quaternion of zeros names no rotation: step and forward refuse, unchanged."""
     model, data = lab.box, lab.data(lab.box)
-    start = int(model.jnt_qposadr[model.joint_id("box")]) + 3
+    start = lab.box_at[0] + 3
     data.qpos[start : start + 4] = 0.0
     before = data.qpos.copy()
     for verb in (step, forward):

@@ -8,7 +8,7 @@ import pickle
 import numpy as np
 
 from ..errors import BadInputError, ForeignStateError
-from ..interface import forward, get_state, make_data, reset, set_state, step
+from ..interface import forward, get_state, reset, set_state, step
 from ._lab import (
     Lab,
     inputs_of,
@@ -144,10 +144,10 @@ def check_a_state_moves_between_variants(lab: Lab) -> None:
     run_ctrl(model, data, 20, seed=11)
     state = get_state(model, data)
     variant = model.replace(gravity=[0.0, 0.0, -1.6])
-    with make_data(variant) as other:
-        set_state(variant, other, state)
-        require_equal(inputs_of(variant, other), inputs_of(model, data), "inputs in a variant")
-        step(variant, other, 5)
+    other = lab.data(variant)
+    set_state(variant, other, state)
+    require_equal(inputs_of(variant, other), inputs_of(model, data), "inputs in a variant")
+    step(variant, other, 5)
 
 
 def check_foreign_states_are_refused(lab: Lab) -> None:

@@ -1,9 +1,9 @@
 """The engines without us: what each does and calls things when its own users drive it.
 
-Each engine has a room here, a package with its name. A room has parts, modules with the names
-in `PARTS`; conventions, phrasebook, calls, audit, comparison, pictures, grading and doctor ask for
-a part by the engine's name, and name no engine themselves. An engine without a part is not asked,
-and the page says so.
+Each engine has a room here, a package with a `RawEngine`; conventions, phrasebook, calls, audit,
+comparison, pictures, grading and doctor ask it by the engine's name, and name no engine themselves.
+What a room does not override is not asked, and the page says so. The methods import what they
+need: to look a room up imports no engine.
 
 So an engine is `backends/NAME_backend.py`, `engines/NAME` and a row of `installed.ENGINES`; one of
 another distribution declares entry points instead of the row.
@@ -11,34 +11,299 @@ another distribution declares entry points instead of the row.
 
 from __future__ import annotations
 
+import functools
 import importlib
 import importlib.metadata
-import importlib.util
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from typing import Any
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-from ..errors import BadInputError, MissingEngineError, UnsupportedError, unknown_name
-from ..installed import ENGINES, raise_if_interrupted
+from ..errors import BadInputError, MissingEngineError, UnsupportedError
+from ..installed import raise_if_interrupted
 
-_ROOMS: dict[str, str] = {name: f"{__name__}.{name}" for name in ENGINES}
-# What a room may have. The protocol of a part, and the records that it gives, are in a module of
-# this package: `measured`, `phrases`, `call_watch`, `auditing`, `parts`.
-PARTS: dict[str, str] = {
-    "as_it_comes": "what the engine calls things, and a model as its own users load it",
-    "conventions": "what it does with tiny models, for the questions of `conventions`",
-    "phrasebook": "which of its calls does what, as lines to type",
-    "calls": "which of its functions can be watched, and what they change",
-    "dials": "Models between the engine as it comes and the contract",
-    "audit": "the engine by its own functions, to find out what its state is",
-    "reading": "what the engine makes of a file, as a description",
-    "differences": "all that two compiled models differ in, and what brings one to the other",
-    "energy": "the energies of states, by which all engines are measured",
-    "mutants": "where a seeded fault is put into its backend",
-    "one_step": "what it tells of one step from a given state, past the interface",
-    "plain": "a file as its own users run it, to compare bits with",
-    "watched": "what a student can do with the engine past the interface",
-    "rendering": "pictures without a screen",
+if TYPE_CHECKING:
+    from ..description.records import Robot
+    from ..drawing.camera import Camera
+    from ..drawing.shots import Drawer
+    from ..interface import Array, Data, Model
+    from .auditing import Driver
+    from .call_watch import CallWatch
+    from .measured import Phrases
+    from .records import (
+        Counterparts,
+        Dials,
+        Edit,
+        LeftAlone,
+        ModelDifference,
+        Term,
+        WayBack,
+    )
+
+_ROOMS: dict[str, str] = {
+    "mujoco": f"{__name__}.mujoco:MujocoEngine",
+    "pybullet": f"{__name__}.pybullet:PybulletEngine",
+    "pinocchio": f"{__name__}.pinocchio:PinocchioEngine",
 }
+
+
+Method = TypeVar("Method", bound=Callable[..., Any])
+
+
+def _needed(method: Method) -> Method:
+    """A method without which what was asked cannot be done: it raises UnsupportedError."""
+
+    @functools.wraps(method)
+    def lacking(self: RawEngine, *_arguments: Any, **_named: Any) -> Any:
+        raise UnsupportedError(
+            f"{self.name} has no {method.__name__!r} in its room",
+            backend=self.name,
+            feature=method.__name__,
+            reason="not written",
+        )
+
+    return cast("Method", lacking)
+
+
+class RawEngine:
+    """An engine as its own users drive it; each method is optional.
+
+    Attributes:
+        name: The engine's.
+        emulated: Whether the backend emulates some of the contract, so that what the engine does
+            must not be read from there.
+        primes: What of the step before the engine takes, in words; "" for nothing.
+        sharper: It draws so many times as large as a picture is shown.
+        steps: Names of its functions f(model, data[, nstep]) that advance time.
+        forwards: Names of those f(model, data) that only recompute.
+    """
+
+    emulated = False
+    primes = ""
+    sharper = 1
+    steps: tuple[str, ...] = ()
+    forwards: tuple[str, ...] = ()
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def can(self, method: str) -> bool:
+        """Whether its room has a method of its own."""
+        return getattr(type(self), method) is not getattr(RawEngine, method)
+
+    # The engine as it comes. Nothing here goes through an adapter that emulates the contract.
+
+    def terms(self, model: Model) -> tuple[Term, ...]:
+        """What the engine calls the things of the interface."""
+        return ()
+
+    def left_alone(self, model: Model, seconds: float, joint: int) -> tuple[LeftAlone, ...]:
+        """A joint that nobody commands, after some time [s], on four freshly loaded models.
+
+        As it comes; with the model's gravity; without the engine's own motors too; and
+        without the damping of joints.
+        """
+        return ()
+
+    def ways_back(self, model: Model) -> tuple[WayBack, ...]:
+        """Which of the engine's own ways to go back is exact."""
+        return ()
+
+    def dials(self, model: Model, options: Mapping[str, Any]) -> Dials | None:
+        """What can be set between the engine as it comes and the contract; None of any other."""
+        return None
+
+    def frictionless(self, model: Model) -> Model:
+        """The same Model with surfaces that have no friction, where the engine has a way."""
+        return model
+
+    def plain_run(self, path: Path, commands: Array, keyframe: int | None) -> Array | None:
+        """A file as the engine's own users run it, where the interface promises the same bits.
+
+        Args:
+            path: The file.
+            commands: (n, nu) ctrl of each step.
+            keyframe: Where to start; None for the default state.
+
+        Returns:
+            Positions and velocities (n + 1, nq + nv) at the start and after each step; None
+            where the engine alone cannot open the file.
+        """
+        return None
+
+    # What it takes for granted, what its state is, and what it runs.
+
+    def measurement(self, question: str) -> Callable[..., Any] | None:
+        """What measures the answer to a question of `probes.conventions`; None if nothing does."""
+        return None
+
+    def phrases(self) -> Phrases:
+        """Which of its calls does what, as lines to type."""
+        from .measured import Phrases
+
+        return Phrases(("", ""), {})
+
+    def driver(self, model: Model, seed: int) -> Driver | None:
+        """What starts, steps, saves and restores by its own functions; `seed`: of what it draws."""
+        return None
+
+    @_needed
+    def call_watch(self) -> CallWatch:
+        """Which of its functions can be watched, and what they change."""
+        ...
+
+    # One step from a given state, past the interface.
+
+    def mass_matrix(self, model: Model, data: Data, qpos: Array) -> Array:
+        """The engine's mass matrix (nv, nv) at a pose, armature included; NaN if not told.
+
+        Args:
+            model: A Model on this engine.
+            data: A Data of it, after a step from `qpos` or a forward.
+            qpos: (nq,) where.
+        """
+        import numpy as np
+
+        return np.full((model.nv, model.nv), np.nan)
+
+    def prime(self, model: Model, data: Data, before: Mapping[str, Array]) -> None:
+        """Let a Data, put to a state, know of the step before.
+
+        Args:
+            model: A Model on this engine.
+            data: A Data of it.
+            before: (nv,) arrays of that step by their names in the contract, those that the
+                other side tells: "qacc", "qfrc_contact", "qfrc_friction".
+        """
+
+    # Files and compiled models.
+
+    @_needed
+    def read(self, path: Path, name: str) -> Robot:
+        """What it makes of a file, with its own defaults.
+
+        Args:
+            path: The file.
+            name: What the description goes by.
+
+        Raises:
+            MissingEngineError: It is not installed here.
+            ModelError: It cannot read the file.
+        """
+        ...
+
+    @_needed
+    def read_file(self, path: Path, name: str) -> Robot:
+        """What an MJCF says itself; meshes may be missing. Arguments and errors as of `read`."""
+        ...
+
+    @_needed
+    def describe(self, compiled: Any, name: str) -> Robot:
+        """The description in a compiled model; its joints are in the order of the model's."""
+        ...
+
+    @_needed
+    def differences(
+        self, one: Any, two: Any, pairs: Counterparts, *, world: bool = True
+    ) -> tuple[ModelDifference, ...]:
+        """All that two compiled models differ in and that can change a motion.
+
+        Args:
+            one: A compiled model.
+            two: Another.
+            pairs: What of one is what of the other.
+            world: Whether gravity and the timestep are compared, too.
+        """
+        ...
+
+    @_needed
+    def sensors(self, one: Any, two: Any, pairs: Counterparts) -> list[ModelDifference]:
+        """What the sensors of two compiled models differ in, which only a controller reads."""
+        ...
+
+    @_needed
+    def entries(self, two: Any, difference: ModelDifference) -> tuple[ModelDifference, ...]:
+        """A difference by its single entries, or itself where it is of one piece.
+
+        Args:
+            two: The compiled model that its edits are of.
+            difference: One of `differences`.
+        """
+        ...
+
+    @_needed
+    def edited(self, raw: Any, edits: Iterable[Edit]) -> Any:
+        """A copy of a compiled model with these edits, and all that follows from them."""
+        ...
+
+    @_needed
+    def energies(self, model: Model, qpos: Array, qvel: Array) -> Array:
+        """Kinetic and potential energy (n, 2) [J] of states.
+
+        Args:
+            model: A model on this engine.
+            qpos: (n, nq) positions [rad or m].
+            qvel: (n, nv) velocities [rad/s or m/s].
+        """
+        ...
+
+    # Pictures without a screen.
+
+    @_needed
+    def opengl(self) -> str:
+        """The OpenGL that it draws with here; "" for its own choice, or where none is needed.
+
+        Raises:
+            MissingEngineError: It cannot draw here; the message says why, and what to do.
+        """
+        ...
+
+    @_needed
+    def drawn_by(self, opengl: str) -> str:
+        """What a reader is told of what draws."""
+        ...
+
+    @_needed
+    def drawer(self, files: Sequence[Path], size: tuple[int, int], camera: Camera) -> Drawer:
+        """Get ready to draw.
+
+        Args:
+            files: The model of the solid side, and that of the ghost if there is one.
+            size: Width and height of the pictures, `sharper` times as shown.
+            camera: Where they are seen from.
+        """
+        ...
+
+    @_needed
+    def drawing_environment(self, opengl: str, known: dict[str, str]) -> dict[str, str]:
+        """The environment of a process in which the engine takes this OpenGL."""
+        ...
+
+    @_needed
+    def drawing_diagnosis(self) -> tuple[bool, str, str]:
+        """Whether it draws here, what was found, and the next step if there is one."""
+        ...
+
+    # What a student can do with it past the interface, and where a fault is seeded.
+
+    def watched_data(self) -> type[Data] | None:
+        """The backend's Data whose verbs call `steps` and `forwards`; None: nothing is watched."""
+        return None
+
+    @_needed
+    def origin(self, raw: Any) -> object:
+        """What an engine's own model and its copies have in common, and no other."""
+        ...
+
+    def settings(self, raw: Any) -> dict[str, list[float]]:
+        """What of an engine's own model a student can change, by name."""
+        return {}
+
+    @_needed
+    def backend(self) -> ModuleType:
+        """The backend's module, with `compile_file`, `facts` and `edited`, to put a fault in."""
+        ...
 
 
 def room_names() -> list[str]:
@@ -48,7 +313,7 @@ def room_names() -> list[str]:
     return list(_ROOMS)
 
 
-def register(name: str, package: str) -> None:
+def register(name: str, kind: str) -> None:
     """Give an engine of another package a room.
 
     A package that declares it as an entry point of the group "statemachine.engines" is found
@@ -56,75 +321,43 @@ def register(name: str, package: str) -> None:
 
     Args:
         name: The engine's name.
-        package: What is imported, as "package.module"; its parts are looked for in it.
+        kind: A subclass of `RawEngine`, as "package.module:Class".
 
     Raises:
         BadInputError: There is another room of that name.
     """
-    if _ROOMS.get(name, package) != package:
+    if _ROOMS.get(name, kind) != kind:
         raise BadInputError(f"there is a room for {name!r} already; choose another name")
-    _ROOMS[name] = package
+    _ROOMS[name] = kind
 
 
-def rooms_with(name: str) -> list[str]:
-    """Names of the engines whose rooms have a part.
-
-    Args:
-        name: One of `PARTS`.
-    """
-    rooms = []
-    for engine in room_names():
-        with suppress(MissingEngineError):
-            rooms += [engine] if _module(engine, name) else []
-    return rooms
-
-
-def part(engine: str | None, name: str) -> Any:
-    """A part of an engine's room, imported now; None if the engine has none.
+def room(engine: str | None) -> RawEngine:
+    """The room of an engine; an empty one if it has none.
 
     Args:
         engine: Its name; None for no engine.
-        name: One of `PARTS`.
 
     Raises:
-        MissingEngineError: The engine is not installed here, or its room cannot be imported.
+        MissingEngineError: Its room cannot be imported.
     """
-    if name not in PARTS:
-        raise unknown_name("part of an engine's room", name, PARTS)
     # What is installed is looked through for names that are not known alone: that takes long.
     if engine is None or (engine not in _ROOMS and engine not in room_names()):
-        return None
-    module = _module(engine, name)
-    return importlib.import_module(module) if module else None
-
-
-def needed_part(engine: str, name: str) -> Any:
-    """A part that an engine must have for what was asked; else as `part`.
-
-    Raises:
-        UnsupportedError: Its room has none.
-    """
-    found = part(engine, name)
-    if found is None:
-        raise UnsupportedError(
-            f"{engine} has no part {name!r} in its room: {PARTS[name]}",
-            backend=engine,
-            feature=name,
-            reason="not written",
-        )
-    return found
-
-
-def _module(engine: str, name: str) -> str | None:
-    """The module of a part, which is not imported; None if there is none."""
-    room = _ROOMS[engine]
-    module = f"{room}.{name}"
-    if room.startswith(f"{__name__}.") and not importlib.util.find_spec(room):
-        return None  # an engine of the table that has no room
+        return RawEngine(engine or "")
+    module, _, kind = _ROOMS[engine].partition(":")
     try:
-        return module if importlib.util.find_spec(module) else None
-    except ImportError as error:  # the package of the room
+        return getattr(importlib.import_module(module), kind)(engine)
+    except (ImportError, AttributeError) as error:
         raise_if_interrupted(error)
         raise MissingEngineError(
-            f"the room of {engine!r} cannot be loaded from {room!r}: {error}", engine=engine
+            f"the room of {engine!r} cannot be loaded from {_ROOMS[engine]!r}: {error}",
+            engine=engine,
         ) from error
+
+
+def rooms_with(method: str) -> list[str]:
+    """Names of the engines whose rooms have a method of their own; none of them is imported."""
+    rooms = []
+    for engine in room_names():
+        with suppress(MissingEngineError):
+            rooms += [engine] if room(engine).can(method) else []
+    return rooms

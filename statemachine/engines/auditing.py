@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import DivergedError
 from ..interface import Array, Model
-from .futures import Coordinates, FutureGap, gap, worst
+from .futures import Coordinates, FutureGap, coordinates_of, gap, worst
 
 Layer = Literal["engine", "interface"]
 
@@ -24,6 +24,9 @@ STIR = 0.3  # how far a command is from that of rest [rad or m], where the range
 _RATE = 2.0  # of a command that swings [rad/s]
 
 ONLY = "only those that matter"  # the candidate of what was found to be needed
+# What is restored.
+ITSELF, FRESH, USED = "the run itself", "a fresh one", "a used one"
+ITSELF_AGAIN = "the run itself, again"  # where nothing else can be
 Machine = Any  # what a driver steps: an MjData, a client, a Data
 Restore = Callable[[Machine], None]
 # Entered, it saves a machine and gives what restores one.
@@ -183,38 +186,41 @@ class Driver(ABC):
         self.model, self.seed = model, seed
         self._measured: dict[str, Measured] = {}
 
+    # A machine is taken to have qpos, qvel, ctrl and time, as an MjData and a Data have.
+
     @cached_property
-    @abstractmethod
     def coordinates(self) -> Coordinates:
         """What the numbers are that `read` gives."""
+        return coordinates_of(self.model)
 
     @abstractmethod
     def fresh(self, point: SavePoint) -> Machine:
         """A new machine, at its default state."""
 
-    @abstractmethod
     def close(self, machine: Machine) -> None:
         """Give back what it holds."""
+        machine.close()
 
-    @abstractmethod
     def start(self, machine: Machine, point: SavePoint) -> None:
         """Put a machine, new or reset, to the start of a point."""
+        machine.qpos[:], machine.qvel[:] = point.qpos, point.qvel
+        self.command(machine, point.ctrl)
 
-    @abstractmethod
     def command(self, machine: Machine, ctrl: Array) -> None:
         """Write the command."""
+        machine.ctrl[:] = ctrl
 
     @abstractmethod
     def advance(self, machine: Machine, nstep: int = 1) -> None:
         """Step."""
 
-    @abstractmethod
     def read(self, machine: Machine) -> Array:
         """Positions and velocities, in one new array."""
+        return np.concatenate((machine.qpos, machine.qvel))
 
-    @abstractmethod
     def time(self, machine: Machine) -> float:
         """Simulated time [s]."""
+        return machine.time
 
     @abstractmethod
     def _measure(self, point: SavePoint) -> Measured:
@@ -306,6 +312,20 @@ class Driver(ABC):
                 self.advance(machine)
             trace.append(self.read(machine))
         return np.array(trace)
+
+    def futures(self, point: SavePoint, steps: int, way: SaveMethod) -> dict[str, Array]:
+        """What follows from a restore, by what was restored: as `drive` gives it."""
+        futures = {}
+        with self.at(point) as machine, way.save(machine) as restore:
+            self.drive(machine, point, steps)
+            for into in (ITSELF,) if way.travels else (ITSELF, ITSELF_AGAIN):
+                restore(machine)
+                futures[into] = self.drive(machine, point, steps)
+            for into, other in ((FRESH, self.new), (USED, self.used)) if way.travels else ():
+                with other(point) as target:
+                    restore(target)
+                    futures[into] = self.drive(target, point, steps)
+        return futures
 
     def run(self, point: SavePoint, steps: int) -> ReferenceRun:
         """The undisturbed run from a point.

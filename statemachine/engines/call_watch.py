@@ -1,8 +1,8 @@
-"""What the part "calls" of a room tells of its engine: its functions, and what calls change.
+"""What a room tells of its engine's calls: its functions, and what calls change.
 
-`statemachine.calls` replaces the functions by ones that count and look. The part has `watch()`,
-which gives a `CallWatch`, and `WORDS`, a `CallWords`. It imports the engine's backend: what that
-takes from the engine must be the engine's own, and not a wrapper that nobody takes away again.
+`probes.calls` replaces the functions by ones that count and look. A `CallWatch` imports the
+engine's backend: what that takes from the engine must be the engine's own, and not a wrapper that
+nobody takes away again.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import types
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from ..interface import Model
 
@@ -39,16 +39,6 @@ class CallWords:
     note: str = ""
     roles: Mapping[str, str] = dataclasses.field(default_factory=dict)
     helpers: Mapping[str, str] = dataclasses.field(default_factory=dict)
-
-
-class CallsPart(Protocol):
-    """The part "calls"; see the module."""
-
-    WORDS: CallWords
-
-    def watch(self) -> CallWatch:
-        """A watch on the engine."""
-        ...
 
 
 class WatchedObject(ABC):
@@ -97,9 +87,15 @@ class WatchedObject(ABC):
 
 
 class CallWatch(ABC):
-    """What the recorder must know of an engine."""
+    """What the recorder must know of an engine.
+
+    Attributes:
+        engine: Its name.
+        words: What a page says of its calls.
+    """
 
     engine: str
+    words: CallWords
 
     @abstractmethod
     def functions(self) -> Iterator[tuple[Any, str, str]]:

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..engines import part
-from ..engines.parts import WatchedPart
+from ..engines import room
 from ..interface import DERIVED, INPUTS, Model
 from .watch import EngineRun, Inputs, StudentWatch
 
@@ -150,5 +149,4 @@ def _live(value: Any, datas: Sequence[Any]) -> str:
 
 def settings(model: Model) -> dict[str, list[float]]:
     """What of the engine's own model a student can reach: its options, and its arrays' sums."""
-    room: WatchedPart | None = part(model.backend, "watched")
-    return room.settings(model.raw) if room else {}
+    return room(model.backend).settings(model.raw)

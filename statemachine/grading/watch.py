@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..engines import part
-from ..engines.parts import WatchedPart
+from ..engines import room
 from ..installed import require
 from ..interface import Array, Data, Model
 
@@ -102,8 +101,8 @@ class StudentWatch:
         self.runs: list[EngineRun] = []
         self.forwards: list[Inputs] = []
         self.datas: list[Any] = []
-        self._room: WatchedPart | None = part(model.backend, "watched")
-        self._origin = self._origin_of(model.raw if self._room else model)
+        self._room = room(model.backend)
+        self._origin = self._origin_of(model.raw if self._room.can("origin") else model)
         self._nudge = nudge
         self._current: dict[int, EngineRun] = {}
 
@@ -157,7 +156,7 @@ class StudentWatch:
 
     def _origin_of(self, model: Any) -> object:
         """What a Model and its variants have in common, and the engine's own with its copies."""
-        if isinstance(model, Model) or self._room is None:
+        if isinstance(model, Model) or not self._room.can("origin"):
             return model.path
         return self._room.origin(model)
 
@@ -183,17 +182,16 @@ def engine_watched(backend: str) -> Iterator[None]:
     Before a student's file can import them.
     """
     with ExitStack() as stack:
-        room: WatchedPart | None = part(backend, "watched")
-        if room:
-            engine = require(backend)
-            for name in room.STEPS:
-                stack.enter_context(_replaced(engine, name, _seen_step))
-            for name in room.FORWARDS:
-                stack.enter_context(_replaced(engine, name, _seen_forward))
+        own = room(backend)
+        for name in own.steps:
+            stack.enter_context(_replaced(require(backend), name, _seen_step))
+        for name in own.forwards:
+            stack.enter_context(_replaced(require(backend), name, _seen_forward))
+        watched = own.watched_data()
         for kind in Data.__subclasses__():
-            if not (room and kind is room.DATA):
+            if kind is not watched:
                 stack.enter_context(_replaced(kind, "_recompute", _seen_forward))
-        telling = backend if room else None
+        telling = backend if watched else None
         stack.enter_context(_replaced(Data, "__init__", functools.partial(_seen_data, telling)))
         yield
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..engines.parts import LeftAlone
+from ..engines.records import LeftAlone
 from ..errors import UnsupportedError
 from ..interface import Array, Data, forward
 from ..measures.text import NONE, apart, position

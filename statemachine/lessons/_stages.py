@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import conventions
-from ..engines import part
+from ..engines import room
 from ..interface import INPUTS, Array, Data, Model, forward, make_data, step
 from ..measures import largest
 from ..measures.text import count, millimetres, short_time
 from ..page import Block, Heading, Pipeline, Table, Text, Traces, Verdict
+from ..probes import conventions
 from ..runs.commands import hold_ctrl
 from ..runs.drive import Progress
 from ..runs.provenance import Provenance, provenance
@@ -81,7 +81,7 @@ class Stages:
 
 def own_answers(model: Model, question: str) -> tuple[OwnAnswer, ...]:
     """A convention of the engine behind a Model that emulates some of the contract."""
-    if part(model.backend, "as_it_comes") is None:  # the interface is the engine's own
+    if not room(model.backend).emulated:  # the interface is the engine's own
         return ()
     return tuple(
         OwnAnswer(question, finding.of, finding.answer)

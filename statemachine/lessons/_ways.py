@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..engines.parts import WayBack
+from ..engines.records import WayBack
 from ..interface import Array, Data, Model, get_state, make_data, reset, set_state, step
 from ..page import Table, Text
 

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..engines import part
-from ..engines.parts import AsItComes
+from ..engines import room
 from ..errors import BadInputError, UnsupportedError
 from ..interface import Data, JointType, Model, make_data, reset
 from ..measures import largest
@@ -120,9 +119,8 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Gravit
         fallen[name] = _left_alone(each, joint, options["longer"], share)
     which = model.joint_id(joint)
     driven = model.actuator_jntid == which
-    own: AsItComes | None = part(model.backend, "as_it_comes")
-    if int(model.jnt_type[which]) == int(JointType.FREE):
-        own = None  # no motor of the engine's own is on it
+    # No motor of the engine's own is on a free body.
+    engine = None if int(model.jnt_type[which]) == int(JointType.FREE) else model.backend
     return Gravity(
         joint=joint,
         slide=at.slide,
@@ -132,7 +130,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Gravit
         servos_on=ends[0],
         servos_off=ends[-1],
         longer=fallen,
-        alone=own.left_alone(model, seconds, which) if own else (),
+        alone=room(engine).left_alone(model, seconds, which),
         provenance=provenance(model),
     )
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..engines import part
-from ..engines.parts import AsItComes, WayBack
+from ..engines import room
+from ..engines.records import WayBack
 from ..errors import UnsupportedError, check_name
 from ..interface import Array, Ints, JointType, Model, get_state
 from ..interface.checks import as_count
@@ -151,7 +151,6 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Replay
     free = model.jnt_qposadr[model.jnt_type == int(JointType.FREE)].tolist()
     hinges = model.jnt_qposadr[model.jnt_type == int(JointType.HINGE)]
     _, data = play.worlds[0]
-    own: AsItComes | None = part(model.backend, "as_it_comes")
     return Replay(
         ctrl=data.ctrl.copy(),
         broken_by=way,
@@ -170,7 +169,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Replay
         finer=finer,
         state=tuple(name for name, size in get_state(model, data).layout if size),
         ways=ways_back(model, data.ctrl),
-        own_ways=own.ways_back(model) if own else (),
+        own_ways=room(model.backend).ways_back(model),
         provenance=provenance(model),
     )
 

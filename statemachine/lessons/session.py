@@ -14,9 +14,9 @@ from typing import Any
 import statemachine
 
 from ..backends import backend_engine
-from ..calls import CallRecording, record, recorded_engines, statements
 from ..interface import Data, Model, make_data, step
 from ..page import Page
+from ..probes.calls import CallRecording, record, recorded_engines, statements
 from . import module
 from .records import Lesson, Session
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..backends import load as load_model
-from ..engines import part
+from ..engines import room
 from ..interface import Data, Model
 from ..interface.checks import as_count
 from ..measures.text import capital, count, duration
@@ -111,7 +111,7 @@ def run(
     size = max(1, min(total // _ROUNDS, _MOST))
     rounds = [size] * (total // size) + [total % size] * bool(total % size)
     models = {_BULK: model, _AGAIN: model, _LOOP: model}
-    if part(model.backend, "as_it_comes"):
+    if room(model.backend).emulated:
         as_it_comes = load_model(model.path, backend=model.backend, defaults="engine")
         models[_OWN] = as_it_comes.replace(gravity=model.gravity, timestep=model.timestep)
     ways = {

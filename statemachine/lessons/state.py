@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..engines import part
-from ..engines.parts import AsItComes, Term
+from ..engines import room
+from ..engines.records import Term
 from ..interface import JointType, Model, make_data, reset
 from ..page import Page, Question, Slots, Table, Text
 from ..runs.drive import Progress
@@ -83,7 +83,6 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Layout
                 qvel_stop=int(dof) + known.nv,
             )
         )
-    own: AsItComes | None = part(model.backend, "as_it_comes")
     with make_data(model) as data:
         fresh, name, time = data.time, None, None
         if model.keyframes:
@@ -98,7 +97,7 @@ def run(play: CodeRun, options: Mapping[str, Any], progress: Progress) -> Layout
         fresh_time=fresh,
         keyframe=name,
         keyframe_time=time,
-        terms=own.terms(model) if own else (),
+        terms=room(model.backend).terms(model),
         provenance=provenance(model),
     )
 

@@ -6,7 +6,6 @@ each picture: of each side (nbody, 7) float64, xpos and xquat of each body.
 
 from __future__ import annotations
 
-import importlib
 import json
 import os
 import signal
@@ -21,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..drawing.camera import Camera
-from ..drawing.shots import Drawer
+from ..engines import room
 from ..interface import Array
 from .compose import compose, halved
 
@@ -45,7 +44,7 @@ def draw(facts: dict[str, Any], out: Any) -> None:
     camera = Camera(**facts["camera"])
     width, height = facts["size"]
     sharper = facts["sharper"]
-    drawer: Drawer = importlib.import_module(facts["renderer"]).drawer(
+    drawer = room(facts["renderer"]).drawer(
         [Path(file) for file in facts["files"]], (width * sharper, height * sharper), camera
     )
     try:

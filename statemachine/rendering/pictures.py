@@ -17,6 +17,7 @@ import numpy as np
 
 from ..drawing.camera import Camera, framed
 from ..drawing.shots import Pixels
+from ..engines import room
 from ..errors import BadInputError, EngineError
 from ..interface import Array, Model
 from ..runs import Trace
@@ -201,8 +202,8 @@ class LivePictures:
         self._size = size
         self._renderer = renderer
         facts = {
-            "renderer": renderer.room.__name__,
-            "sharper": renderer.room.SHARPER,
+            "renderer": renderer.name,
+            "sharper": room(renderer.name).sharper,
             "files": [str(file) for file in files],
             "bodies": list(bodies),
             "size": size,

@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 
-from ..engines import needed_part, rooms_with
-from ..engines.parts import OpenGLPart, RenderingPart
+from ..engines import room, rooms_with
 from ..errors import MissingEngineError, unknown_name
 from ..installed import DEFAULT, require
 
@@ -25,17 +24,12 @@ class Renderer:
     opengl: str = ""
 
     def __str__(self) -> str:
-        return self.room.label(self.opengl)
-
-    @property
-    def room(self) -> RenderingPart:
-        """What the engine draws with."""
-        return needed_part(self.name, "rendering")
+        return room(self.name).drawn_by(self.opengl)
 
 
 def renderers() -> list[str]:
     """Names of the engines that draw, whether or not they can here; the best first."""
-    return rooms_with("rendering")
+    return rooms_with("drawer")
 
 
 def renderer_here(name: str | None = None) -> Renderer:
@@ -55,8 +49,7 @@ def renderer_here(name: str | None = None) -> Renderer:
     reasons: list[MissingEngineError] = []
     for engine in known if name is None else (name,):
         try:
-            room: RenderingPart = needed_part(engine, "rendering")
-            return Renderer(engine, room.here())
+            return Renderer(engine, room(engine).opengl())
         except MissingEngineError as error:
             reasons.append(error)
     if name is not None:
@@ -69,5 +62,4 @@ def renderer_here(name: str | None = None) -> Renderer:
 
 def environment_of(renderer: Renderer) -> dict[str, str]:
     """The environment of a process that draws; the model is read by the default engine there."""
-    room: OpenGLPart = needed_part(DEFAULT, "rendering")
-    return room.environment(renderer.opengl, dict(os.environ))
+    return room(DEFAULT).drawing_environment(renderer.opengl, dict(os.environ))

@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from ..audit import Audit, Audited
-from ..audit.falls import BOXES, FALL, STEPS
-from ..audit.findings import EACH_OTHER, AuditFinding
-from ..audit.restore import FORGETS, NO_CONTACTS, NOT_RESTORED, RESTORE, WITHOUT
 from ..engines.futures import worst
 from ..measures.text import NONE, count, milliseconds, rough
 from ..page import Block, Page, Table, Text, Verdict
+from ..probes.audit import Audit, Audited
+from ..probes.audit.trials import (
+    BOXES,
+    EACH_OTHER,
+    FALL,
+    FORGETS,
+    NO_CONTACTS,
+    NOT_RESTORED,
+    RESTORE,
+    STEPS,
+    WITHOUT,
+    AuditFinding,
+)
 from .audit_words import cell, sentences
 
 _OF_THE_STATE = (RESTORE, WITHOUT, FORGETS, NO_CONTACTS)

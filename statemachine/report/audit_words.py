@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..audit import Audited
-from ..audit.conclusions import Conclusion, Missing
-from ..audit.look import LOOK
-from ..audit.repeat import AGAIN
 from ..engines.futures import FutureGap, worst
 from ..measures.text import rough
+from ..probes.audit import Audited
+from ..probes.audit.conclusions import Conclusion, Missing
+from ..probes.audit.trials import AGAIN, LOOK
 
 _SAME = "same"
 

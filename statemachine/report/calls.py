@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby, zip_longest
 
-from ..calls import Call, CallRecording, Statement
-from ..engines import needed_part
+from ..engines import room
 from ..engines.call_watch import CallWords
 from ..interface import DERIVED
 from ..measures.text import NONE
 from ..page import Block, Code, Table, Text
+from ..probes.calls import Call, CallRecording, Statement
 
 _MOST_NAMES = 8  # of what a call changed
 _MOST_ROWS = 6  # of the calls on one thing, before those that changed nothing share one
@@ -138,7 +138,7 @@ def _names(changed: Sequence[str]) -> str:
 
 
 def _words(engine: str) -> CallWords:
-    return needed_part(engine, "calls").WORDS
+    return room(engine).call_watch().words
 
 
 def _legend(recordings: Mapping[str, CallRecording]) -> Iterator[Text]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from html import escape
 
-from ..conventions.phrasebook import CONCEPTS, Phrasebook
+from ..probes.phrasebook import CONCEPTS, Phrasebook
 
 # With this library, concept by concept: a program, as the engines' own cells are.
 OURS = {

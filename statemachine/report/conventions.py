@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..conventions import Answered, Conventions
-from ..conventions.phrasebook import CONCEPTS, Phrasebook
 from ..engines.measured import Measurement
 from ..measures.text import reading, significant
 from ..page import Block, Page, Table, Text, Verdict
+from ..probes.conventions import Answered, Conventions
+from ..probes.phrasebook import CONCEPTS, Phrasebook
 
 _ZERO = 1e-12
 _NOT_ASKED = "not asked"

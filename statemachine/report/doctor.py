@@ -8,8 +8,7 @@ import subprocess
 import sys
 from dataclasses import dataclass, replace
 
-from ..engines import needed_part
-from ..engines.parts import OpenGLPart
+from ..engines import room
 from ..installed import DEFAULT, ENGINES, engine_version, wheel_here
 from ..page import Page, Table, Text, Verdict
 
@@ -163,8 +162,7 @@ def _imported(name: str, code: str, optional: bool) -> HealthCheck:
 
 
 def _rendering() -> HealthCheck:
-    room: OpenGLPart = needed_part(DEFAULT, "rendering")
-    works, found, step = room.diagnosis()
+    works, found, step = room(DEFAULT).drawing_diagnosis()
     return HealthCheck("rendering", works, found, step, optional=True)
 
 

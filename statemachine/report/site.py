@@ -9,7 +9,6 @@ from pathlib import Path
 from ..backends import backend_names, load
 from ..compare import Request, compare, series, sides_of, witness
 from ..compare.why import attribute
-from ..conventions import phrasebook, probe
 from ..errors import MissingEngineError
 from ..installed import available
 from ..lessons import LESSONS
@@ -17,6 +16,8 @@ from ..lessons.pictures import with_picture
 from ..lessons.session import page_of_lesson, take
 from ..measures.text import reading
 from ..page import Page, Picture, RobotPicture, Traces, Verdict
+from ..probes import phrasebook
+from ..probes.conventions import probe
 from ..runs.scenarios import scenario
 from ..runs.whole import replace_bytes
 from . import compare as comparison

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ..backends import backend_names, load
-from ..engines import part
+from ..engines import room
 from ..engines.auditing import SavePoint
 from ..errors import (
     BadInputError,
@@ -28,11 +28,12 @@ from ..errors import (
     UnsupportedError,
 )
 from ..installed import DEFAULT, WITNESS, require
-from ..interface import Array, Data, Model, get_state, make_data, reset, set_state, step
+from ..interface import Model, make_data, reset, step
 from ..lessons.fingertip import certify
 from ..lessons.in_turns import Ratio, in_turns
+from ..probes.audit import trials
+from ..probes.audit.interface_driver import InterfaceDriver
 from ..runs import record_scenario
-from ..runs.drive import drive
 from ..runs.scenarios import scenario
 from ..runs.whole import replace_text
 from . import gaps
@@ -165,30 +166,28 @@ class _Examination:
         self.row = replace(self.row, **sizes)
 
     def _equals_engine(self, model: Model) -> bool | None:
-        plain = part(model.backend, "plain")
-        if plain is None:
+        own = room(model.backend)
+        if not own.can("plain_run"):
             return None
         orders = gaps.commands(model, _SAME, self.seed)
         rows, _ = gaps.run(model, orders)
-        theirs = plain.run(self.path, orders[: len(rows) - 1], gaps.keyframe_of(model))
+        theirs = own.plain_run(self.path, orders[: len(rows) - 1], gaps.keyframe_of(model))
         return None if theirs is None else rows.tobytes() == theirs[: len(rows)].tobytes()
 
     def _restores(self, model: Model) -> bool | None:
         """Whether two futures of a State are one, and that of the run itself if promised."""
-        orders = gaps.commands(model, 2 * _FUTURE, self.seed)
-        ends = []
+        driver = InterfaceDriver(model, self.seed)
+        point = self._start(model, _FUTURE)
+        way = replace(driver.save_methods(point)[-1], travels=False)
+        found = trials.tried(driver, driver.run(point, _FUTURE), way)
+        return all(finding.holds for finding in found)
+
+    def _start(self, model: Model, run_in: int) -> SavePoint:
+        """The start of a run, under the first command."""
+        ctrl = gaps.commands(model, 1, self.seed)[0]
         with make_data(model) as data:
             reset(model, data, gaps.keyframe_of(model))
-            _follow(model, data, orders[:_FUTURE])
-            state = get_state(model, data)
-            for again in range(3):
-                if again:
-                    set_state(model, data, state)
-                _follow(model, data, orders[_FUTURE:])
-                ends.append(get_state(model, data))
-        if model.capabilities.exact_restore and ends[0] != ends[1]:
-            return False
-        return ends[1] == ends[2]
+            return SavePoint("start", "", model, data.qpos.copy(), data.qvel.copy(), ctrl, run_in)
 
     def _gaps(self) -> None:
         """Each other backend against the default one."""
@@ -212,28 +211,23 @@ class _Examination:
 
     def _cost(self, model: Model) -> float | None:
         """Time of a step over that of the engine, driven by its own functions, in turns."""
-        audit = part(model.backend, "audit")
-        if audit is None or not model.nv:
+        engine = room(model.backend).driver(model, self.seed) if model.nv else None
+        if engine is None:
             return None
-        engine = audit.driver(model, self.seed)
-        ctrl = gaps.commands(model, 1, self.seed)[0]
-        with make_data(model) as data:
-            reset(model, data, gaps.keyframe_of(model))
-            point = SavePoint("start", "", model, data.qpos.copy(), data.qvel.copy(), ctrl, 0)
-            data.ctrl[:] = ctrl
-            with engine.at(point) as machine:
+        point = self._start(model, 0)
+        with InterfaceDriver(model, self.seed).at(point) as data, engine.at(point) as machine:
 
-                def ours(steps: int) -> None:
-                    for _ in range(steps):
-                        step(model, data)
+            def ours(steps: int) -> None:
+                for _ in range(steps):
+                    step(model, data)
 
-                first = in_turns({"": lambda: ours(3)}, 2)[""][-1] / 3
-                steps = max(1, min(500, round(_TURN / max(first, 1e-7))))
-                ways = {
-                    "ours": lambda: ours(steps),
-                    "alone": lambda: engine.advance(machine, steps),
-                }
-                times = in_turns(ways, _ROUNDS, seed=self.seed)
+            first = in_turns({"": lambda: ours(3)}, 2)[""][-1] / 3
+            steps = max(1, min(500, round(_TURN / max(first, 1e-7))))
+            ways = {
+                "ours": lambda: ours(steps),
+                "alone": lambda: engine.advance(machine, steps),
+            }
+            times = in_turns(ways, _ROUNDS, seed=self.seed)
         return round(Ratio.of("", times["ours"], times["alone"]).median, 3)
 
 
@@ -253,12 +247,6 @@ def _witness_row(model: Model, seed: int) -> WitnessRow:
     if gap is None:  # its frame is another one than the engine's
         gap = float("inf") if found.frames is None else found.frames.distance
     return WitnessRow(found.grade, found.reason, len(found.tips), gap)
-
-
-def _follow(model: Model, data: Data, orders: Array) -> None:
-    error = drive(model, data, gaps.in_order(orders), len(orders))
-    if error is not None:
-        raise error
 
 
 def _features(error: StateMachineError) -> tuple[str, ...]:

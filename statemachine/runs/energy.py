@@ -7,8 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..backends import on_default
-from ..engines import needed_part
-from ..engines.parts import EnergyPart
+from ..engines import room
 from ..errors import StateMachineError
 from ..installed import DEFAULT
 from ..interface import Array, Model
@@ -51,8 +50,7 @@ def energies(
                 )
             elif gravity is not None:
                 yardstick = yardstick.replace(gravity=gravity)
-        room: EnergyPart = needed_part(DEFAULT, "energy")
-        found = room.energies(yardstick, qpos, qvel)
+        found = room(DEFAULT).energies(yardstick, qpos, qvel)
     except StateMachineError:
         return unknown
     return found, f"{DEFAULT} {yardstick.engine_version}"

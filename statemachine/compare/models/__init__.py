@@ -3,7 +3,7 @@
 `read` makes a description of a file, `compare` says where two of them differ:
 
 - `..description` has the records, the reader of URDF, rigid groups and which joint is which; an
-  engine's own is the part `reading` of its room
+  engine's own is read by its room
 - `diff`: every difference with its size, entered into a `ledger`; by subject in `_places`,
   `_joints`, `_solids`, `_shapes`, `_settings`
 - `_one_list`, `_told`: joins that with the list of compiled models that `..why` explains a gap with
@@ -26,8 +26,7 @@ from ...description import urdf
 from ...description.match import renamed
 from ...description.records import Robot
 from ...description.tree import GroupTree
-from ...engines import needed_part, part, rooms_with
-from ...engines.parts import CompilerPart, ReadingPart
+from ...engines import room, rooms_with
 from ...errors import UnsupportedError, unknown_name
 from ...installed import DEFAULT
 from ...models import SUFFIXES, resolve
@@ -129,19 +128,18 @@ def read(
     if engine is None:
         if path.suffix.lower() == ".urdf":
             return urdf.read(path)
-        compiler: CompilerPart = needed_part(DEFAULT, "reading")
-        return compiler.read_file(path, name)
+        return room(DEFAULT).read_file(path, name)
     backend_engine(engine)
-    room: ReadingPart | None = part(engine, "reading")
-    if room is None:
-        known = ", ".join(rooms_with("reading"))
+    own = room(engine)
+    if not own.can("read"):
+        known = ", ".join(rooms_with("read"))
         raise UnsupportedError(
             f"what {engine} makes of a file cannot be read here; known: {known}",
             backend=engine,
             feature="description",
             reason="no reader",
         )
-    return room.read(path, name)
+    return own.read(path, name)
 
 
 def compare(

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ...backends import load
-from ...engines.model_differences import ModelDifference
+from ...engines.records import ModelDifference
 from ...errors import StateMachineError
 from ...interface import Model
 from ...measures.text import few, rounded

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ... import conventions
-from ...engines import part
+from ...engines import room
+from ...probes import conventions
 
 # Of the conventions, those that stand between a description and what comes of it.
 _ASKED = ("actuation", "damping", "friction")
@@ -13,7 +13,7 @@ def own_ways(one: str | None, two: str | None) -> tuple[tuple[str, str, str], ..
     """For each question that two engines answer otherwise: its title, and both answers."""
     if one is None or two is None or one == two:
         return ()
-    if any(part(engine, "conventions") is None for engine in (one, two)):
+    if not all(room(engine).can("measurement") for engine in (one, two)):
         return ()
     asked = conventions.probe((one, two), _ASKED)
     found = []

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from ...engines import needed_part
-from ...engines.model_differences import DifferencesPart, Edit, ModelDifference
+from ...engines import room
+from ...engines.records import Edit, ModelDifference
 from ...installed import DEFAULT
 from ...interface import Model
 from ..matching import Matched
@@ -55,12 +55,12 @@ def differences_of(
         finer: By single entries, where they can be brought over one by one.
         sensors: Whether sensors count, which act on nothing but a controller that reads them.
     """
-    room: DifferencesPart = needed_part(DEFAULT, "differences")
-    found = list(room.differences(one.compiled, two.compiled, matched, world=world))
+    own = room(DEFAULT)
+    found = list(own.differences(one.compiled, two.compiled, matched, world=world))
     if sensors:
         found += sensors_of(matched)
     if finer:
-        found = [part for each in found for part in room.entries(two.compiled, each)]
+        found = [part for each in found for part in own.entries(two.compiled, each)]
     for side, only in enumerate(matched.only):
         for name in only.get("joint", ()):
             values = (("joint", "there", None) if side == 0 else ("joint", None, "there"),)
@@ -71,8 +71,7 @@ def differences_of(
 
 def sensors_of(matched: Matched) -> list[ModelDifference]:
     """What the sensors of two Models differ in, which only a controller reads."""
-    room: DifferencesPart = needed_part(DEFAULT, "differences")
-    return room.sensors(matched.one.compiled, matched.two.compiled, matched)
+    return room(DEFAULT).sensors(matched.one.compiled, matched.two.compiled, matched)
 
 
 def built(model: Model, edits: tuple[Edit, ...]) -> Model:
@@ -83,8 +82,7 @@ def built(model: Model, edits: tuple[Edit, ...]) -> Model:
     """
     if not edits:
         return model
-    room: DifferencesPart = needed_part(DEFAULT, "differences")
-    return model.with_compiled(room.edited(model.compiled, edits))
+    return model.with_compiled(room(DEFAULT).edited(model.compiled, edits))
 
 
 def causes(differences: Iterable[ModelDifference], finer: bool = False) -> tuple[Cause, ...]:

@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...engines import part
-from ...engines.parts import Dials, DialsPart, Setting
+from ...engines import room
+from ...engines.records import Dials, Setting
 from ...errors import UnsupportedError
 from ...interface import Model
 from ...measures.text import milliseconds, rounded, significant
@@ -79,7 +79,7 @@ class ModelSide:
                 return "the other engine has nothing that corresponds"
             if factor.name == "surfaces":
                 able = _raw(self._as_it_comes, "geom_friction") is not None
-                able = able or part(self._base.backend, "dials") is not None
+                able = able or room(self._base.backend).can("frictionless")
                 return "" if able else f"{self._base.backend} has no way to set friction"
             if missing:
                 return f"{self._base.backend} cannot leave it out"
@@ -134,8 +134,7 @@ class ModelSide:
         options = {**self._options, **options}
         model = model.replace(**options) if options else model
         smoothed = "surfaces" in changes and changes["surfaces"].how == "off"
-        dials: DialsPart | None = part(model.backend, "dials") if smoothed else None
-        return dials.frictionless(model) if dials else model
+        return room(model.backend).frictionless(model) if smoothed else model
 
     def _off(self, factor: Factor) -> dict[str, Any]:
         if factor.name == "gravity":
@@ -215,8 +214,7 @@ AdjustableSide = ModelSide | EngineSide  # a side that `attribute` can build wit
 
 def side_of(model: Model, options: Mapping[str, Any]) -> AdjustableSide:
     """The side of a Model, in an experiment with some options."""
-    own: DialsPart | None = part(model.backend, "dials")
-    dials = own.dials(model, options) if own else None
+    dials = room(model.backend).dials(model, options)
     return EngineSide(model, options, dials) if dials else ModelSide(model, options)
 
 

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from ...backends import load
-from ...engines.model_differences import Edit, ModelDifference
+from ...engines.records import Edit, ModelDifference
 from ...errors import DivergedError, EngineError, ModelError, UnsupportedError
 from ...installed import DEFAULT
 from ...interface import Array, Model

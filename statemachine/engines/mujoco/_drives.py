@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..model_differences import Edit, ModelDifference
+from ..records import Edit, ModelDifference
 from . import _fields as fields
 from ._element_pairs import ElementPairs, switched_off
 from ._figures import plain, same

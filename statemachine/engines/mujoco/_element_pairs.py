@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..model_differences import Counterparts, Edit, ModelDifference
+from ..records import Counterparts, Edit, ModelDifference
 from . import _fields as fields
 from ._figures import differing
 from ._solid import Solids, name_of, solids_of

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from ...installed import require
-from ..model_differences import Edit, ModelDifference
+from ..records import Edit, ModelDifference
 from . import _fields as fields
 from ._element_pairs import ElementPairs, switched_off
 from ._figures import plain, same

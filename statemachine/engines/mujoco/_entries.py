@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..model_differences import Edit, ModelDifference
+from ..records import Edit, ModelDifference
 from ._figures import plain, same
 
 # Fields whose entries mean something one by one, and what each is called; a name with {} is of all.

@@ -12,7 +12,7 @@ from ...description.records import HERE, Placement
 from ...installed import require
 from ...interface import Array
 from ...measures.text import few
-from ..model_differences import BodyPair, Counterparts, Edit, ModelDifference
+from ..records import BodyPair, Counterparts, Edit, ModelDifference
 from . import _meshes as meshes
 from ._element_pairs import switched_off
 from ._figures import plain, same

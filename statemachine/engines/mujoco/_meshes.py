@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...interface import Array
-from ..model_differences import Edit, ModelDifference
+from ..records import Edit, ModelDifference
 from ._figures import same
 
 VERTEX = 1e-6  # [m]: vertices are single precision

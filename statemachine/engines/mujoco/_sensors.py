@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...installed import require
-from ..model_differences import Counterparts, Edit, ModelDifference
+from ..records import Counterparts, Edit, ModelDifference
 from ._element_pairs import ElementPairs
 from ._figures import plain, same
 

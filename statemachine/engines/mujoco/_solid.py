@@ -11,7 +11,7 @@ from ...description.records import HERE, Inertial, Placement
 from ...installed import require
 from ...interface import Array
 from ...rotations import matrix_from_quat
-from ..model_differences import BodyPair, Counterparts
+from ..records import BodyPair, Counterparts
 
 SLIDE, HINGE = 2, 3  # mjtJoint
 NEAR = 1e-10  # [m], and of entries of matrices: less is rounding

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...description.records import HERE, Inertial, Placement
 from ...interface import Array
-from ..model_differences import BodyPair, Edit, ModelDifference
+from ..records import BodyPair, Edit, ModelDifference
 from ._figures import plain, same
 from ._solid import NEAR, SolidPairs, apart, name_of, quat_of
 

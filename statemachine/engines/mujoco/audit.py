@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from importlib import import_module
 from typing import Any
 
@@ -14,24 +13,10 @@ import numpy as np
 from ...installed import require
 from ...interface import Array, Model
 from ..auditing import ONLY, Disturbance, Driver, Measured, Restore, SaveMethod, SavePoint
-from ..futures import Coordinates, coordinates_of
 
 # What another past may have left in them, as a part of the weight or inertia that it acts on.
 _PUSH = 0.1
 _SEVERAL, _THREADS = 3, 2  # simulations, and threads, of the engine's own pools
-
-
-@dataclass
-class Simulation:
-    """An MjData and the MjModel that it belongs to."""
-
-    model: Any
-    data: Any
-
-
-def driver(model: Model, seed: int) -> Driver:
-    """The engine itself, to be audited with a model; `seed`: of what it does of its own."""
-    return MujocoDriver(model, seed)
 
 
 class MujocoDriver(Driver):
@@ -59,38 +44,21 @@ class MujocoDriver(Driver):
             and self.mj.mj_stateSize(model.raw, int(bit))
         }
 
-    @cached_property
-    def coordinates(self) -> Coordinates:
-        return coordinates_of(self.model)
+    def fresh(self, point: SavePoint) -> Any:
+        return self.mj.MjData(point.model.raw)
 
-    def fresh(self, point: SavePoint) -> Simulation:
-        return Simulation(point.model.raw, self.mj.MjData(point.model.raw))
+    def close(self, machine: Any) -> None:
+        """It goes with its last name."""
 
-    def close(self, machine: Simulation) -> None:
-        machine.data = None
+    def reset(self, machine: Any) -> None:
+        self.mj.mj_resetData(machine.model, machine)
 
-    def reset(self, machine: Simulation) -> None:
-        self.mj.mj_resetData(machine.model, machine.data)
+    def advance(self, machine: Any, nstep: int = 1) -> None:
+        self.mj.mj_step(machine.model, machine, nstep)
 
-    def start(self, machine: Simulation, point: SavePoint) -> None:
-        data = machine.data
-        data.qpos[:], data.qvel[:], data.ctrl[:] = point.qpos, point.qvel, point.ctrl
-
-    def command(self, machine: Simulation, ctrl: Array) -> None:
-        machine.data.ctrl[:] = ctrl
-
-    def advance(self, machine: Simulation, nstep: int = 1) -> None:
-        self.mj.mj_step(machine.model, machine.data, nstep)
-
-    def read(self, machine: Simulation) -> Array:
-        return np.concatenate((machine.data.qpos, machine.data.qvel))
-
-    def time(self, machine: Simulation) -> float:
-        return float(machine.data.time)
-
-    def leave_traces(self, machine: Simulation, point: SavePoint) -> None:
+    def leave_traces(self, machine: Any, point: SavePoint) -> None:
         """Every component that stepping does not change is left at something else."""
-        model, data = machine.model, machine.data
+        model, data = machine.model, machine
         rng = np.random.default_rng(self.seed + 2)
         around = partial(rng.uniform, -_PUSH, _PUSH)
         data.time += 1.0
@@ -102,9 +70,9 @@ class MujocoDriver(Driver):
         data.eq_active[:] = 1 - data.eq_active
 
     def _measure(self, point: SavePoint) -> Measured:
-        with self.at(point) as machine:
-            self.mj.mj_forward(machine.model, machine.data)
-            data, kind = machine.data, self.mj.mjtConstraint
+        with self.at(point) as data:
+            self.mj.mj_forward(data.model, data)
+            kind = self.mj.mjtConstraint
             return Measured(
                 point.name,
                 point.how,
@@ -144,36 +112,36 @@ class MujocoDriver(Driver):
         """The candidate of a mask of components."""
 
         @contextmanager
-        def save(machine: Simulation) -> Iterator[Restore]:
+        def save(machine: Any) -> Iterator[Restore]:
             kept = self.saved(machine, spec)
-            yield lambda other: self.mj.mj_setState(other.model, other.data, kept, spec)
+            yield lambda other: self.mj.mj_setState(other.model, other, kept, spec)
 
         return SaveMethod(name, save, left_out)
 
-    def saved(self, machine: Simulation, spec: int) -> Array:
+    def saved(self, machine: Any, spec: int) -> Array:
         """The components of a mask, as the engine gives them."""
         kept = np.empty(self.mj.mj_stateSize(machine.model, spec))
-        self.mj.mj_getState(machine.model, machine.data, kept, spec)
+        self.mj.mj_getState(machine.model, machine, kept, spec)
         return kept
 
     @contextmanager
-    def _copied(self, machine: Simulation) -> Iterator[Restore]:
+    def _copied(self, machine: Any) -> Iterator[Restore]:
         kept = self.mj.MjData(machine.model)
-        self.mj.mj_copyData(kept, machine.model, machine.data)
-        yield lambda other: self.mj.mj_copyData(other.data, other.model, kept)
+        self.mj.mj_copyData(kept, machine.model, machine)
+        yield lambda other: self.mj.mj_copyData(other, other.model, kept)
 
     def disturbances(self, point: SavePoint) -> tuple[Disturbance, ...]:
         mj = self.mj
 
-        def halves(machine: Simulation) -> None:
-            mj.mj_step1(machine.model, machine.data)
-            mj.mj_step2(machine.model, machine.data)
+        def halves(machine: Any) -> None:
+            mj.mj_step1(machine.model, machine)
+            mj.mj_step2(machine.model, machine)
 
         # The engine's manual keeps the two halves for integrators of one stage.
         one_stage = int(point.model.raw.opt.integrator) != int(mj.mjtIntegrator.mjINT_RK4)
         return (
-            Disturbance("mj_forward", lambda m: mj.mj_forward(m.model, m.data)),
-            Disturbance("mj_inverse", lambda m: mj.mj_inverse(m.model, m.data), promised=False),
+            Disturbance("mj_forward", lambda m: mj.mj_forward(m.model, m)),
+            Disturbance("mj_inverse", lambda m: mj.mj_inverse(m.model, m), promised=False),
             Disturbance("mj_getState", lambda m: self.saved(m, self.whole)),
             Disturbance("mj_step1, mj_step2 for mj_step", halves, promised=one_stage, instead=True),
         )
@@ -189,7 +157,7 @@ class MujocoDriver(Driver):
         with self.at(point) as machine:
             start = self.saved(machine, int(state.mjSTATE_FULLPHYSICS))
             inputs = self.saved(machine, user)
-            warm, first = np.array(machine.data.qacc_warmstart), self.read(machine)
+            warm, first = np.array(machine.qacc_warmstart), self.read(machine)
         out, _ = import_module("mujoco.rollout").rollout(
             model,
             [self.mj.MjData(model) for _ in range(_THREADS)],

@@ -12,11 +12,6 @@ from ...backends import mujoco_backend
 from ...interface import DERIVED, INPUTS, Data, Model
 from ..call_watch import FUNCTIONS, CallWatch, CallWords, Contents, WatchedObject, entries, named
 
-WORDS = CallWords(
-    shown="the arrays, counts and options of MjData and MjModel",
-    step="mj_step",
-)
-
 _OURS = ("time", *INPUTS, *DERIVED)
 # What comes before the rest in a list of what changed.
 _FIRST = (*_OURS, "contact", "ncon", "act", "sensordata", "qacc_warmstart", "xmat", "geom_xpos")
@@ -115,8 +110,14 @@ def _fields(data: Any) -> tuple[str, ...]:
     return (*order, *(name for name in names if name not in order))
 
 
-class _MujocoWatch(CallWatch):
+class MujocoWatch(CallWatch):
+    """A watch on MuJoCo."""
+
     engine = "mujoco"
+    words = CallWords(
+        shown="the arrays, counts and options of MjData and MjModel",
+        step="mj_step",
+    )
 
     def __init__(self) -> None:
         self._module: Any = mujoco_backend.mujoco
@@ -190,8 +191,3 @@ class _MujocoWatch(CallWatch):
 
 
 _METHODS = ("instancemethod", "staticmethod", "function")
-
-
-def watch() -> CallWatch:
-    """A watch on MuJoCo."""
-    return _MujocoWatch()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -10,9 +10,9 @@ import numpy as np
 
 from ...installed import require
 from ...interface import Array
-from ..measured import Futures, LetGo, Measurement, OneStep, ReadTwice, Sliding
+from ..measured import LetGo, Measurement, OneStep, ReadTwice, Sliding
 from ..samples import floor, joint_tree, marked, pendulum
-from . import pile
+from .pile import MujocoPile
 
 
 def _loaded(text: str) -> tuple[Any, Any, Any]:
@@ -59,7 +59,7 @@ def timestep() -> OneStep:
     mj, model, data = _loaded(marked.MJCF)
     data.qvel[0] = 1
     mj.mj_step(model, data)
-    return OneStep(model.opt.timestep, float(data.qpos[0]), "data.time", float(data.time))
+    return (model.opt.timestep, float(data.qpos[0]), "data.time", float(data.time))
 
 
 def actuation(seconds: float) -> list[LetGo]:
@@ -72,7 +72,7 @@ def actuation(seconds: float) -> list[LetGo]:
         mj, model, data = _loaded(pendulum.MJCF % actuator)
         mj.mj_step(model, data, round(seconds / model.opt.timestep))
         torque = Measurement("it exerts", float(data.qfrc_actuator[0]), "N·m")
-        runs.append(LetGo(part, float(data.qpos[0]), data.time, (torque,) if actuator else ()))
+        runs.append((part, float(data.qpos[0]), data.time, (torque,) if actuator else ()))
     return runs
 
 
@@ -112,14 +112,14 @@ def write(angle: float, deep: float) -> list[ReadTwice]:
     data.qpos[0] = angle
     read = np.array(data.site("tip").xpos)
     mj.mj_forward(model, data)
-    tip = ReadTwice("the tip", read, np.array(data.site("tip").xpos), pendulum.tip_at(angle))
+    tip = ("the tip", read, np.array(data.site("tip").xpos), pendulum.tip_at(angle))
 
     mj, model, data = _loaded(floor.BALL)
     mj.mj_forward(model, data)
     data.qpos[2] = floor.RADIUS - deep
     depth = _depth(data)
     mj.mj_forward(model, data)
-    return [tip, ReadTwice("the contact", depth, _depth(data), deep)]
+    return [tip, ("the contact", depth, _depth(data), deep)]
 
 
 def step(speed: float, deep: float) -> list[ReadTwice]:
@@ -130,7 +130,7 @@ def step(speed: float, deep: float) -> list[ReadTwice]:
     read = np.array(data.site("tip").xpos)
     mj.mj_kinematics(model, data)
     true = pendulum.tip_at(data.qpos[0])
-    tip = ReadTwice("the tip", read, np.array(data.site("tip").xpos), true)
+    tip = ("the tip", read, np.array(data.site("tip").xpos), true)
 
     mj, model, data = _loaded(floor.BALL)
     data.qpos[2], data.qvel[2] = floor.RADIUS - deep, speed
@@ -138,7 +138,7 @@ def step(speed: float, deep: float) -> list[ReadTwice]:
     depth = _depth(data)
     mj.mj_forward(model, data)
     now = max(floor.RADIUS - float(data.qpos[2]), 0.0)
-    return [tip, ReadTwice("the contact", depth, _depth(data), now)]
+    return [tip, ("the contact", depth, _depth(data), now)]
 
 
 def joints() -> dict[str, list[str]]:
@@ -149,17 +149,6 @@ def joints() -> dict[str, list[str]]:
         name = partial(mj.mj_id2name, model, mj.mjtObj.mjOBJ_JOINT)
         names[form] = [name(joint) for joint in range(model.njnt)]
     return names
-
-
-def reset() -> dict[str, dict[str, bool]]:
-    """Every quantity changed, then mj_resetData."""
-    mj, model, data = pile.build()
-    bodies = model.nbody
-    mj.mj_step(model, data, 300)
-    written = pile.write(model, data, 0.125)
-    mj.mj_resetData(model, data)
-    same = pile.same(written, pile.read(model, data))
-    return {"mj_resetData": {**same, "bodies": model.nbody == bodies}}
 
 
 def friction() -> dict[str, Sliding]:
@@ -181,38 +170,4 @@ def friction() -> dict[str, Sliding]:
     return {"equal priority": speed, "the block has priority": partial(speed, priority=1)}
 
 
-def save() -> dict[str, dict[str, bool]]:
-    """Every quantity changed, saved, changed again, restored."""
-    mj, model, data = pile.build()
-    mj.mj_step(model, data, 100)
-    back = {}
-    for name, way in pile.ways_to_save(mj, model, data).items():
-        before = pile.write(model, data, 0.125)
-        restore = way()
-        pile.write(model, data, 0.125)
-        restore()
-        back[name] = pile.same(before, pile.read(model, data))
-    return back
-
-
-def future(moments: Sequence[float], steps: int) -> Mapping[str, Sequence[Futures]]:
-    """Boxes that fall, set back to the start or to moments in the middle."""
-    mj, model, data = pile.build()
-
-    def run(count: int = steps) -> Array:
-        return pile.run(mj, model, data, count)
-
-    def middle(save: Callable[[], Callable[[], None]], moment: float) -> Futures:
-        mj.mj_resetData(model, data)
-        run(round(moment / model.opt.timestep))
-        restore = save()
-        first = run()
-        restore()
-        return first, run()
-
-    first = run()
-    mj.mj_resetData(model, data)
-    trials = {"mj_resetData": [(first, run())]}
-    for name, save in pile.ways_to_save(mj, model, data).items():
-        trials[name] = [middle(save, moment) for moment in moments]
-    return trials
+reset, save, future = MujocoPile.reset, MujocoPile.save, MujocoPile.future

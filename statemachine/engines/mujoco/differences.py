@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...installed import require
-from ..model_differences import Counterparts, Edit, ModelDifference
+from ..records import Counterparts, Edit, ModelDifference
 from . import _fields as fields
 from ._contact_pairs import ContactPairs
 from ._drives import Drives

@@ -4,14 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..phrases import ANGLE, TORQUE, Cell, accelerated, near
+from ..measured import ANGLE, TORQUE, Cell, Phrases, accelerated, near
 from ..samples.pendulum import MJCF, acceleration, tip_at
-
-FILE = ("arm.xml", MJCF % '<actuator><motor joint="j"/></actuator>')
-
-
-def close(_n: Any) -> None:
-    """Nothing: a Model and a Data go with their last name."""
 
 
 def _loaded(n: Any) -> bool:
@@ -61,7 +55,7 @@ def _apart(n: Any) -> bool:
     return [world.time for world in n.worlds] == [0, n.m.opt.timestep, 0]
 
 
-CELLS = {
+_CELLS = {
     "load": Cell(
         "import mujoco\n"
         "import numpy as np\n"
@@ -85,3 +79,7 @@ CELLS = {
     ),
     "many worlds": Cell("worlds = [mujoco.MjData(m) for _ in range(3)]", _apart),
 }
+PHRASES = Phrases(
+    ("arm.xml", MJCF % '<actuator><motor joint="j"/></actuator>'),
+    _CELLS,
+)

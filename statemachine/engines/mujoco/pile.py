@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ...installed import require
 from ...interface import Array
-from ..samples.pile import HALF, PLACES, TILT
+from ..samples.pile import HALF, PLACES, TILT, Pile
 
 MJCF = f"""<mujoco><worldbody><geom type="plane" size="5 5 1"/>
 {
@@ -23,7 +24,7 @@ MJCF = f"""<mujoco><worldbody><geom type="plane" size="5 5 1"/>
 <actuator><position joint="j" kp="20"/></actuator></mujoco>"""
 
 # What decides the future, by where the engine has it; the last two belong to the Model.
-QUANTITIES = {
+_FIELDS = {
     "time": "time",
     "qpos": "qpos",
     "qvel": "qvel",
@@ -35,68 +36,75 @@ QUANTITIES = {
 }
 
 
-def build() -> tuple[Any, Any, Any]:
-    """The engine, a Model and a fresh Data."""
-    mj = require("mujoco")
-    model = mj.MjModel.from_xml_string(MJCF)
-    return mj, model, mj.MjData(model)
+def _copied(scene: MujocoPile) -> Iterator[Callable[[], object]]:
+    data = scene.data
+    qpos, qvel = np.array(data.qpos), np.array(data.qvel)
+
+    def restore() -> None:
+        data.qpos[:], data.qvel[:] = qpos, qvel
+
+    yield restore
 
 
-def read(model: Any, data: Any) -> dict[str, Array]:
-    """A copy of each quantity."""
-    return {
-        name: np.array(getattr(_owner(model, data, field), field))
-        for name, field in QUANTITIES.items()
+def _state(part: str) -> Callable[[MujocoPile], Iterator[Callable[[], object]]]:
+    """The components of a mask of mjtState."""
+
+    def saved(scene: MujocoPile) -> Iterator[Callable[[], object]]:
+        mj, model, data = scene.mj, scene.model, scene.data
+        mask = getattr(mj.mjtState, part)
+        kept = np.empty(mj.mj_stateSize(model, mask))
+        mj.mj_getState(model, data, kept, mask)
+        yield lambda: mj.mj_setState(model, data, kept, mask)
+
+    return saved
+
+
+class MujocoPile(Pile):
+    """A Model and a Data."""
+
+    quantities = tuple(_FIELDS)
+    resets: ClassVar = {
+        "mj_resetData": lambda scene: scene.mj.mj_resetData(scene.model, scene.data)
+    }
+    ways_to_save: ClassVar = {
+        "qpos and qvel copied": contextmanager(_copied),
+        "mjSTATE_FULLPHYSICS": contextmanager(_state("mjSTATE_FULLPHYSICS")),
+        "mjSTATE_INTEGRATION": contextmanager(_state("mjSTATE_INTEGRATION")),
     }
 
+    def __init__(self) -> None:
+        self.mj: Any = require("mujoco")
+        self.model = self.mj.MjModel.from_xml_string(MJCF)
+        self.data = self.mj.MjData(self.model)
 
-def write(model: Any, data: Any, amount: float) -> dict[str, Array]:
-    """Add an amount to every number of every quantity; what they are then."""
-    for field in QUANTITIES.values():
-        owner = _owner(model, data, field)
-        setattr(owner, field, getattr(owner, field) + amount)
-    return read(model, data)
+    @classmethod
+    @contextmanager
+    def fresh(cls) -> Iterator[MujocoPile]:
+        yield cls()
 
+    @property
+    def timestep(self) -> float:
+        return self.model.opt.timestep
 
-def same(left: dict[str, Array], right: dict[str, Array]) -> dict[str, bool]:
-    """Which quantities are the same in both, bit by bit."""
-    return {name: np.array_equal(left[name], right[name]) for name in QUANTITIES}
+    def bodies(self) -> int:
+        return self.model.nbody
 
+    def _owner(self, field: str) -> Any:
+        return self.data if hasattr(self.data, field) else self.model.opt
 
-def run(mj: Any, model: Any, data: Any, steps: int) -> Array:
-    """Go on, and give qpos (steps, nq) after every step."""
-    trace = []
-    for _ in range(steps):
-        mj.mj_step(model, data)
-        trace.append(np.array(data.qpos))
-    return np.array(trace)
+    def write(self, quantity: str, value: float) -> None:
+        """Every number of it."""
+        owner, field = self._owner(_FIELDS[quantity]), _FIELDS[quantity]
+        setattr(owner, field, 0 * getattr(owner, field) + value)
 
+    def read(self, quantity: str) -> float:
+        """The number of which all are; NaN if they differ."""
+        values = np.ravel(getattr(self._owner(_FIELDS[quantity]), _FIELDS[quantity]))
+        return float(values[0]) if (values == values[0]).all() else np.nan
 
-def ways_to_save(mj: Any, model: Any, data: Any) -> dict[str, Callable[[], Callable[[], None]]]:
-    """Functions that save, by name; each gives the function that restores."""
-
-    def copies() -> Callable[[], None]:
-        qpos, qvel = np.array(data.qpos), np.array(data.qvel)
-
-        def restore() -> None:
-            data.qpos[:], data.qvel[:] = qpos, qvel
-
-        return restore
-
-    def state(part: Any) -> Callable[[], Callable[[], None]]:
-        def save() -> Callable[[], None]:
-            kept = np.empty(mj.mj_stateSize(model, part))
-            mj.mj_getState(model, data, kept, part)
-            return lambda: mj.mj_setState(model, data, kept, part)
-
-        return save
-
-    return {
-        "qpos and qvel copied": copies,
-        "mjSTATE_FULLPHYSICS": state(mj.mjtState.mjSTATE_FULLPHYSICS),
-        "mjSTATE_INTEGRATION": state(mj.mjtState.mjSTATE_INTEGRATION),
-    }
-
-
-def _owner(model: Any, data: Any, field: str) -> Any:
-    return data if hasattr(data, field) else model.opt
+    def run(self, steps: int) -> Array:
+        trace = []
+        for _ in range(steps):
+            self.mj.mj_step(self.model, self.data)
+            trace.append(np.array(self.data.qpos))
+        return np.array(trace)

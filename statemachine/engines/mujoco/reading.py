@@ -18,8 +18,8 @@ from ._description import description_of
 _FORMATS = {".mjb": "MJB", ".urdf": "URDF"}
 
 
-def read(path: Path, name: str) -> Robot:
-    """What the engine makes of a file, with its own defaults.
+def read_file(path: Path, name: str) -> Robot:
+    """What an MJCF says itself; one some of whose meshes are missing is read without them.
 
     Args:
         path: The file.
@@ -29,22 +29,9 @@ def read(path: Path, name: str) -> Robot:
         MissingEngineError: It is not installed here.
         ModelError: It cannot read the file.
     """
-    return _loaded(path, name, "engine")
-
-
-def read_file(path: Path, name: str) -> Robot:
-    """What an MJCF says itself; one some of whose meshes are missing is read without them.
-
-    Args:
-        path: The file.
-        name: What the description goes by.
-
-    Raises:
-        MissingEngineError, ModelError: As `read`.
-    """
     suffix = path.suffix.lower()
     try:
-        return _loaded(path, name, _FORMATS.get(suffix, "MJCF"))
+        return loaded(path, name, _FORMATS.get(suffix, "MJCF"))
     except ModelError:
         robot = _without_missing_meshes(path, name) if suffix == ".xml" else None
         if robot is None:
@@ -52,18 +39,8 @@ def read_file(path: Path, name: str) -> Robot:
         return robot
 
 
-def describe(compiled: Any, name: str) -> Robot:
-    """The description in a compiled model; joints are in the order of its own.
-
-    Args:
-        compiled: An mjModel.
-        name: What the description goes by.
-    """
-    version = require("mujoco").__version__
-    return description_of(compiled, name, f"mujoco {version}", "MJCF")
-
-
-def _loaded(path: Path, name: str, form: str) -> Robot:
+def loaded(path: Path, name: str, form: str) -> Robot:
+    """What its compiler makes of a file, with its own defaults; `form` is what it is called."""
     model = load(path, backend="mujoco", defaults="engine")
     return description_of(model.raw, name, f"mujoco {model.engine_version}", form)
 

@@ -10,41 +10,10 @@ import numpy as np
 
 from ...backends import load
 from ...drawing.camera import Camera
-from ...drawing.shots import GHOST, Drawer, Shot
-from ...errors import MissingEngineError
+from ...drawing.shots import GHOST, Shot
 from ...installed import require
 from ...interface import Array
 from ...rotations import matrix_from_quat
-from . import _opengl
-from ._opengl import diagnosis, environment
-
-__all__ = ["diagnosis", "drawer", "environment", "here", "label"]
-
-SHARPER = 2  # drawn so many times as large, and made smaller: edges are smooth then
-
-
-def here() -> str:
-    """The MUJOCO_GL that it draws with here; "" for its own choice.
-
-    Raises:
-        MissingEngineError: It is not installed here, or finds no OpenGL.
-    """
-    require("mujoco")
-    opengl = _opengl.offscreen_opengl()
-    if opengl is None:
-        remedy = _opengl.opengl_remedy()
-        raise MissingEngineError(f"MuJoCo finds no OpenGL to draw with: {remedy}", engine="OpenGL")
-    return opengl
-
-
-def label(opengl: str) -> str:
-    """What a reader is told of what draws."""
-    return f"MuJoCo (MUJOCO_GL={opengl})" if opengl else "MuJoCo"
-
-
-def drawer(files: Sequence[Path], size: tuple[int, int], camera: Camera) -> Drawer:
-    """Open an OpenGL context; see `MujocoFrames`."""
-    return MujocoFrames(files, size, camera)
 
 
 class MujocoFrames:

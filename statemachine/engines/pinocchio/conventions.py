@@ -11,9 +11,18 @@ import numpy as np
 
 from ...installed import require
 from ...interface import Array
-from ..measured import Absent, LetGo, Measurement, Past, ReadTwice
+from ..measured import Absent, LetGo, Measurement, ReadTwice
 from ..samples import joint_tree, marked, pendulum
-from .names import names_with
+
+
+def names_with(pin: Any, *words: str) -> tuple[str, ...]:
+    """Public names of Pinocchio's, and of its Data's, that have one of the words in them."""
+    names = (*vars(pin), *vars(pin.Data))
+    return tuple(
+        sorted(
+            name for name in names if name[0] != "_" and any(word in name.lower() for word in words)
+        )
+    )
 
 
 def _marks(pin: Any, model: Any, data: Any, q: Array) -> Array:
@@ -79,7 +88,7 @@ def actuation(_seconds: float) -> list[LetGo]:
     model = pin.buildModelFromXML(pendulum.URDF)
     rest = np.zeros(model.nv)
     started = float(pin.aba(model, model.createData(), pin.neutral(model), rest, rest)[0])
-    return [LetGo("aba at zero torque", started, None)]
+    return [("aba at zero torque", started, None, ())]
 
 
 def command(_torque: float) -> Absent:
@@ -104,7 +113,7 @@ def write(angle: float, _deep: float) -> list[ReadTwice]:
     reads["the tip, after forwardKinematics"] = np.array(data.oMf[tip].translation)
     pin.updateFramePlacements(model, data)
     now, true = np.array(data.oMf[tip].translation), pendulum.tip_at(angle)
-    return [ReadTwice(part, read, now, true) for part, read in reads.items()]
+    return [(part, read, now, true) for part, read in reads.items()]
 
 
 def step(_speed: float, _deep: float) -> Absent:
@@ -135,7 +144,7 @@ def friction() -> Absent:
     return _absent("step", "simul")
 
 
-def save() -> Past:
+def save() -> float:
     """Whether its Data holds a state: whether anything of its past shows in what comes out."""
     pin = require("pinocchio")
     model = pin.buildModelFromXML(pendulum.URDF)
@@ -144,9 +153,9 @@ def save() -> Past:
     v, torque = np.full(model.nv, 0.3), np.full(model.nv, 0.1)
     pin.aba(model, used, pin.integrate(model, q, v), 2 * v, 5 * torque)
     first, second = (np.array(pin.aba(model, data, q, v, torque)) for data in (used, new))
-    return Past(float(np.abs(first - second).max()))
+    return float(np.abs(first - second).max())
 
 
-def future(_moments: Sequence[float], _steps: int) -> Past:
+def future(_moments: Sequence[float], _steps: int) -> float:
     """Whether a used Data computes anything else than a new one, of the same q and v."""
     return save()

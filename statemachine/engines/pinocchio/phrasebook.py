@@ -6,16 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ..phrases import ANGLE, TORQUE, Cell, accelerated, near
+from ..measured import ANGLE, TORQUE, Cell, Phrases, accelerated, near
 from ..samples.pendulum import TIP, URDF, acceleration, tip_at
-from .names import names_with
+from .conventions import names_with
 
-FILE = ("arm.urdf", URDF)
 _STEP = 0.002  # s; whatever its user likes
-
-
-def close(_n: Any) -> None:
-    """Nothing: a Model and a Data go with their last name."""
 
 
 def _loaded(n: Any) -> bool:
@@ -69,7 +64,7 @@ def _apart(n: Any) -> bool:
     )
 
 
-CELLS = {
+_CELLS = {
     "load": Cell(
         "import numpy as np\n"
         "import pinocchio as pin\n"
@@ -100,3 +95,4 @@ CELLS = {
     ),
     "many worlds": Cell("worlds = [m.createData() for _ in range(3)]", _apart),
 }
+PHRASES = Phrases(("arm.urdf", URDF), _CELLS)

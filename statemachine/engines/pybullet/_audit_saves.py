@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...backends._bullet_client import pb
-from ...interface import Array, Data
+from ...interface import Array
 from ..auditing import Restore
 from .world import read_into, saved_in_a_file, saved_in_memory
 
@@ -22,7 +22,7 @@ class Client:
         targets: (nu,) what the motors aim at; None where they are off.
     """
 
-    data: Data
+    data: Any
     time: float = 0.0
     targets: Array | None = None
 
@@ -81,11 +81,16 @@ def in_a_file(machine: Client) -> Iterator[Restore]:
         yield lambda other: restore(other.id)
 
 
-def taken_apart(machine: Client) -> Iterator[Restore]:
-    """Every body is taken far away and brought back, which leaves no memory of contacts."""
+def put_back(machine: Client, how: str = "put") -> Iterator[Restore]:
+    """What can be read of positions and velocities, as the backend writes it."""
     qpos, qvel = machine.data.qpos.copy(), machine.data.qvel.copy()
     read_into(machine.world, qpos, qvel)
-    yield lambda other: other.world.place(qpos, qvel)
+    yield lambda other: getattr(other.world, how)(qpos, qvel)
+
+
+def taken_apart(machine: Client) -> Iterator[Restore]:
+    """Every body is taken far away and brought back, which leaves no memory of contacts."""
+    yield from put_back(machine, "place")
 
 
 def let_pass(machine: Client) -> None:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
@@ -18,8 +20,11 @@ from ...backends._bullet_plan import Plan
 from ...backends._bullet_world import ENGINE_TIMESTEP, Tree, World
 from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model
-from ..parts import LeftAlone, Term, WayBack
-from .world import aim, fresh_world, gravity_of, limp, read_into, servos_of
+from ..auditing import Restore, SavePoint
+from ..records import LeftAlone, Term, WayBack
+from ._audit_saves import Client, in_memory, put_back
+from .audit import PybulletDriver
+from .world import fresh_world, gravity_of, limp
 
 # Before a state is taken, while the jaws still touch what they hold; and after it.
 _BEFORE, _AFTER = 10, 100
@@ -184,76 +189,46 @@ def _joint(world: World, model: Model, joint: int) -> tuple[Tree, int]:
     return tree, tree.joints[tree.dofs.tolist().index(dof)]
 
 
+class _AsLoaded(PybulletDriver):
+    """The bodies as loadURDF leaves them."""
+
+    def fresh(self, point: SavePoint) -> Client:
+        world = World(cast("PybulletModel", point.model).plan, "engine")
+        qpos, qvel = point.qpos.copy(), point.qvel.copy()
+        return Client(SimpleNamespace(raw=world, qpos=qpos, qvel=qvel, close=world.close))
+
+
 def ways_back(model: Model) -> tuple[WayBack, ...]:
     """Which of the engine's own ways to go back is exact, in the middle of contact.
 
     Each run starts in a new client from keyframe 0 (or the default pose), squeezes by
     POSITION_CONTROL, goes on, goes back, and goes on again: are the two futures the same?
     """
-    start = model.keyframes[0] if model.keyframes else None
-    qpos = start.qpos if start else model.compiled.qpos0
-    target = start.ctrl if start else np.zeros(model.nu)
-    zero = np.zeros(model.nv)
-    servos, touching = servos_of(model), list[int]()
+    key = model.keyframes[0] if model.keyframes else None
+    qpos, ctrl = (key.qpos, key.ctrl) if key else (model.compiled.qpos0, np.zeros(model.nu))
+    start = SavePoint("start", "", model, qpos, np.zeros(model.nv), ctrl, 0)
+    middle, driver = replace(start, run_in=_BEFORE), _AsLoaded(model, 0)
 
-    def run(world: World, steps: int) -> Array:
-        trace = []
-        for _ in range(steps):
-            aim(world, servos, target)
-            pb.stepSimulation(world.client)
-            trace.append(_joints(world))
-        return np.array(trace)
+    def off(first: Array, second: Array) -> float:
+        gap = (first - second)[1:, : driver.coordinates.width]
+        return float(np.abs(gap).max(initial=0.0))
 
-    def begin(world: World) -> None:
-        world.put(qpos, zero)
+    def back(point: SavePoint, way: Callable[[Client], Iterator[Restore]]) -> float:
+        with driver.at(point) as machine, contextmanager(way)(machine) as restore:
+            first = driver.drive(machine, point, _AFTER)
+            restore(machine)
+            return off(first, driver.drive(machine, point, _AFTER))
 
-    def difference(back: Callable[[World], Callable[[], None]]) -> float:
-        with _raw(model) as world:
-            begin(world)
-            run(world, _BEFORE)
-            touching.append(sum(point[8] <= 0 for point in world.contact_points()))
-            restore = back(world)
-            first = run(world, _AFTER)
-            restore()
-            return float(np.abs(run(world, _AFTER) - first).max(initial=0.0))
+    def to_the_start(_machine: Client) -> Iterator[Restore]:
+        yield lambda machine: driver.start(machine, start)
 
-    def saved(world: World) -> Callable[[], None]:
-        state = pb.saveState(world.client)
-        return lambda: pb.restoreState(state, physicsClientId=world.client)
-
-    def written(world: World) -> Callable[[], None]:
-        now, rate = qpos.copy(), zero.copy()
-        read_into(world, now, rate)
-        return lambda: world.put(now, rate)
-
-    futures = []
-    for _ in range(2):
-        with _raw(model) as world:
-            begin(world)
-            futures.append(run(world, _BEFORE + _AFTER))
-    again = float(np.abs(futures[1] - futures[0]).max(initial=0.0))
-    with _raw(model) as world:
-        begin(world)
-        first = run(world, _AFTER)
-        begin(world)
-        same_client = float(np.abs(run(world, _AFTER) - first).max(initial=0.0))
-    kept, put = difference(saved), difference(written)
-    moment = f"after {_BEFORE} steps, {touching[0]} contacts"
+    runs = [driver.run(start, _BEFORE + _AFTER).future for _ in range(2)]
+    with driver.at(middle) as machine:
+        touching = sum(point[8] <= 0 for point in machine.world.contact_points())
+    moment = f"after {_BEFORE} steps, {touching} contacts"
     return (
-        WayBack("a new client, loaded again", again),
-        WayBack("resetJointState, resetBase… to the start", same_client),
-        WayBack(f"saveState, restoreState {moment}", kept),
-        WayBack(f"written back {moment}", put),
+        WayBack("a new client, loaded again", off(*runs)),
+        WayBack("resetJointState, resetBase… to the start", back(start, to_the_start)),
+        WayBack(f"saveState, restoreState {moment}", back(middle, in_memory)),
+        WayBack(f"written back {moment}", back(middle, put_back)),
     )
-
-
-def _joints(world: World) -> list[float]:
-    """Positions of all joints, and of all bases."""
-    values: list[float] = []
-    for tree in world.trees:
-        if tree.joints:
-            values += [s[0] for s in pb.getJointStates(tree.body, tree.joints, world.client)]
-        if tree.free:
-            pos, quat = pb.getBasePositionAndOrientation(tree.body, world.client)
-            values += [*pos, *quat]
-    return values

@@ -37,11 +37,6 @@ _BEST = "written + targets"  # all that can be read and written
 _SLIPPERY = 0.05  # a friction that the model does not have
 
 
-def driver(model: Model, seed: int) -> Driver:
-    """The engine itself, to be audited with a model; `seed`: of what it does of its own."""
-    return PybulletDriver(model, seed)
-
-
 class PybulletDriver(Driver):
     """The engine through its own functions."""
 

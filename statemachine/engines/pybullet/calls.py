@@ -18,25 +18,6 @@ from ...installed import require
 from ...interface import DERIVED, INPUTS
 from ..call_watch import FUNCTIONS, CallWatch, CallWords, Contents, WatchedObject, entries, named
 
-WORDS = CallWords(
-    shown="what its getters tell without computing anything anew",
-    step="stepSimulation",
-    note="On pybullet a Data's arrays are the interface's own: it copies between them and the "
-    "engine's hidden world, which is outside the engine's functions.",
-    roles={
-        "the still copy": "The still copy is the robot with its true inertias, in a world of its "
-        "own; the one that is stepped carries extra inertia for its servos. The interface asks "
-        "the copy for poses, the mass matrix and the bias. In this run it was {}.",
-        "the look-ahead": "The look-ahead is another copy. It is put where your data is and takes "
-        "one step, so that contacts and forces can be read after forward and no time passes in "
-        "yours. In this run it was {}.",
-    },
-    helpers={
-        "mujoco": "On pybullet the interface uses MuJoCo as a library: its parser reads the "
-        "model's file, and it solves small linear systems. Its own step was {} there.",
-    },
-)
-
 # How many arguments come before `physicsClientId` where it is given by its place, which the
 # engine's functions do not tell. It is the last one in all of these.
 _BEFORE_CLIENT = {
@@ -176,8 +157,28 @@ class _Arrays(WatchedObject):
         return f"{self.label}.{field}"
 
 
-class _BulletWatch(CallWatch):
+class PybulletWatch(CallWatch):
+    """A watch on PyBullet."""
+
     engine = "pybullet"
+    words = CallWords(
+        shown="what its getters tell without computing anything anew",
+        step="stepSimulation",
+        note="On pybullet a Data's arrays are the interface's own: it copies between them and the "
+        "engine's hidden world, which is outside the engine's functions.",
+        roles={
+            "the still copy": "The still copy is the robot with its true inertias, in a world of "
+            "its own; the one that is stepped carries extra inertia for its servos. The interface "
+            "asks the copy for poses, the mass matrix and the bias. In this run it was {}.",
+            "the look-ahead": "The look-ahead is another copy. It is put where your data is and "
+            "takes one step, so that contacts and forces can be read after forward and no time "
+            "passes in yours. In this run it was {}.",
+        },
+        helpers={
+            "mujoco": "On pybullet the interface uses MuJoCo as a library: its parser reads the "
+            "model's file, and it solves small linear systems. Its own step was {} there.",
+        },
+    )
 
     def __init__(self) -> None:
         self._module: Any = require("pybullet")
@@ -249,8 +250,3 @@ def client_of(function: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> 
     if place is None:
         return None if args else 0
     return int(args[place]) if len(args) > place else 0  # the engine's own default
-
-
-def watch() -> CallWatch:
-    """A watch on PyBullet."""
-    return _BulletWatch()

@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
 
 import numpy as np
 
 from ...backends._bullet_client import pb
 from ...interface import Array
-from ..measured import Futures, LetGo, Measurement, OneStep, ReadTwice, Sliding
+from ..measured import LetGo, Measurement, OneStep, ReadTwice, Sliding
 from ..samples import floor, joint_tree, marked, pendulum
-from . import pile
+from .pile import BulletPile
 from .world import fresh_world, gravity_of, limp, load, put_floor
 from .world import timestep as step_of
+
+
+@contextmanager
+def _loaded(text: str, fixed: bool = False) -> Iterator[tuple[int, int]]:
+    """A fresh world with a body in it: their numbers."""
+    with fresh_world() as client:
+        yield client, load(client, text, fixed)
+
+
+def _run(client: int, steps: int) -> None:
+    for _ in range(steps):
+        pb.stepSimulation(client)
 
 
 def _marks(client: int, body: int) -> Array:
@@ -28,8 +42,7 @@ def _marks(client: int, body: int) -> Array:
 def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
     """Four numbers into resetBasePositionAndOrientation."""
     turned = []
-    with fresh_world() as client:
-        body = load(client, marked.URDF)
+    with _loaded(marked.URDF) as (client, body):
         for four in fours:
             pb.resetBasePositionAndOrientation(body, (0, 0, 0), four, client)
             marks = _marks(client, body)
@@ -41,8 +54,7 @@ def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
 
 def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Array, Array]:
     """Three and three numbers into resetBaseVelocity, in this order, and one short step."""
-    with fresh_world() as client:
-        body = load(client, marked.URDF)
+    with _loaded(marked.URDF) as (client, body):
         pb.setTimeStep(seconds, client)
         pb.resetBasePositionAndOrientation(body, place.tolist(), four.tolist(), client)
         pb.resetBaseVelocity(body, six[:3].tolist(), six[3:].tolist(), client)
@@ -53,19 +65,16 @@ def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Arr
 
 def gravity(steps: int) -> tuple[tuple[float, ...], Array]:
     """A body in a world that was told nothing, let go; without the damping that bodies have."""
-    with fresh_world() as client:
-        body = load(client, marked.URDF)
+    with _loaded(marked.URDF) as (client, body):
         pb.changeDynamics(body, -1, linearDamping=0, physicsClientId=client)
-        for _ in range(steps):
-            pb.stepSimulation(client)
+        _run(client, steps)
         seconds = steps * step_of(client)
         return gravity_of(client), np.array(pb.getBaseVelocity(body, client)[0]) / seconds
 
 
 def timestep() -> OneStep:
     """A body at 1 m/s, one step; and whatever number of the world's has changed in it."""
-    with fresh_world() as client:
-        body = load(client, marked.URDF)
+    with _loaded(marked.URDF) as (client, body):
         pb.changeDynamics(body, -1, linearDamping=0, physicsClientId=client)
         start = pb.getBasePositionAndOrientation(body, client)[0][0]
         pb.resetBaseVelocity(body, (1, 0, 0), (0, 0, 0), client)
@@ -75,43 +84,40 @@ def timestep() -> OneStep:
         after = pb.getPhysicsEngineParameters(client)
         changed = {name: after[name] - told[name] for name in told if after[name] != told[name]}
         name, ticked = next(iter(changed.items()), ("", 0.0))
-        return OneStep(told["fixedTimeStep"], moved, name, ticked)
+        return (told["fixedTimeStep"], moved, name, ticked)
 
 
 def actuation(seconds: float) -> list[LetGo]:
     """As loadURDF leaves the joint, with gravity set, and with its motor switched off."""
     runs = []
     for part, off in (("as loaded", False), ("motor off", True)):
-        with fresh_world() as client:
-            body = load(client, pendulum.URDF, fixed=True)
+        with _loaded(pendulum.URDF, fixed=True) as (client, body):
             pb.setGravity(0, 0, -pendulum.GRAVITY, client)
             if off:
                 limp(body, client)
             step = step_of(client)
             steps = round(seconds / step)
-            for _ in range(steps):
-                pb.stepSimulation(client)
+            _run(client, steps)
             angle, _, _, torque = pb.getJointState(body, 0, client)
             forces = (
                 Measurement("its motor exerts", torque, "N·m"),
                 Measurement("gravity", pendulum.TORQUE, "N·m"),
             )
-            runs.append(LetGo(part, angle, steps * step, forces))
+            runs.append((part, angle, steps * step, forces))
     return runs
 
 
 def command(torque: float) -> dict[str, list[float]]:
     """A torque, and a velocity motor that cannot reach its target so soon; without gravity."""
     modes = {"TORQUE_CONTROL": {}, "VELOCITY_CONTROL": {"targetVelocity": 1e3}}
-    speeds: dict[str, list[float]] = {mode: [] for mode in modes}
+    speeds: dict[str, list[float]] = {}
     for mode, values in modes.items():
-        with fresh_world() as client:
-            body = load(client, pendulum.URDF, fixed=True)
+        with _loaded(pendulum.URDF, fixed=True) as (client, body):
             limp(body, client)
             pb.setJointMotorControl2(
                 body, 0, getattr(pb, mode), force=torque, physicsClientId=client, **values
             )
-            speeds[mode].append(pb.getJointState(body, 0, client)[1])
+            speeds[mode] = [pb.getJointState(body, 0, client)[1]]
             for _ in range(2):
                 pb.stepSimulation(client)
                 speeds[mode].append(pb.getJointState(body, 0, client)[1])
@@ -120,14 +126,11 @@ def command(torque: float) -> dict[str, list[float]]:
 
 def damping(seconds: float, fast: float) -> tuple[float, float]:
     """As loadURDF leaves them; of the joint, the motor is switched off."""
-    with fresh_world() as client:
-        body = load(client, marked.URDF)
+    with _loaded(marked.URDF) as (client, body):
         pb.resetBaseVelocity(body, (1, 0, 0), (0, 0, 0), client)
-        for _ in range(round(seconds / step_of(client))):
-            pb.stepSimulation(client)
+        _run(client, round(seconds / step_of(client)))
         end = pb.getBaseVelocity(body, client)[0][0]
-    with fresh_world() as client:
-        body = load(client, pendulum.URDF, fixed=True)
+    with _loaded(pendulum.URDF, fixed=True) as (client, body):
         limp(body, client)
         pb.resetJointState(body, 0, 0, fast, physicsClientId=client)
         pb.stepSimulation(client)
@@ -154,65 +157,52 @@ def _depth(client: int) -> float:
     return max((-point[8] for point in pb.getContactPoints(physicsClientId=client)), default=0.0)
 
 
+def _tip_twice(client: int, body: int) -> ReadTwice:
+    tip = partial(_tip, client, body)
+    true = pendulum.tip_at(pb.getJointState(body, 0, client)[0])
+    return "the tip", tip(), tip(compute=True), true
+
+
+def _contact_twice(client: int, true: float) -> ReadTwice:
+    depth = _depth(client)
+    pb.performCollisionDetection(client)
+    return "the contact", depth, _depth(client), true
+
+
 def write(angle: float, deep: float) -> list[ReadTwice]:
     """Write by resetJointState to a pendulum, then a ball that is put into the floor."""
-    with fresh_world() as client:
-        body = load(client, pendulum.URDF, fixed=True)
+    with _loaded(pendulum.URDF, fixed=True) as (client, body):
         _tip(client, body, compute=True)
         pb.resetJointState(body, 0, angle, 0, client)
-        read = _tip(client, body)
-        tip = ReadTwice("the tip", read, _tip(client, body, compute=True), pendulum.tip_at(angle))
+        tip = _tip_twice(client, body)
     with fresh_world() as client:
         ball = _put_ball(client, 1)
         pb.performCollisionDetection(client)
         at = (0, 0, floor.RADIUS - deep)
         pb.resetBasePositionAndOrientation(ball, at, (0, 0, 0, 1), client)
-        depth = _depth(client)
-        pb.performCollisionDetection(client)
-        return [tip, ReadTwice("the contact", depth, _depth(client), deep)]
+        return [tip, _contact_twice(client, deep)]
 
 
 def step(speed: float, deep: float) -> list[ReadTwice]:
     """A limp pendulum on its way, and a ball on its way out of the floor."""
-    with fresh_world() as client:
-        body = load(client, pendulum.URDF, fixed=True)
+    with _loaded(pendulum.URDF, fixed=True) as (client, body):
         limp(body, client)
         pb.resetJointState(body, 0, 0, speed, client)
         pb.stepSimulation(client)
-        read, again = _tip(client, body), _tip(client, body, compute=True)
-        angle = pb.getJointState(body, 0, client)[0]
-        tip = ReadTwice("the tip", read, again, pendulum.tip_at(angle))
+        tip = _tip_twice(client, body)
     with fresh_world() as client:
         ball = _put_ball(client, floor.RADIUS - deep)
         pb.resetBaseVelocity(ball, (0, 0, speed), (0, 0, 0), client)
         pb.stepSimulation(client)
-        depth = _depth(client)
-        pb.performCollisionDetection(client)
-        now = max(floor.RADIUS - pb.getBasePositionAndOrientation(ball, client)[0][2], 0.0)
-        return [tip, ReadTwice("the contact", depth, _depth(client), now)]
+        height = pb.getBasePositionAndOrientation(ball, client)[0][2]
+        return [tip, _contact_twice(client, max(floor.RADIUS - height, 0.0))]
 
 
 def joints() -> dict[str, list[str]]:
     """The indices of the joints, from a URDF."""
-    with fresh_world() as client:
-        body = load(client, joint_tree.URDF, fixed=True)
+    with _loaded(joint_tree.URDF, fixed=True) as (client, body):
         count = pb.getNumJoints(body, client)
         return {"URDF": [pb.getJointInfo(body, k, client)[1].decode() for k in range(count)]}
-
-
-def reset() -> dict[str, dict[str, bool]]:
-    """Every quantity changed, then resetSimulation, or everything put where it began."""
-    return {name: _kept_after(way) for name, way in pile.RESETS.items()}
-
-
-def _kept_after(way: pile.Restart) -> dict[str, bool]:
-    # Half of anything is not what it has at the start.
-    kept = {quantity: pile.survives(quantity, 0.5, way) for quantity in pile.QUANTITIES}
-    with fresh_world() as client:
-        scene = pile.build(client)
-        bodies = pb.getNumBodies(client)
-        way.call(scene)
-        return {**kept, "bodies": pb.getNumBodies(client) == bodies}
 
 
 def friction() -> dict[str, Sliding]:
@@ -231,55 +221,10 @@ def friction() -> dict[str, Sliding]:
             step = step_of(client)
             for seconds, tangent in ((floor.REST, 0.0), (floor.PULL, lean)):
                 pb.setGravity(tangent * floor.GRAVITY, 0, -floor.GRAVITY, client)
-                for _ in range(round(seconds / step)):
-                    pb.stepSimulation(client)
+                _run(client, round(seconds / step))
             return pb.getBaseVelocity(body, client)[0][0]
 
     return {"": speed}
 
 
-def save() -> dict[str, dict[str, bool]]:
-    """Each quantity changed, saved, changed again, restored, in a world of its own."""
-
-    def comes_back(quantity: str, saved: pile.Saved) -> bool:
-        def there_and_back(scene: pile.Pile) -> pile.Pile:
-            with saved(scene) as restore:
-                if quantity == "applied force":  # there is one until the next step
-                    pb.stepSimulation(scene.client)
-                else:
-                    pile.QUANTITIES[quantity].write(scene, -0.25)
-                restore()
-            return scene
-
-        return pile.survives(quantity, 0.5, there_and_back)
-
-    return {
-        name: {quantity: comes_back(quantity, saved) for quantity in pile.QUANTITIES}
-        for name, saved in pile.WAYS_TO_SAVE.items()
-    }
-
-
-def future(moments: Sequence[float], steps: int) -> Mapping[str, Sequence[Futures]]:
-    """Boxes that fall, set back to the start or to the middle; each trial in its own world."""
-
-    def middle(saved: pile.Saved, moment: float) -> Futures:
-        with fresh_world() as client:
-            scene = pile.build(client)
-            pile.run(scene, round(moment / step_of(client)))
-            with saved(scene) as restore:
-                first = pile.run(scene, steps)
-                restore()
-                return first, pile.run(scene, steps)
-
-    def start(way: pile.Restart) -> Futures:
-        with fresh_world() as client:
-            scene = pile.build(client)
-            return pile.run(scene, steps), pile.run(way(scene), steps)
-
-    return {
-        **{name: [start(way)] for name, way in pile.RESETS.items()},
-        **{
-            name: [middle(saved, moment) for moment in moments]
-            for name, saved in pile.WAYS_TO_SAVE.items()
-        },
-    }
+reset, save, future = BulletPile.reset, BulletPile.save, BulletPile.future

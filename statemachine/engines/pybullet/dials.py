@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator, Mapping
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -25,8 +25,8 @@ from ...backends._bullet_surfaces import Surfaces
 from ...backends._bullet_world import UNCLAMPED, World
 from ...backends.pybullet_backend import PybulletData, PybulletModel
 from ...errors import EngineError
-from ...interface import Model
-from ..parts import Setting
+from ...interface import Array, Model
+from ..records import Setting
 
 # What a fresh body has: a single-precision literal in the engine.
 BODY_DAMPING = float(np.float32(0.04))
@@ -144,19 +144,13 @@ class PybulletDials:
                 inertias[b] = pb.getDynamicsInfo(body, link, world.client)[2]
         return inertias
 
-    @cached_property
-    def frictions(self) -> np.ndarray:
+    @property
+    def frictions(self) -> Array:
         """(nsolid,) lateral friction that the engine tells of each link that touches."""
         with cast("PybulletData", self.model._make_data()) as data:
             world = data.raw
             told = [pb.getDynamicsInfo(b, link, world.client)[1] for b, link, _ in world.solids()]
         return np.array(told)
-
-
-def dials(model: Model, options: Mapping[str, Any]) -> PybulletDials | None:
-    """The dials of a Model of PyBullet as it comes; None of any other."""
-    as_it_comes = isinstance(model, PybulletModel) and model.defaults == "engine"
-    return PybulletDials(model, options) if as_it_comes else None
 
 
 def frictionless(model: Model) -> Model:

@@ -5,15 +5,14 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import Any
 
-from ..phrases import ANGLE, Cell, accelerated, near
+from ..measured import ANGLE, Cell, Phrases, accelerated, near
 from ..samples.pendulum import GRAVITY, INERTIA, URDF, tip_at
 
-FILE = ("arm.urdf", URDF)
 # A link's frame is told in single precision.
 _SINGLE = 1e-6
 
 
-def close(n: Any) -> None:
+def _close(n: Any) -> None:
     """Every world that a cell has made."""
     for world in (getattr(n, "w", -1), *getattr(n, "worlds", ())):
         with suppress(Exception):  # not made
@@ -79,7 +78,7 @@ def _apart(n: Any) -> bool:
     return [n.pb.getNumBodies(world) for world in n.worlds] == [0, 1, 0]
 
 
-CELLS = {
+_CELLS = {
     "load": Cell(
         "import pybullet as pb\n"
         "w = pb.connect(pb.DIRECT)\n"
@@ -119,3 +118,4 @@ CELLS = {
     ),
     "many worlds": Cell("worlds = [pb.connect(pb.DIRECT) for _ in range(3)]", _apart),
 }
+PHRASES = Phrases(("arm.urdf", URDF), _CELLS, _close)

@@ -8,102 +8,61 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
 from functools import partial
+from typing import ClassVar
 
 import numpy as np
 
 from ...backends._bullet_client import pb
 from ...interface import Array
 from ..samples.pendulum import GRAVITY, URDF
-from ..samples.pile import HALF, PLACES, TILT
-from .world import Restore, fresh_world, load, put_floor, saved_in_a_file, saved_in_memory
+from ..samples.pile import HALF, PLACES, TILT, Pile, Saved
+from .world import (
+    Restore,
+    fresh_world,
+    load,
+    put_floor,
+    saved_in_a_file,
+    saved_in_memory,
+    timestep,
+)
 
 _TURNS = (np.array((*TILT[1:], TILT[0])) / np.linalg.norm(TILT), *[np.array((0, 0, 0, 1.0))] * 2)
-_NEAR = 0.05  # of what was written; a motor's target is met that well in one step
+# Of a quantity: what puts a number there, and what tells it.
+Write = Callable[["BulletPile", float], object]
+Read = Callable[["BulletPile"], float]
 
 
-@dataclass(frozen=True)
-class Pile:
-    """A world's client, and the numbers of its bodies."""
-
-    client: int
-    boxes: tuple[int, ...]
-    arm: int
-
-    @property
-    def box(self) -> int:
-        """The lowest box, at which quantities are looked at."""
-        return self.boxes[0]
-
-
-def build(client: int) -> Pile:
-    """Put the bodies into an empty world; what else is set there stays."""
-    put_floor(client)
-    edges = (HALF, HALF, HALF)
-    shape = pb.createCollisionShape(pb.GEOM_BOX, halfExtents=edges, physicsClientId=client)
-    boxes = tuple(
-        pb.createMultiBody(
-            1,
-            shape,
-            basePosition=place,
-            baseOrientation=turn.tolist(),
-            physicsClientId=client,
-        )
-        for place, turn in zip(PLACES, _TURNS, strict=True)
-    )
-    arm = load(client, URDF, fixed=True)
-    pb.resetBasePositionAndOrientation(arm, (2, 0, 2), (0, 0, 0, 1), client)
-    return Pile(client, boxes, arm)
-
-
-# Saves when it is entered, and gives the function that restores.
-Saved = Callable[[Pile], AbstractContextManager[Callable[[], None]]]
-
-
-@dataclass(frozen=True)
-class PileQuantity:
-    """Something that decides the future: how it is written, and what shows it.
-
-    Attributes:
-        write: Puts a number there.
-        read: Tells the number; may take a step for it.
-    """
-
-    write: Callable[[Pile, float], None]
-    read: Callable[[Pile], float]
-
-
-def _joint(scene: Pile, k: int) -> float:
+def _joint(scene: BulletPile, k: int) -> float:
     return pb.getJointState(scene.arm, 0, scene.client)[k]
 
 
-def _stepped(read: Callable[[Pile], float]) -> Callable[[Pile], float]:
-    def after(scene: Pile) -> float:
+def _stepped(read: Read) -> Read:
+    def after(scene: BulletPile) -> float:
         pb.stepSimulation(scene.client)
         return read(scene)
 
     return after
 
 
-def _base_velocity(scene: Pile) -> float:
+def _base_velocity(scene: BulletPile) -> float:
     return pb.getBaseVelocity(scene.box, scene.client)[0][0]
 
 
-def _set_target(scene: Pile, value: float) -> None:
+def _set_target(scene: BulletPile, value: float) -> None:
     pb.setJointMotorControl2(
         scene.arm, 0, pb.VELOCITY_CONTROL, targetVelocity=value, physicsClientId=scene.client
     )
 
 
-def _push(scene: Pile, value: float) -> None:
+def _push(scene: BulletPile, value: float) -> None:
     """A force that makes up this speed in one step of 1/240 s; the box weighs 1 kg."""
     at = pb.getBasePositionAndOrientation(scene.box, scene.client)[0]
     force = (240 * value, 0, 0)
     pb.applyExternalForce(scene.box, -1, force, at, pb.WORLD_FRAME, physicsClientId=scene.client)
 
 
-def _moved(scene: Pile) -> float:
+def _moved(scene: BulletPile) -> float:
     """How far the box comes in a step at 100 m/s: what step the engine takes, not what it tells."""
     pb.resetBaseVelocity(scene.box, (100, 0, 0), (0, 0, 0), scene.client)
     start = pb.getBasePositionAndOrientation(scene.box, scene.client)[0][0]
@@ -112,84 +71,50 @@ def _moved(scene: Pile) -> float:
 
 
 # Nothing else acts while one of these is looked at; the box is in the air.
-QUANTITIES = {
-    "joint position": PileQuantity(
+_QUANTITIES: dict[str, tuple[Write, Read]] = {
+    "joint position": (
         lambda s, x: pb.resetJointState(s.arm, 0, x, _joint(s, 1), s.client),
         lambda s: _joint(s, 0),
     ),
-    "joint velocity": PileQuantity(
+    "joint velocity": (
         lambda s, x: pb.resetJointState(s.arm, 0, _joint(s, 0), x, s.client),
         lambda s: _joint(s, 1),
     ),
-    "base position": PileQuantity(
+    "base position": (
         lambda s, x: pb.resetBasePositionAndOrientation(s.box, (x, 0, 1), (0, 0, 0, 1), s.client),
         lambda s: pb.getBasePositionAndOrientation(s.box, s.client)[0][0],
     ),
-    "base velocity": PileQuantity(
+    "base velocity": (
         lambda s, x: pb.resetBaseVelocity(s.box, (x, 0, 0), (0, 0, 0), s.client),
         _base_velocity,
     ),
-    "motor target": PileQuantity(_set_target, _stepped(lambda s: _joint(s, 1))),
-    "applied force": PileQuantity(_push, _stepped(_base_velocity)),
-    "gravity": PileQuantity(
+    "motor target": (_set_target, _stepped(lambda s: _joint(s, 1))),
+    "applied force": (_push, _stepped(_base_velocity)),
+    "gravity": (
         # As much as makes up this speed in one step.
         lambda s, x: pb.setGravity(240 * x, 0, 0, s.client),
         _stepped(_base_velocity),
     ),
-    "timestep": PileQuantity(lambda s, x: pb.setTimeStep(x / 100, s.client), _moved),
+    "timestep": (lambda s, x: pb.setTimeStep(x / 100, s.client), _moved),
 }
 
 
-def survives(quantity: str, value: float, way: Callable[[Pile], Pile]) -> bool:
-    """Whether a number that was written is there after a way, in a world of its own."""
-    with fresh_world() as client:
-        scene = build(client)
-        QUANTITIES[quantity].write(scene, value)
-        return abs(QUANTITIES[quantity].read(way(scene)) - value) < _NEAR * abs(value)
-
-
-@dataclass(frozen=True)
-class Restart:
-    """A way to the start.
-
-    Attributes:
-        call: What the engine is asked to do.
-        again: What its user must do then; gives the world as it began.
-    """
-
-    call: Callable[[Pile], None]
-    again: Callable[[Pile], Pile]
-
-    def __call__(self, scene: Pile) -> Pile:
-        self.call(scene)
-        return self.again(scene)
-
-
-def _put_back(scene: Pile) -> None:
+def _put_back(scene: BulletPile) -> None:
     for box, place, turn in zip(scene.boxes, PLACES, _TURNS, strict=True):
         pb.resetBasePositionAndOrientation(box, place, turn.tolist(), scene.client)
     pb.resetJointState(scene.arm, 0, 0, 0, scene.client)
 
 
-RESETS = {
-    "resetSimulation": Restart(
-        lambda scene: pb.resetSimulation(physicsClientId=scene.client),
-        lambda scene: build(scene.client),
-    ),
-    "resetBase…, resetJointState": Restart(_put_back, lambda scene: scene),
-}
-
-
 def _of_the_world(save: Callable[[int], AbstractContextManager[Restore]]) -> Saved:
     @contextmanager
-    def saved(scene: Pile) -> Iterator[Callable[[], None]]:
+    def saved(scene: BulletPile) -> Iterator[Callable[[], None]]:
         with save(scene.client) as restore:
             yield partial(restore, scene.client)
 
     return saved
 
 
-def _read_and_written(scene: Pile) -> Iterator[Callable[[], None]]:
+def _read_and_written(scene: BulletPile) -> Iterator[Callable[[], None]]:
     client = scene.client
     poses = [pb.getBasePositionAndOrientation(box, client) for box in scene.boxes]
     rates = [pb.getBaseVelocity(box, client) for box in scene.boxes]
@@ -204,23 +129,78 @@ def _read_and_written(scene: Pile) -> Iterator[Callable[[], None]]:
     yield restore
 
 
-WAYS_TO_SAVE: dict[str, Saved] = {
-    "positions, velocities written": contextmanager(_read_and_written),
-    "saveState, restoreState": _of_the_world(saved_in_memory),
-    "saveBullet, restoreState": _of_the_world(saved_in_a_file),
-}
+class BulletPile(Pile):
+    """A world's client, and the numbers of its bodies."""
 
+    quantities = tuple(_QUANTITIES)
+    near = 0.05  # a motor's target is met that well in one step
+    resets: ClassVar = {
+        "resetSimulation": lambda scene: pb.resetSimulation(physicsClientId=scene.client),
+        "resetBase…, resetJointState": _put_back,
+    }
+    ways_to_save: ClassVar = {
+        "positions, velocities written": contextmanager(_read_and_written),
+        "saveState, restoreState": _of_the_world(saved_in_memory),
+        "saveBullet, restoreState": _of_the_world(saved_in_a_file),
+    }
 
-def run(scene: Pile, steps: int) -> Array:
-    """Go on under gravity; coordinates of boxes and joint (steps, 22) after every step."""
-    client = scene.client
-    pb.setGravity(0, 0, -GRAVITY, client)
-    trace = []
-    for _ in range(steps):
-        pb.stepSimulation(client)
-        places: list[float] = []
-        for box in scene.boxes:
-            pos, quat = pb.getBasePositionAndOrientation(box, client)
-            places += (*pos, *quat)
-        trace.append((*places, _joint(scene, 0)))
-    return np.array(trace)
+    def __init__(self, client: int) -> None:
+        """Put the bodies into an empty world; what else is set there stays."""
+        self.client = client
+        put_floor(client)
+        edges = (HALF, HALF, HALF)
+        shape = pb.createCollisionShape(pb.GEOM_BOX, halfExtents=edges, physicsClientId=client)
+        self.boxes = tuple(
+            pb.createMultiBody(
+                1,
+                shape,
+                basePosition=place,
+                baseOrientation=turn.tolist(),
+                physicsClientId=client,
+            )
+            for place, turn in zip(PLACES, _TURNS, strict=True)
+        )
+        self.box = self.boxes[0]  # the lowest, at which quantities are looked at
+        self.arm = load(client, URDF, fixed=True)
+        pb.resetBasePositionAndOrientation(self.arm, (2, 0, 2), (0, 0, 0, 1), client)
+
+    @classmethod
+    @contextmanager
+    def fresh(cls) -> Iterator[BulletPile]:
+        with fresh_world() as client:
+            yield cls(client)
+
+    @property
+    def timestep(self) -> float:
+        return timestep(self.client)
+
+    def bodies(self) -> int:
+        return pb.getNumBodies(self.client)
+
+    def write(self, quantity: str, value: float) -> None:
+        _QUANTITIES[quantity][0](self, value)
+
+    def read(self, quantity: str) -> float:
+        return _QUANTITIES[quantity][1](self)
+
+    def disturb(self, quantity: str) -> None:
+        if quantity == "applied force":  # there is one until the next step
+            pb.stepSimulation(self.client)
+        else:
+            super().disturb(quantity)
+
+    def refilled(self) -> BulletPile:
+        return self if self.bodies() else BulletPile(self.client)
+
+    def run(self, steps: int) -> Array:
+        client = self.client
+        pb.setGravity(0, 0, -GRAVITY, client)
+        trace = []
+        for _ in range(steps):
+            pb.stepSimulation(client)
+            places: list[float] = []
+            for box in self.boxes:
+                pos, quat = pb.getBasePositionAndOrientation(box, client)
+                places += (*pos, *quat)
+            trace.append((*places, _joint(self, 0)))
+        return np.array(trace)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...backends import load
 from ...drawing import Part, drawing_of
 from ...drawing.camera import Camera
-from ...drawing.shots import GHOST, Drawer, Shot
+from ...drawing.shots import GHOST, Shot
 from ...installed import require
 from ...interface import Array
 from ...rotations import xyzw_from_wxyz
@@ -24,34 +24,12 @@ _TILES = 12  # each way from the middle
 _LIGHT = (0.4, -0.6, 1.5)
 _SKY = np.array([[196.0, 208.0, 220.0], [240.0, 243.0, 246.0]])  # above, and at the horizon
 
-SHARPER = 1  # it has no time for smooth edges
-
-
-def here() -> str:
-    """Nothing that it needs beside itself.
-
-    Raises:
-        MissingEngineError: It is not installed here.
-    """
-    require("pybullet")
-    return ""
-
-
-def label(_opengl: str) -> str:
-    """What a reader is told of what draws."""
-    return "PyBullet's software renderer"
-
-
-def drawer(files: Sequence[Path], size: tuple[int, int], camera: Camera) -> Drawer:
-    """Connect to a world for each side; see `BulletFrames`."""
-    return BulletFrames(files, size, camera)
-
 
 class BulletFrames:
     """Draws the bodies of one or two models wherever they are told to be."""
 
     def __init__(self, files: Sequence[Path], size: tuple[int, int], camera: Camera) -> None:
-        """Connect to a world for each side; the arguments are those of `drawer`."""
+        """Connect to a world for each side; the arguments are those of `RawEngine.drawer`."""
         pb = require("pybullet")
         self._pb, self._size, self._camera = pb, size, camera
         self._clients: list[int] = []

@@ -1,6 +1,129 @@
-"""A pile of boxes that fall on each other."""
+"""A pile of boxes that fall on each other, a driven joint, and what of it is kept or forgotten."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from functools import partial
+from typing import Any, ClassVar
+
+from ...interface import Array
+from ..measured import Futures
 
 HALF = 0.1  # an edge [m]
 # Where the boxes begin, one over the other [m], and how the lowest is turned (w, x, y, z).
 PLACES = ((0.0, 0.0, 0.25), (0.0, 0.02, 0.55), (0.0, 0.0, 0.85))
 TILT = (0.92, 0.31, 0.21, 0.1)
+_WRITTEN, _OTHER = 0.5, -0.25  # half of anything is not what it has at the start
+
+# Saves when it is entered, and gives the function that restores.
+Saved = Callable[[Any], AbstractContextManager[Callable[[], object]]]
+
+
+class Pile(ABC):
+    """A world of an engine with the pile in it; of all there is a new one for each trial.
+
+    Attributes:
+        quantities: What decides the future.
+        near: By what part of a number it may be read otherwise than it was written.
+        resets: Ways to the start, by name.
+        ways_to_save: Ways to save, by name.
+    """
+
+    quantities: ClassVar[Sequence[str]]
+    near: ClassVar[float] = 0.0
+    resets: ClassVar[Mapping[str, Callable[[Any], object]]]
+    ways_to_save: ClassVar[Mapping[str, Saved]]
+
+    @classmethod
+    @abstractmethod
+    def fresh(cls) -> AbstractContextManager[Pile]:
+        """A new world."""
+
+    @property
+    @abstractmethod
+    def timestep(self) -> float:
+        """The engine's own step [s]."""
+
+    @abstractmethod
+    def bodies(self) -> int:
+        """How many there are."""
+
+    @abstractmethod
+    def write(self, quantity: str, value: float) -> None:
+        """Put a number there."""
+
+    @abstractmethod
+    def read(self, quantity: str) -> float:
+        """The number that is there; may take a step for it."""
+
+    @abstractmethod
+    def run(self, steps: int) -> Array:
+        """Go on under gravity; coordinates of boxes and joint (steps, 22) after every step."""
+
+    def disturb(self, quantity: str) -> None:
+        """Put something else there."""
+        self.write(quantity, _OTHER)
+
+    def refilled(self) -> Pile:
+        """With the bodies in it, if a way to the start takes them away."""
+        return self
+
+    @classmethod
+    def _survives(cls, quantity: str, act: Callable[[Any], object]) -> bool:
+        """Whether a number that was written is there after something was done."""
+        with cls.fresh() as scene:
+            scene.write(quantity, _WRITTEN)
+            act(scene)
+            off = scene.refilled().read(quantity) - _WRITTEN
+            return abs(off) <= cls.near * _WRITTEN
+
+    @classmethod
+    def reset(cls) -> dict[str, dict[str, bool]]:
+        """Which quantities are, for each way to reset, still what was written before."""
+        kept = {}
+        for name, way in cls.resets.items():
+            kept[name] = {quantity: cls._survives(quantity, way) for quantity in cls.quantities}
+            with cls.fresh() as scene:
+                bodies = scene.bodies()
+                way(scene)
+                kept[name]["bodies"] = scene.bodies() == bodies
+        return kept
+
+    @classmethod
+    def save(cls) -> dict[str, dict[str, bool]]:
+        """Which quantities a restore brings back, for each way to save."""
+
+        def there_and_back(quantity: str, saved: Saved, scene: Pile) -> None:
+            with saved(scene) as restore:
+                scene.disturb(quantity)
+                restore()
+
+        return {
+            name: {q: cls._survives(q, partial(there_and_back, q, saved)) for q in cls.quantities}
+            for name, saved in cls.ways_to_save.items()
+        }
+
+    @classmethod
+    def future(cls, moments: Sequence[float], steps: int) -> dict[str, list[Futures]]:
+        """The two futures of each trial, set back to the start or to moments [s] in the middle."""
+
+        def start(way: Callable[[Any], object]) -> Futures:
+            with cls.fresh() as scene:
+                first = scene.run(steps)
+                way(scene)
+                return first, scene.refilled().run(steps)
+
+        def middle(saved: Saved, moment: float) -> Futures:
+            with cls.fresh() as scene:
+                scene.run(round(moment / scene.timestep))
+                with saved(scene) as restore:
+                    first = scene.run(steps)
+                    restore()
+                    return first, scene.run(steps)
+
+        return {name: [start(way)] for name, way in cls.resets.items()} | {
+            name: [middle(saved, moment) for moment in moments]
+            for name, saved in cls.ways_to_save.items()
+        }

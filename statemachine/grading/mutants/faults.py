@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ...engines import part, rooms_with
+from ...engines import room, rooms_with
 from ...errors import MissingEngineError
 from ...installed import require
 from ...interface import INPUTS, Array, Data, JointType, read_only
@@ -31,10 +31,10 @@ Instead = Callable[..., Any]
 def _adapters() -> list[ModuleType]:
     """The modules of the backends whose engine is here."""
     found = []
-    for name in rooms_with("mutants"):
+    for name in rooms_with("backend"):
         with suppress(MissingEngineError):
             require(name)
-            found.append(part(name, "mutants").adapter)
+            found.append(room(name).backend())
     return found
 
 

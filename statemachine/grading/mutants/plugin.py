@@ -38,7 +38,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """The options with which `run` starts it."""
     group = parser.getgroup("statemachine")
     group.addoption(
-        "--engine", choices=rooms_with("mutants"), default=DEFAULT, help="backend of `model`"
+        "--engine", choices=rooms_with("backend"), default=DEFAULT, help="backend of `model`"
     )
     group.addoption("--record", metavar="FILE", help="write down there what happens")
 

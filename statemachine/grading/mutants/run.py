@@ -192,7 +192,7 @@ def _test_file(file: str | os.PathLike[str]) -> Path:
 
 def _ready(backend: str) -> str:
     """The version of the backend's engine; raises where the tests could not even begin."""
-    known = rooms_with("mutants")
+    known = rooms_with("backend")
     if backend not in backend_names():
         raise unknown_name("backend", backend, known)
     if backend not in known:

@@ -1,0 +1,152 @@
+"""What rooms tell of an engine as it comes, and of two compiled models, as records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+from ..description.records import Placement
+from ..interface import Array, Model
+
+
+@dataclass(frozen=True)
+class Term:
+    """What the interface calls a thing, and what an engine calls it."""
+
+    thing: str
+    ours: str
+    engine: str
+
+
+@dataclass(frozen=True)
+class LeftAlone:
+    """A joint that nobody commands, on an engine as it comes.
+
+    Attributes:
+        label: What was done to the engine before.
+        time: Simulated time [s].
+        position: Of the joint then [rad; of a slide, m].
+        motor: What the engine's own motor exerts on it [N·m or N].
+        explicit: Largest h·D/M of the joint damping that the engine applies explicitly;
+            above 2 a joint gains speed from being damped.
+        gravity: Length of the gravity of a fresh world [m/s²].
+        widest: How far any joint of the robot is from zero then [rad or m].
+        turns: In how many steps the joint's velocity changed its sign.
+        steps: Of how many.
+    """
+
+    label: str
+    time: float
+    position: float
+    motor: float
+    explicit: float
+    gravity: float
+    widest: float
+    turns: int
+    steps: int
+
+
+@dataclass(frozen=True)
+class WayBack:
+    """A way to go back to an earlier state, and how far the second future is from the first.
+
+    Attributes:
+        name: What is done.
+        difference: Largest difference of a coordinate; zero means the same bits.
+    """
+
+    name: str
+    difference: float
+
+
+Setting = Literal["model", "off"]  # of a dial; one that is not named is as it comes
+
+
+class Dials(Protocol):
+    """What can be set in an engine's own way or in the model's.
+
+    Attributes:
+        model: The model as it comes, with the options of an experiment.
+        emulated: The same file behind the contract, with the same options.
+        with_servo: What only an adapter can give, and so only the world of the model's law.
+        words: What the engine's own setting of a factor is, in a few words.
+        frictions: (nsolid,) friction that the engine tells of each body that touches.
+    """
+
+    with_servo: tuple[str, ...]
+    words: Mapping[str, str]
+
+    @property
+    def model(self) -> Model: ...
+    @property
+    def emulated(self) -> Model: ...
+    @property
+    def frictions(self) -> Array: ...
+
+    def build(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
+        """A Model with some of them turned."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class BodyPair:
+    """A rigid part of one model, or the world, and its counterpart in another.
+
+    Attributes:
+        one, two: Ids of the bodies that carry it.
+        align: The frame of `one` in that of `two`, as the same solid.
+        moved: Whether it hangs on another part in the other model.
+    """
+
+    one: int
+    two: int
+    align: Placement
+    moved: bool
+
+
+class Counterparts(Protocol):
+    """What of one model is what of another: pairs of ids; actuators by their place in ctrl."""
+
+    @property
+    def joints(self) -> tuple[tuple[int, int], ...]: ...
+    @property
+    def sites(self) -> tuple[tuple[int, int], ...]: ...
+    @property
+    def actuators(self) -> tuple[tuple[int, int], ...]: ...
+    @property
+    def solids(self) -> tuple[BodyPair, ...]: ...
+
+
+# An array of a compiled model or an option, where in it, and what is to stand there.
+Edit = tuple[str, tuple[int | slice, ...], Any]
+
+
+@dataclass(frozen=True, eq=False)
+class ModelDifference:
+    """One thing in which two compiled models differ, and what makes them alike.
+
+    Attributes:
+        subject: What it is: "mass", "range", "gravity".
+        kind: Of the element that it is of: "body", "joint", "geom", "actuator", "option", …
+        where: Name of that element; "" of the whole model.
+        values: For each figure that differs its name and both values; None: it has none.
+        unit: SI unit of the first of them.
+        edits: What brings the second model to the first.
+        edits_one: What brings the first to the second, where only it can be changed.
+        refused: Why neither can be brought to the other; "" if one can.
+    """
+
+    subject: str
+    kind: str
+    where: str
+    values: tuple[tuple[str, Any, Any], ...]
+    unit: str = ""
+    edits: tuple[Edit, ...] = ()
+    edits_one: tuple[Edit, ...] = ()
+    refused: str = ""
+
+    @property
+    def title(self) -> str:
+        """What it is, and of what."""
+        return f"{self.subject} of {self.where}" if self.where else self.subject

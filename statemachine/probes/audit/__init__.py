@@ -1,0 +1,163 @@
+"""What exactly is the state of an engine, and what leaves it alone? Found by trying.
+
+A run is saved at several moments, goes on, is set back and goes on again: the same bytes at
+every step? Each candidate for the state is tried on the engine itself, by its own functions,
+and beside it the promise of our interface. And what should change nothing (several steps in one
+call, forward, threads, another process) is tried in the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+from ...engines import room
+from ...engines.auditing import Driver, Measured, ReferenceRun, SavePoint
+from ...errors import BadInputError, DivergedError
+from ...interface import Model
+from ...interface.checks import as_count
+from ...runs.drive import Progress, silent
+from ...runs.provenance import Provenance, provenance
+from . import elsewhere, trials
+from .conclusions import Conclusion, conclude
+from .interface_driver import InterfaceDriver
+from .points import points
+from .trials import AuditFinding
+
+STEPS = 60  # of each future
+
+
+@dataclass(frozen=True)
+class Audited:
+    """An engine, or the interface to it, and all that was found.
+
+    Attributes:
+        layer: "engine" or "interface".
+        name: What a page calls it.
+        legend: What the names of its ways to save mean.
+        points: The save points, as measured.
+        findings: What came of every trial.
+        conclusion: What follows from them.
+    """
+
+    layer: str
+    name: str
+    legend: str
+    points: tuple[Measured, ...]
+    findings: tuple[AuditFinding, ...]
+    conclusion: Conclusion
+
+
+@dataclass(frozen=True)
+class Audit:
+    """An engine and our interface to it.
+
+    Attributes:
+        steps: How many each future has.
+        audited: The engine itself, where there is a driver for it; then the interface.
+        without: Save points that this model does not have, and why.
+    """
+
+    steps: int
+    audited: tuple[Audited, ...]
+    without: tuple[str, ...]
+    provenance: Provenance
+
+    @property
+    def holds(self) -> bool:
+        """Whether every promise is kept."""
+        return all(finding.holds for driver in self.audited for finding in driver.findings)
+
+
+def run(model: Model, steps: int = STEPS, seed: int = 0, progress: Progress = silent) -> Audit:
+    """Try everything on the engine behind a Model and on the interface.
+
+    Args:
+        model: Any model with something that moves.
+        steps: Of each future that is compared.
+        seed: Of the commands in motion and of other pasts.
+        progress: Told the fraction that is done.
+
+    Raises:
+        BadInputError: `steps` or `seed` is no such number, or nothing in the model moves.
+    """
+    nstep = as_count(steps, "steps")
+    if seed < 0:
+        raise BadInputError(f"seed must not be negative; got {seed}")
+    if not model.nv:
+        raise BadInputError(f"nothing moves in {model.path.name}: it has no state to audit")
+    save_points, without = points(model, seed)
+    drivers = drivers_of(model, seed)
+    interface = next(driver for driver in drivers if isinstance(driver, InterfaceDriver))
+    runs, diverged = _runs(drivers, save_points, nstep)
+    states = {run.point.name: interface.state(run.point) for run in runs[interface]}
+    if not states:
+        raise BadInputError(f"nothing can be saved in {model.path.name}: {'; '.join(diverged)}")
+    job = elsewhere.Job(model, seed, nstep, states, tuple(map(type, drivers)))
+    findings: dict[Driver, list[AuditFinding]] = {driver: [] for driver in drivers}
+    with ThreadPoolExecutor(1) as pool:
+        child = pool.submit(elsewhere.run, job)
+        work = [(driver, run) for driver in drivers for run in runs[driver]]
+        for done, (driver, run) in enumerate(work):
+            progress(done / (len(work) + len(drivers)))
+            for question in _OF_A_RUN:
+                findings[driver] += question(driver, run)
+        for done, driver in enumerate(drivers, start=len(work)):
+            progress(done / (len(work) + len(drivers)))
+            findings[driver] += trials.smallest(driver, runs[driver], findings[driver])
+            findings[driver] += trials.forgets(driver, runs[driver])
+            findings[driver] += trials.threads(driver, runs[driver])
+            findings[driver] += elsewhere.findings(child.result(), driver, runs[driver])
+            if driver.layer == "engine":
+                findings[driver] += trials.falls(driver)
+        findings[interface] += elsewhere.pickled(child.result(), interface, runs[interface], states)
+    audited = []
+    for driver in drivers:
+        measured = tuple(driver.measure(run.point) for run in runs[driver])
+        of_driver = tuple(findings[driver])
+        conclusion = conclude(of_driver)
+        audited.append(
+            Audited(driver.layer, driver.name, driver.legend, measured, of_driver, conclusion)
+        )
+    return Audit(nstep, tuple(audited), without + diverged, provenance(model, seed))
+
+
+# A question to a driver about one save point, given the run from there that nothing disturbed.
+_OF_A_RUN: tuple[Callable[[Driver, ReferenceRun], Iterator[AuditFinding]], ...] = (
+    trials.again,
+    trials.after_reset,
+    trials.pieces,
+    trials.look,
+    trials.beside,
+    trials.pools,
+    trials.restored,
+    trials.contacts_off,
+)
+
+
+def drivers_of(model: Model, seed: int) -> tuple[Driver, ...]:
+    """The engine behind a Model, where its room has a driver, and the interface to it."""
+    engine = room(model.backend).driver(model, seed)
+    return (*((engine,) if engine else ()), InterfaceDriver(model, seed))
+
+
+def _runs(
+    drivers: Sequence[Driver], save_points: Sequence[SavePoint], steps: int
+) -> tuple[dict[Driver, list[ReferenceRun]], tuple[str, ...]]:
+    """The undisturbed runs, from points at which no driver diverges; a line for each other."""
+    runs: dict[Driver, list[ReferenceRun]] = {driver: [] for driver in drivers}
+    without: list[str] = []
+    for point in save_points:
+        try:
+            # The interface first: it raises, where an engine may go on and warn.
+            able = [driver for driver in reversed(drivers) if not driver.lacks(point)]
+            undisturbed = [(driver, driver.run(point, steps)) for driver in able]
+            reasons = [(driver.name, driver.lacks(point)) for driver in drivers]
+            without += [f"{point.name}: on {name}, {why}" for name, why in reasons if why]
+        except DivergedError:
+            without.append(f"{point.name}: the run diverges")
+            continue
+        for driver, run in undisturbed:
+            runs[driver].append(run)
+    return runs, tuple(without)

@@ -1,0 +1,149 @@
+"""What follows from the findings: which state suffices, and what breaks a smaller one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from ...engines.auditing import ITSELF, ONLY
+from ...engines.futures import FutureGap, worst
+from .trials import (
+    EACH_OTHER,
+    FORGETS,
+    NO_CONTACTS,
+    NOT_RESTORED,
+    RESTORE,
+    WITHOUT,
+    AuditFinding,
+)
+
+_NEARLY = 1e-6  # of a difference: what is left of it is rounding
+
+
+@dataclass(frozen=True)
+class Missing:
+    """A component, and what comes of leaving it out of an otherwise whole state.
+
+    Attributes:
+        field: The engine's name of it.
+        points: Where the future differs without it, into whatever it is restored.
+        itself: Where it differs in the run itself, which nobody has written into.
+        gap: The worst of it.
+    """
+
+    field: str
+    points: tuple[str, ...]
+    itself: tuple[str, ...]
+    gap: FutureGap
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What the findings say of the state.
+
+    Attributes:
+        suffice: Candidates whose future was exact at every save point, whatever was restored.
+        fail: The others, and the largest gap of each.
+        agree: Candidates whose restores have one future, be it that of the run or not.
+        missing: Components without which something differs, and what.
+        idle: Components without which nothing differs.
+        smallest: Whether those of `missing` alone suffice; None where that was not tried.
+        forgotten: By way to save, what it does not bring back.
+        touching: By save point, how far off all that can be written is in a fresh one, as
+            it stands and with contacts switched off.
+        not_read_back: Candidates that do not read back as they were saved, before any step,
+            and where.
+    """
+
+    suffice: tuple[str, ...]
+    fail: dict[str, FutureGap]
+    agree: tuple[str, ...]
+    missing: tuple[Missing, ...]
+    idle: tuple[str, ...]
+    smallest: bool | None
+    forgotten: dict[str, tuple[str, ...]]
+    touching: dict[str, tuple[FutureGap, FutureGap]]
+    not_read_back: dict[str, tuple[str, ...]]
+
+    @property
+    def in_contact(self) -> tuple[str, ...]:
+        """Where nearly all that is missing acts through contacts, and nothing else."""
+        return tuple(
+            point
+            for point, (standing, off) in self.touching.items()
+            if not standing.exact and off.size <= _NEARLY * standing.size
+        )
+
+
+def conclude(findings: Sequence[AuditFinding]) -> Conclusion:
+    """Draw the conclusion of one driver's findings."""
+    restores = [finding for finding in findings if finding.experiment == RESTORE]
+    tried = _by_case(finding for finding in restores if finding.into != EACH_OTHER)
+    among = _by_case(finding for finding in restores if finding.into == EACH_OTHER)
+    left_out = _by_case(
+        finding
+        for finding in findings
+        if finding.experiment == WITHOUT and finding.into != EACH_OTHER
+    )
+    alone = tried.pop(ONLY, None)
+    return Conclusion(
+        suffice=tuple(case for case in tried if not _differing(tried[case])),
+        fail={case: _worst(tried[case]) for case in tried if _differing(tried[case])},
+        agree=tuple(case for case in among if case in tried and not _differing(among[case])),
+        missing=tuple(_missing(name, left_out[name]) for name in _that_matter(left_out)),
+        idle=tuple(name for name in left_out if name not in _that_matter(left_out)),
+        smallest=None if alone is None else not _differing(alone),
+        forgotten=_forgotten(findings),
+        touching=_touching(findings),
+        not_read_back={
+            case: points
+            for case, of_case in tried.items()
+            if (points := _differing(finding for finding in of_case if finding.gap.first == 0))
+        },
+    )
+
+
+def _by_case(findings: Iterable[AuditFinding]) -> dict[str, list[AuditFinding]]:
+    cases: dict[str, list[AuditFinding]] = {}
+    for finding in findings:
+        cases.setdefault(finding.case, []).append(finding)
+    return cases
+
+
+def _that_matter(cases: Mapping[str, Sequence[AuditFinding]]) -> list[str]:
+    return [name for name, findings in cases.items() if _differing(findings)]
+
+
+def _differing(findings: Iterable[AuditFinding]) -> tuple[str, ...]:
+    """The save points at which a future differs."""
+    return tuple(dict.fromkeys(finding.point for finding in findings if not finding.gap.exact))
+
+
+def _worst(findings: Sequence[AuditFinding]) -> FutureGap:
+    return worst([finding.gap for finding in findings])
+
+
+def _missing(name: str, findings: Sequence[AuditFinding]) -> Missing:
+    itself = _differing(finding for finding in findings if finding.into == ITSELF)
+    return Missing(name, _differing(findings), itself, _worst(findings))
+
+
+def _forgotten(findings: Iterable[AuditFinding]) -> dict[str, tuple[str, ...]]:
+    """What each way to save does not bring back."""
+    forgotten: dict[str, dict[str, None]] = {}
+    for finding in findings:
+        if finding.experiment == FORGETS and finding.into != NOT_RESTORED:
+            cases = forgotten.setdefault(finding.into, {})
+            if not finding.gap.exact:
+                cases[finding.case] = None
+    return {way: tuple(cases) for way, cases in forgotten.items()}
+
+
+def _touching(findings: Sequence[AuditFinding]) -> dict[str, tuple[FutureGap, FutureGap]]:
+    """By save point the same restore, as it stands and with contacts switched off."""
+    restores = {(f.case, f.into, f.point): f.gap for f in findings if f.experiment == RESTORE}
+    return {
+        off.point: (restores[off.case, off.into, off.point], off.gap)
+        for off in findings
+        if off.experiment == NO_CONTACTS
+    }

@@ -1,0 +1,112 @@
+"""Our own interface, on any backend: the seven verbs and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+import numpy as np
+
+from ...engines.auditing import Disturbance, Driver, Measured, Restore, SaveMethod, SavePoint
+from ...errors import UnsupportedError
+from ...interface import (
+    DERIVED,
+    INPUTS,
+    Array,
+    Data,
+    Model,
+    State,
+    forward,
+    get_state,
+    make_data,
+    reset,
+    set_state,
+    step,
+)
+
+
+class InterfaceDriver(Driver):
+    """The interface to an engine."""
+
+    layer = "interface"
+    legend = (
+        "'qpos qvel …' are written into the arrays of a Data; get_state and set_state are the "
+        "two verbs."
+    )
+
+    def __init__(self, model: Model, seed: int) -> None:
+        super().__init__(model, seed)
+        self.name = f"this interface on {model.backend}"
+
+    def fresh(self, point: SavePoint) -> Data:
+        return make_data(point.model)
+
+    def reset(self, machine: Data) -> None:
+        reset(machine.model, machine)
+
+    def advance(self, machine: Data, nstep: int = 1) -> None:
+        step(machine.model, machine, nstep)
+
+    def _measure(self, point: SavePoint) -> Measured:
+        with self.at(point) as machine:
+            forward(machine.model, machine)
+            speed = float(np.abs(machine.qvel).max(initial=0.0))
+            contacts = len(machine.contacts)
+            return Measured(point.name, point.how, machine.time, contacts, None, speed)
+
+    def save_methods(self, point: SavePoint) -> tuple[SaveMethod, ...]:
+        exact = point.model.capabilities.exact_restore
+        return (
+            _written("qpos", "qvel"),
+            _written("qpos", "qvel", "ctrl", "time"),
+            SaveMethod("get_state, set_state", _state, promised=exact, agree=True),
+        )
+
+    def disturbances(self, point: SavePoint) -> tuple[Disturbance, ...]:
+        def ask(machine: Data) -> None:
+            forward(machine.model, machine)
+            _read_all(machine)
+
+        return (
+            Disturbance("forward", lambda machine: forward(machine.model, machine)),
+            Disturbance("reading what is derived", _read_all),
+            Disturbance("forward, then reading", ask),
+            Disturbance("get_state", lambda machine: get_state(machine.model, machine)),
+        )
+
+    def state(self, point: SavePoint) -> State:
+        """The State at a save point, to be put into a Data elsewhere."""
+        with self.at(point) as machine:
+            return get_state(machine.model, machine)
+
+    def future(self, point: SavePoint, state: State, steps: int) -> Array:
+        """What follows from a State in a new Data."""
+        with self.new(point) as machine:
+            set_state(machine.model, machine, state)
+            return self.drive(machine, point, steps)
+
+
+def _written(*names: str) -> SaveMethod:
+    @contextmanager
+    def save(machine: Data) -> Iterator[Restore]:
+        kept = {name: np.array(getattr(machine, name)) for name in names}
+
+        def restore(other: Data) -> None:
+            for name, value in kept.items():
+                setattr(other, name, value if name in INPUTS else float(value))
+
+        yield restore
+
+    return SaveMethod(" ".join(names), save)
+
+
+@contextmanager
+def _state(machine: Data) -> Iterator[Restore]:
+    kept = get_state(machine.model, machine)
+    yield lambda other: set_state(other.model, other, kept)
+
+
+def _read_all(machine: Data) -> None:
+    for name in (*DERIVED, "contacts"):
+        with suppress(UnsupportedError):
+            getattr(machine, name)

@@ -1,0 +1,307 @@
+"""The engine's own words: which of its functions a few lines of code made it run.
+
+The code is run as it is typed, statement by statement. While it runs, the functions of the
+engine's module are replaced by ones that count, and that look at the engine before and
+after; then all are put back. The interface knows nothing of it.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import io
+import linecache
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import redirect_stdout
+from dataclasses import dataclass
+from typing import Any
+
+from ..engines import room, rooms_with
+from ..engines.call_watch import CallWatch, WatchedObject
+from ..errors import BadInputError, StateMachineError, unknown_name
+from ..installed import engine_version, require
+from ..interface import Model
+
+# What stands in `Call.changed` for something that was not there before, or is no more.
+NEW, CLOSED = "new", "closed"
+
+
+@dataclass(frozen=True)
+class Call:
+    """One function of an engine, as often as a statement made it run on one thing.
+
+    Attributes:
+        function: Its name; a method after its class.
+        on: What it was called on: the variable that leads there, or a role; "" for nothing.
+        count: How often.
+        changed: What differs, bit by bit, after at least one of the calls from before it.
+            All of the engine's own names; `NEW` or `CLOSED` for the thing as a whole.
+        engine: Whose function it is.
+    """
+
+    function: str
+    on: str
+    count: int
+    changed: tuple[str, ...]
+    engine: str
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One statement of the code and what it made the engine do.
+
+    Attributes:
+        source: As it was typed; several lines for a loop.
+        line: Its first line, from 1.
+        calls: In the order of their first appearance.
+        changed: What changed outside any call, as code would spell it: "data.qpos[1]". Where
+            the interface has arrays of its own, theirs are here too. Writes into objects that
+            no variable leads to are left out; arrays of a model beyond 64 kB (meshes,
+            pictures) are compared at the statement's ends only, and so end up here.
+        printed: What it printed.
+        due: Each Data of which all that is derived now belongs to another moment, and is
+            computed when it is read.
+    """
+
+    source: str
+    line: int
+    calls: tuple[Call, ...]
+    changed: tuple[str, ...]
+    printed: str
+    due: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class CallRecording:
+    """A run of a few lines of code.
+
+    Attributes:
+        engine: Whose calls were recorded.
+        version: The engine's.
+        statements: Those that ran, the failed one included.
+        error: What the library had to say where it refused to go on, in one line.
+    """
+
+    engine: str
+    version: str
+    statements: tuple[Statement, ...]
+    error: str | None = None
+
+    @property
+    def printed(self) -> str:
+        """All that was printed."""
+        return "".join(statement.printed for statement in self.statements)
+
+
+class _Tally:
+    """The calls of one function on one thing, within a statement."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.changed: dict[tuple[WatchedObject, str], None] = {}
+
+
+class CallRecorder:
+    """Functions of engines replaced while it is entered; one at a time in a process."""
+
+    _active = False
+
+    def __init__(self, watches: Sequence[CallWatch]) -> None:
+        self._watches = watches
+        self._replaced: list[tuple[Any, str, Any]] = []
+        self._listening = False  # only while a statement runs, and not within a call
+        self._tallies: dict[tuple[str, str, WatchedObject | None], _Tally] = {}
+        self._written: dict[tuple[WatchedObject, str], set[str]] = {}
+
+    def __enter__(self) -> CallRecorder:
+        if CallRecorder._active:
+            raise BadInputError("a run that is recorded cannot record another")
+        CallRecorder._active = True
+        try:
+            for watch in self._watches:
+                for owner, attribute, function in watch.functions():
+                    self._replace(watch, owner, attribute, function)
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self._listening = False
+        while self._replaced:
+            setattr(*self._replaced[-1])
+            self._replaced.pop()  # after it, so that no interrupt leaves one out
+        CallRecorder._active = False
+
+    def _replace(self, watch: CallWatch, owner: Any, attribute: str, function: str) -> None:
+        original = vars(owner)[attribute]  # as it lies there: of a class, a descriptor
+        bare = getattr(owner, attribute)
+
+        @functools.wraps(bare)
+        def counted(*args: Any, **kwargs: Any) -> Any:
+            # A Data keeps the function that it was made with: it may outlive the recording.
+            if not self._listening:
+                return bare(*args, **kwargs)
+            return self._call(watch, function, bare, args, kwargs)
+
+        static = isinstance(original, staticmethod)
+        self._replaced.append((owner, attribute, original))
+        setattr(owner, attribute, staticmethod(counted) if static else counted)
+
+    def begin(self) -> None:
+        """A statement is about to run."""
+        self._tallies, self._written = {}, {}
+        self._listening = True
+
+    def end(
+        self, namespace: Mapping[str, Any]
+    ) -> tuple[tuple[Call, ...], tuple[str, ...], tuple[str, ...]]:
+        """A statement has run: its calls, what changed outside them, whose values are due."""
+        self._listening = False
+        due: list[str] = []
+        for watch in self._watches:
+            watch.name(namespace)
+            for watched in watch.living():
+                self._note_writes(watched, thoroughly=True)
+                if watched.due():
+                    due.append(watched.title)
+        merged: dict[tuple[str, str, str], tuple[int, dict[str, None]]] = {}
+        for (engine, function, on), tally in self._tallies.items():
+            key = engine, function, on.title if on else ""
+            count, names = merged.get(key, (0, {}))
+            for watched, field in tally.changed:
+                names[field if watched is on else watched.spelled(field)] = None
+            merged[key] = count + tally.count, names
+        calls = tuple(
+            Call(function, on, count, tuple(names), engine)
+            for (engine, function, on), (count, names) in merged.items()
+        )
+        changed = tuple(
+            watched.spelled(field if len(entries) > 1 else next(iter(entries)))
+            for (watched, field), entries in self._written.items()
+            if watched.named
+        )
+        return calls, changed, tuple(due)
+
+    def _call(
+        self, watch: CallWatch, function: str, bare: Callable[..., Any], args: Any, kwargs: Any
+    ) -> Any:
+        self._listening = False
+        try:
+            objects = watch.concerned(function, args, kwargs)
+            if objects is None:
+                return bare(*args, **kwargs)
+            for watched in objects:
+                self._note_writes(watched)
+            made = None
+            try:
+                result = bare(*args, **kwargs)
+                made = watch.made(function, args, result)
+                return result
+            finally:
+                on = made or (objects[0] if objects else None)
+                tally = self._tallies.setdefault((watch.engine, function, on), _Tally())
+                tally.count += 1
+                if made:
+                    made.seen = made.look()
+                    tally.changed[made, NEW] = None
+                for watched in objects:
+                    for field in _changed(watched):
+                        tally.changed[watched, field] = None
+        finally:
+            self._listening = True
+
+    def _note_writes(self, watched: WatchedObject, thoroughly: bool = False) -> None:
+        """Whatever differs from the last look was changed by no call."""
+        before, now = watched.seen, watched.look(thoroughly)
+        if now is None:
+            return
+        if before is not None:
+            for field in watched.differing(before, now):
+                entries = self._written.setdefault((watched, field), set())
+                entries.add(watched.entry(field, before.get(field, b""), now[field]))
+        watched.seen = {**(before or {}), **now}
+
+
+def _changed(watched: WatchedObject) -> list[str]:
+    """What differs from the look before a call."""
+    before, now = watched.seen, watched.look()
+    if now is None or before is None:
+        return [CLOSED] if now is None else []
+    watched.seen = {**before, **now}
+    return watched.differing(before, now)
+
+
+def recorded_engines() -> list[str]:
+    """Engines whose rooms say how their calls are watched; none of them is imported."""
+    return rooms_with("call_watch")
+
+
+def record(code: str, engine: str) -> CallRecording:
+    """Run code in a fresh namespace and record the calls that it makes to an engine.
+
+    What is recorded are calls of functions in the engine's Python module, of methods of its
+    objects, and of the other engines that its backend calls; reading an array is no call. A call
+    that another one makes inside the engine is not seen.
+
+    Args:
+        code: Statements, as they are typed; they name their backend themselves.
+        engine: One of `recorded_engines()`, the engine of that backend.
+
+    Raises:
+        UnknownNameError: No recorder knows this engine.
+        MissingEngineError: It is not installed here.
+        BadInputError: The code loaded a model on another engine, or records a run itself.
+        Exception: Whatever else the code raised; a StateMachineError ends the run instead,
+            and is in the recording.
+    """
+    if engine not in recorded_engines():
+        raise unknown_name("engine whose calls can be recorded", engine, recorded_engines())
+    require(engine)
+    watch = room(engine).call_watch()
+    watches = [watch, *(room(helper).call_watch() for helper in watch.words.helpers)]
+    namespace: dict[str, Any] = {"__name__": "__main__"}
+    done: list[Statement] = []
+    error = None
+    with CallRecorder(watches) as recorder:
+        for source, line, run in statements(code):
+            out = io.StringIO()
+            recorder.begin()
+            try:
+                with redirect_stdout(out):
+                    run(namespace)
+            except StateMachineError as refusal:
+                error = " ".join(str(refusal).split())
+            calls, changed, due = recorder.end(namespace)
+            done.append(Statement(source, line, calls, changed, out.getvalue(), due))
+            if error is not None:
+                break
+    for name, value in namespace.items():
+        if isinstance(value, Model) and value.backend != engine:
+            raise BadInputError(
+                f"the code's {name} is on {value.backend}, and {engine} was to be recorded"
+            )
+    return CallRecording(engine, engine_version(engine), tuple(done), error)
+
+
+def statements(code: str) -> Iterator[tuple[str, int, Callable[[dict[str, Any]], None]]]:
+    """Source, first line, and a function that runs it in a namespace, of each statement."""
+    name = "<lesson>"
+    lines = code.splitlines()
+    linecache.cache[name] = (len(code), None, [f"{line}\n" for line in lines], name)
+    body = ast.parse(code, name).body
+    firsts = [
+        min([node.lineno, *(each.lineno for each in getattr(node, "decorator_list", []))])
+        for node in body
+    ]
+    ends = [node.end_lineno or node.lineno for node in body]
+    for k, (node, first, end) in enumerate(zip(body, firsts, ends, strict=True)):
+        shared = (k > 0 and ends[k - 1] == first) or firsts[k + 1 : k + 2] == [end]
+        whole = "\n".join(lines[first - 1 : end])
+        source = (ast.get_source_segment(code, node) or whole) if shared else whole
+        compiled = compile(ast.Module([node], []), name, "exec", dont_inherit=True)
+
+        def run(namespace: dict[str, Any], compiled: Any = compiled) -> None:
+            exec(compiled, namespace)
+
+        yield source, first, run

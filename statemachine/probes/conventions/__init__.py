@@ -1,0 +1,147 @@
+"""What each engine takes for granted: questions, each asked of the raw engines.
+
+A question is a `Convention`: its words, what the engines are given for it, and a function that
+lets the answer follow from what an engine did, so that one that behaved otherwise would get another
+answer. What the engine does is measured in its room (`RawEngine.measurement`). Nothing goes through
+the adapters that keep our contract. An engine whose room measures nothing is not asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from ...engines import room, room_names
+from ...engines.measured import Absent, Measurement
+from ...errors import unknown_name
+from ...installed import ENGINES, engine_version, require
+from . import frames, memory, motion
+from .answers import NO_ANSWER, UNDECIDED, Answers, Convention, EngineAnswer, EngineQuestion
+
+__all__ = [
+    "NO_ANSWER",
+    "QUESTIONS",
+    "UNDECIDED",
+    "Answered",
+    "Answers",
+    "Conventions",
+    "EngineAnswer",
+    "EngineQuestion",
+    "ask",
+    "check_engine",
+    "check_questions",
+    "probe",
+    "versions",
+]
+
+# In the order in which a newcomer meets them.
+QUESTIONS: dict[str, Convention] = {
+    "quaternion": frames.quaternion,
+    "velocity": frames.velocity,
+    "gravity": motion.gravity,
+    "timestep": motion.timestep,
+    "actuation": motion.actuation,
+    "command": motion.command,
+    "damping": motion.damping,
+    "write": memory.write,
+    "step": memory.step,
+    "joints": frames.joints,
+    "reset": memory.reset,
+    "friction": motion.friction,
+    "save": memory.save,
+    "future": memory.future,
+}
+
+
+@dataclass(frozen=True)
+class Answered:
+    """A question and what was found, by engine; None of one that was not asked."""
+
+    name: str
+    question: EngineQuestion
+    findings: dict[str, Answers | None]
+
+
+@dataclass(frozen=True)
+class Conventions:
+    """All that was asked, and of which versions."""
+
+    versions: dict[str, str]
+    questions: tuple[Answered, ...]
+
+
+def ask(question: str, engine: str) -> Answers | None:
+    """What one engine does about one question; None if its room has no measurement for it.
+
+    Args:
+        question: One of `QUESTIONS`.
+        engine: A key of `installed.ENGINES`, or an engine of another package with a room.
+
+    Raises:
+        MissingEngineError: The engine is not installed here.
+        UnknownNameError: There is no such question, or no such engine.
+    """
+    check_questions((question,))
+    check_engine(engine)
+    measure = room(engine).measurement(question)
+    if measure is None:
+        return None
+    asked = QUESTIONS[question]
+    measured = measure(*asked.given)
+    return _absent(measured) if isinstance(measured, Absent) else asked.answer(measured)
+
+
+def _absent(looked: Absent) -> Answers:
+    counted = Measurement(f"functions called …{'…, …'.join(looked.words)}…:", len(looked.names))
+    words = ", ".join(looked.names) or NO_ANSWER
+    return (EngineAnswer(words, (counted, *looked.figures), looked.part),)
+
+
+def probe(
+    engines: Sequence[str],
+    questions: Sequence[str] = tuple(QUESTIONS),
+    progress: Callable[[float], None] = lambda _fraction: None,
+) -> Conventions:
+    """Ask each engine each question.
+
+    Args:
+        engines: Keys of `installed.ENGINES`.
+        questions: Some of `QUESTIONS`.
+        progress: Told the fraction that is done.
+
+    Raises:
+        MissingEngineError: An engine is not installed here.
+        UnknownNameError: There is no such question, or no such engine.
+    """
+    check_questions(questions)
+    asked: dict[str, dict[str, Answers | None]] = {name: {} for name in questions}
+    pairs = [(name, engine) for name in questions for engine in engines]
+    for done, (name, engine) in enumerate(pairs):
+        progress(done / len(pairs))
+        asked[name][engine] = ask(name, engine)
+    return Conventions(
+        versions(engines),
+        tuple(Answered(name, QUESTIONS[name].question, found) for name, found in asked.items()),
+    )
+
+
+def check_questions(questions: Sequence[str]) -> None:
+    """Raise UnknownNameError for a question that there is not."""
+    for name in questions:
+        if name not in QUESTIONS:
+            raise unknown_name("question", name, QUESTIONS)
+
+
+def check_engine(name: str) -> None:
+    """Raise MissingEngineError or UnknownNameError for an engine that cannot be asked here.
+
+    An engine of another package that has a room, and is none of ours, is taken as it is.
+    """
+    if name in ENGINES or name not in room_names():
+        require(name)
+    room(name)
+
+
+def versions(engines: Sequence[str]) -> dict[str, str]:
+    """Version of each engine; "" of one of another package."""
+    return {name: engine_version(name) if name in ENGINES else "" for name in engines}

@@ -1,0 +1,280 @@
+"""Of which moment are the derived arrays of a Data, and how wrong are they by now?
+
+    print(sm.freshness(model, data))  # a table: each array, of which moment, how far off
+
+A write marks nothing dirty, and a step leaves values of the state before it. Nothing is
+recorded on the way, so that who does not ask pays nothing: `freshness` finds out afterwards,
+by computing what the derived values would be now in another Data. `watch` counts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+
+from ..interface import (
+    DERIVED,
+    INPUTS,
+    POSES,
+    Array,
+    Contacts,
+    Data,
+    JointType,
+    Model,
+    State,
+    forward,
+    get_state,
+    make_data,
+    set_state,
+)
+from ..measures import Gap
+from ..measures.readings import Readings, readings
+from ..measures.text import count, few, listed, milliseconds
+from ..rotations import times
+from .stale_rows import Freshness, Row, gaps, same
+
+# The inputs that each is computed from; a write to another is no reason why it is stale.
+DEPEND = dict.fromkeys(DERIVED, INPUTS) | {"contacts": INPUTS}
+DEPEND |= dict.fromkeys(POSES, INPUTS[:1])
+DEPEND |= dict.fromkeys(("qfrc_bias", "qfrc_passive"), INPUTS[:2])
+_ROUNDING = 1e-12  # of poses that are equal but for the order of additions [m, and 1]
+
+
+@dataclass(frozen=True)
+class Age:
+    """How old derived values are, as far as it is known.
+
+    Attributes:
+        steps: Engine steps since; None if that is not known.
+        writes: Changes of each input since; None if nobody counted.
+        never: Whether nothing was derived since the Data was made, reset or set.
+        written: Entries of the inputs that are others now; known only while watching.
+        retraced: Bodies that are where one step back has them, within `within` [m, and of
+            quaternions 1], where that is how the number of steps was found; strays: bodies
+            that are not of now and not there either.
+    """
+
+    steps: int | None = None
+    writes: Mapping[str, int] | None = None
+    never: bool = False
+    written: tuple[str, ...] = ()
+    retraced: tuple[str, ...] = ()
+    strays: tuple[str, ...] = ()
+    within: float = 0.0
+
+
+class Scratch:
+    """Another Data of a Model, in which the present of any Data of it is computed."""
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        self._data = make_data(model)
+
+    def now(self, state: State) -> Readings:
+        """All that `forward` would compute in a state."""
+        set_state(self._model, self._data, state)
+        forward(self._model, self._data)
+        return readings(self._data, copied=True)
+
+    def one_step_back(self, state: State) -> Array:
+        """The poses (nbody, 7) of the bodies in the state that a step led to this one from.
+
+        The engines integrate semi-implicitly: the new velocity moves the old position, and
+        moves the new one back. The velocity of that state cannot be found so.
+        """
+        model, data = self._model, self._data
+        set_state(model, data, state)
+        data.qpos[:] = back(model, state["qpos"], state["qvel"], engine_step(model))
+        forward(model, data)
+        return np.hstack((data.xpos, data.xquat))
+
+    def close(self) -> None:
+        """Give the Data back."""
+        self._data.close()
+
+
+def row(model: Model, name: str, held: Array | Contacts, now: Array | Contacts, age: Age) -> Row:
+    """What is to be told of one array."""
+    if same(held, now):
+        return Row(name, True, 0, 0, "now", ())
+    return stale_row(model, name, age, gaps(model, name, held, now))
+
+
+def stale_row(model: Model, name: str, age: Age, found: tuple[Gap, ...]) -> Row:
+    """What is to be told of an array that is not of now, and off by `found`."""
+    if age.never:
+        return Row(name, False, None, None, "never computed", found)
+    writes = None
+    if age.writes is not None:
+        writes = sum(age.writes[each] for each in DEPEND[name])
+    words = []
+    if age.steps:
+        words.append(count(age.steps, "substep" if model.substeps > 1 else "step"))
+    if writes:
+        words.append(count(writes, "write"))
+    of = f"{listed(words)} ago" if words else "an earlier state"
+    return Row(name, False, age.steps, writes, of, found)
+
+
+def age_of(model: Model, state: State, held: Readings, now: Readings, scratch: Scratch) -> Age:
+    """How old derived values are, from nothing but their values.
+
+    Args:
+        model: Of the Data.
+        state: What the Data is in now.
+        held: What it says.
+        now: What it would say now.
+        scratch: Where other states are tried.
+    """
+    if all(same(held[name], now[name]) for name in held):
+        return Age(steps=0)
+    if not _array(held, "xquat").any():  # a rotation is never zero
+        return Age(never=True)
+    poses = np.hstack((_array(held, "xpos"), _array(held, "xquat")))
+    lag = np.abs(np.hstack((_array(now, "xpos"), _array(now, "xquat"))) - poses).max(axis=1)
+    if not lag.any():  # the poses, which alone can be retraced, are of now
+        return Age()
+    off = np.abs(scratch.one_step_back(state) - poses).max(axis=1)
+    # Nearer than rounding makes them, and much nearer than those of now. One body is enough:
+    # what else is not there was written since.
+    moved = lag > 0
+    there = moved & (off <= _ROUNDING * (1 + np.abs(poses).max())) & (off <= lag / 100)
+    if not there.any():
+        return Age()
+
+    def names(chosen: Any) -> tuple[str, ...]:
+        return tuple(model.body_names[b] or f"body {b}" for b in np.flatnonzero(chosen).tolist())
+
+    return Age(
+        steps=1,
+        retraced=names(there),
+        strays=names(moved & ~there),
+        within=float(off[there].max()),
+    )
+
+
+def back(model: Model, qpos: Array, qvel: Array, seconds: float) -> Array:
+    """Positions (nq,) that would move to `qpos` in a time, at the velocities `qvel` (nv,).
+
+    The inverse of `mj_integratePos`: a quaternion turns about an axis of the body.
+    """
+    found = np.array(qpos)
+    for joint, kind in enumerate(model.jnt_type.tolist()):
+        place, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+        if kind in (JointType.HINGE, JointType.SLIDE):
+            found[place] -= seconds * qvel[dof]
+            continue
+        if kind == JointType.FREE:
+            found[place : place + 3] -= seconds * qvel[dof : dof + 3]
+            place, dof = place + 3, dof + 3
+        spin = qvel[dof : dof + 3]
+        speed = float(np.linalg.norm(spin))
+        if speed:
+            half = -seconds * speed / 2
+            turn = np.array([math.cos(half), *(math.sin(half) * spin / speed)])
+            found[place : place + 4] = times(qpos[place : place + 4], turn)
+    return found
+
+
+def _array(found: Readings, name: str) -> Array:
+    array = found[name]
+    assert isinstance(array, np.ndarray)
+    return array
+
+
+def engine_step(model: Model) -> float:
+    """Simulated time of one step of the engine [s]."""
+    return model.timestep / model.substeps
+
+
+_REMEMBERED = {"contacts", "qacc", "qfrc_constraint", "qfrc_contact"}
+
+
+def freshness(model: Model, data: Data) -> Freshness:
+    """Of which moment is each derived array of `data`, and how wrong is it by now?
+
+    It needs no preparation and changes nothing: what the arrays would be now is computed in
+    another Data. An array is of now if `forward` would leave every number of it as it is.
+    Otherwise it is one step old if its poses are those of qpos − h·qvel; how many writes ago
+    only `watch_freshness` can tell.
+
+    Args:
+        model: The Model that made `data`.
+        data: Read, and not touched.
+
+    Raises:
+        ForeignDataError: `data` was made by another Model.
+        BadInputError: An input is not finite.
+        DivergedError: The Data diverged earlier.
+        ClosedDataError: `data` is closed.
+    """
+    state = get_state(model, data)
+    watch = getattr(type(data), "_watch", None)
+    with nullcontext() if watch is None else watch.aside():
+        held = readings(data)
+    if watch is not None:
+        now, age = watch.now(state), watch.age()
+    else:
+        scratch = Scratch(model)
+        try:
+            now = scratch.now(state)
+            age = age_of(model, state, held, now, scratch)
+        finally:
+            scratch.close()
+    touching = any(len(cast("Contacts", found["contacts"])) for found in (held, now))
+    rows = tuple(row(model, name, held[name], now[name], age) for name in held)
+    return Freshness(
+        backend=model.backend,
+        engine_version=model.engine_version,
+        model=model.path.stem,
+        time=state.time,
+        rows=rows,
+        written=age.written,
+        notes=tuple(_notes(model, rows, age, touching)),
+    )
+
+
+def _notes(model: Model, rows: tuple[Row, ...], age: Age, touching: bool) -> Iterator[str]:
+    behaviours = model.capabilities.behaviours
+    stale = [each.name for each in rows if not each.now]
+    untold = [name for name in DERIVED if name not in {each.name for each in rows}]
+    if untold:
+        yield f"This backend does not tell: {', '.join(untold)}."
+    if not stale:
+        yield "All are of now."
+        return
+    yield from _how(model, age, not set(POSES).isdisjoint(stale))
+    if age.written:
+        yield f"Written since: {', '.join(age.written)}."
+    if behaviours["stale after a step"].support == "unsupported":
+        yield f"After a step: {behaviours['stale after a step'].note}."
+    if touching and not model.capabilities.exact_restore and not _REMEMBERED.isdisjoint(stale):
+        yield (
+            "In contacts, and the forces and accelerations of what touches, not all of the "
+            f"difference need be age: {behaviours['exact restore'].note}."
+        )
+    yield "sm.forward(model, data) makes all of them of now."
+
+
+def _how(model: Model, age: Age, poses: bool) -> Iterator[str]:
+    """How the moment was found, or what stood in the way."""
+    if age.retraced:
+        exact = f"to {age.within:.1e} m" if age.within else "to the bit"
+        yield (
+            f"Found by going back: qpos − h·qvel, h = {milliseconds(engine_step(model))}, gives "
+            f"the poses of {few(age.retraced)}, {exact}."
+        )
+        if age.strays:
+            yield (
+                f"Not so {few(age.strays)}: qpos or qvel was written since, or the engine "
+                "integrates otherwise."
+            )
+    elif not age.never and age.steps is None:
+        if poses:
+            yield "Going back one step, to qpos − h·qvel, does not lead to these poses."
+        yield "Writes are not recorded, unless sm.watch_freshness(model, data) does."

@@ -1,0 +1,284 @@
+"""`watch_freshness`: writes and steps are counted, and stale reads are found as they happen.
+
+The class of the Data is changed to a subclass for a while, so that every name for it is
+watched, and nothing is left in the way of who does not watch.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from ..errors import BadInputError, StaleReadError
+from ..interface import INPUTS, Array, Contacts, Data, Model, State, get_state
+from ..measures import Gap
+from ..measures.readings import Readings, readings
+from ..measures.text import few
+from .freshness import DEPEND, Age, Scratch, age_of, row, stale_row
+from .stale_rows import Row, StaleRead, table, told
+
+_PACKAGE = str(Path(os.path.abspath(__file__)).parent.parent) + os.sep
+
+
+def watch_freshness(model: Model, data: Data, raise_on_stale: bool = False) -> Watch:
+    """Watch a Data: count writes and steps, and note or refuse stale reads.
+
+    For example::
+
+        with sm.watch_freshness(model, data) as watch:
+            controller(model, data)
+        print(watch)  # which line read what, how often, of which moment, how far off
+
+    Every name for the Data is watched, in whatever object. Not seen are reads through
+    `data.raw` and through an array that was kept from an earlier read; steps of `data.raw`
+    count as writes. Two writes through an array that was kept may count as one.
+
+    Args:
+        model: The Model that made `data`.
+        data: To be watched from `with` until its end.
+        raise_on_stale: Whether a read of what is not of now raises StaleReadError. An array
+            that would come out of `forward` as it is, is of now, whatever was written.
+
+    Raises:
+        ForeignDataError: `data` was made by another Model.
+        BadInputError: It is watched already, or an input is not finite.
+        DivergedError: The Data diverged earlier.
+        ClosedDataError: `data` is closed.
+    """
+    return Watch(model, data, raise_on_stale)
+
+
+class Watch:
+    """A Data under watch; see `watch_freshness`.
+
+    Attributes:
+        reads: How often something derived was read.
+    """
+
+    def __init__(self, model: Model, data: Data, raise_on_stale: bool) -> None:
+        get_state(model, data)  # what is wrong with them is said here
+        self._model, self._data, self._raise = model, data, raise_on_stale
+        self.reads = 0
+        self._found: dict[tuple[str, str, str], StaleRead] = {}
+        self._aside = False
+
+    @property
+    def stale_reads(self) -> tuple[StaleRead, ...]:
+        """What was read while it was stale: by array, line and moment, in order of appearance."""
+        return tuple(self._found.values())
+
+    def __str__(self) -> str:
+        stale = sum(read.count for read in self.stale_reads)
+        head = f"{stale} of {self.reads} reads were stale"
+        cells = [
+            (r.name, r.place, str(r.count), r.of, told(r.gaps) or "not to be told")
+            for r in self.stale_reads
+        ]
+        headers = ("array", "read at", "times", "of", "worst")
+        return "\n".join([head, *(table(headers, cells) if cells else ())])
+
+    def __enter__(self) -> Watch:
+        model, data = self._model, self._data
+        if hasattr(type(data), "_watch"):
+            raise BadInputError("this Data is watched already")
+        state = get_state(model, data)
+        self._scratch = Scratch(model)
+        self._present: tuple[bytes, Readings] | None = None
+        try:
+            age = age_of(model, state, readings(data), self.now(state), self._scratch)
+        except BaseException:
+            self._scratch.close()
+            raise
+        self._begin(age.steps, age.never, state if age.steps == 0 else None)
+        self._kind, self._advance = type(data), data._advance
+        data._advance = self._advancing(self._advance)
+        data.__class__ = _guarded(self._kind, self)
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self._data.__class__ = self._kind
+        if self._data._advance is not None:  # it was not closed meanwhile
+            self._data._advance = self._advance
+        self._scratch.close()
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        """Reads that are not the watched program's."""
+        before, self._aside = self._aside, True
+        try:
+            yield
+        finally:
+            self._aside = before
+
+    def now(self, state: State) -> Readings:
+        """What `forward` would compute in a state."""
+        if self._present is None or self._present[0] != state.blob:
+            self._present = state.blob, self._scratch.now(state)
+        return self._present[1]
+
+    def age(self) -> Age:
+        """How old derived values are, as counted."""
+        self.touch()
+        return Age(
+            self._steps,
+            None if self._steps is None else dict(self._writes),
+            self._never,
+            tuple(self._entries()),
+        )
+
+    def touch(self) -> None:
+        """See whether an input was written since the last time."""
+        for name in INPUTS:
+            value = _SLOTS[name].__get__(self._data).tobytes()
+            if value != self._seen[name]:
+                self._seen[name] = value
+                self._writes[name] += 1
+
+    def check(self, name: str, held: Array | Contacts) -> None:
+        """Look at one read; raise if it is stale and that is wanted."""
+        if self._aside:
+            return
+        self.reads += 1
+        with self.aside():
+            found = self._row(name, held)
+        if found is None or found.now:
+            return
+        if self._raise:
+            raise _stale_read(found, [e for e in self._entries() if e.startswith(DEPEND[name])])
+        place = _place()
+        known = self._found.get((name, place, found.of))
+        if known is None:
+            worst, count = found.gaps, 0
+        else:
+            worst, count = _worst(known.gaps, found.gaps), known.count
+        self._found[name, place, found.of] = StaleRead(name, place, count + 1, found.of, worst)
+
+    def _row(self, name: str, held: Array | Contacts) -> Row | None:
+        age = self.age()
+        state = self._state()
+        if state is None:
+            return stale_row(self._model, name, age, ())
+        if self._fresh is not None and self._fresh == state.blob:
+            return None
+        return row(self._model, name, held, self.now(state)[name], age)
+
+    def _state(self) -> State | None:
+        """The present state; None where what was written is no number: there is no now."""
+        try:
+            return get_state(self._model, self._data)
+        except BadInputError:
+            return None
+
+    def _begin(self, steps: int | None, never: bool, state: State | None) -> None:
+        """From here on things are counted.
+
+        Args:
+            steps: How many steps ago derived values are of.
+            never: Whether there are none.
+            state: The state that they belong to, if that is the present one.
+        """
+        self._steps, self._never = steps, never
+        self._fresh = None if state is None else state.blob
+        self._at = {name: np.array(_SLOTS[name].__get__(self._data)) for name in INPUTS}
+        self._seen = {name: array.tobytes() for name, array in self._at.items()}
+        self._writes: dict[str, int] = dict.fromkeys(INPUTS, 0)
+
+    def _entries(self) -> Iterator[str]:
+        """Entries of the inputs that are others than when the arrays were computed."""
+        if self._steps is None:
+            return
+        for name, before in self._at.items():
+            after = _SLOTS[name].__get__(self._data)
+            for place in np.flatnonzero(before != after).tolist():
+                yield f"{name}[{place}]{self._model._coordinate_name(name, place)}"
+
+    def _advancing(self, advance: Callable[..., None]) -> Callable[..., None]:
+        def counted(*args: Any) -> None:
+            advance(*args)
+            self._begin(1, False, None)
+
+        return counted
+
+    def computed(self) -> None:
+        """`forward` was called."""
+        self._begin(0, False, self._state())
+
+    def forgotten(self) -> None:
+        """The Data was reset, or set to a State."""
+        self._begin(None, True, None)
+
+
+_SLOTS: Mapping[str, Any] = {name: vars(Data)[name] for name in INPUTS}
+
+
+def _guarded(kind: type[Data], watch: Watch) -> type[Data]:
+    """A subclass whose instances tell a Watch what is done with them."""
+
+    def after(name: str, tell: Callable[..., None]) -> Callable[..., Any]:
+        def hook(self: Any, *arguments: Any) -> Any:
+            value = getattr(kind, name)(self, *arguments)
+            tell(value, *arguments)
+            return value
+
+        return hook
+
+    def seen(slot: Any) -> property:
+        def get(self: Any) -> Array:
+            watch.touch()  # what was written through an earlier read
+            return slot.__get__(self)
+
+        return property(get, slot.__set__)
+
+    tells: dict[str, Callable[..., None]] = {
+        "_derive": lambda value, name: watch.check(name, value),
+        "_find_contacts": lambda value: watch.check("contacts", value),
+        "_recompute": lambda _: watch.computed(),
+        "_reset": lambda *_: watch.forgotten(),
+        "_set_state": lambda *_: watch.forgotten(),
+    }
+    hooks = {name: after(name, tell) for name, tell in tells.items()}
+    inputs = {name: seen(slot) for name, slot in _SLOTS.items()}
+    # Without slots of its own it has the layout that a change of class needs.
+    members = {"__slots__": (), "_watch": watch, **hooks, **inputs}
+    return cast("Any", type(kind))(kind.__name__, (kind,), members)
+
+
+def _stale_read(found: Row, entries: list[str]) -> StaleReadError:
+    never = found.of == "never computed"
+    facts = [told(found.gaps)] if found.gaps else []
+    if entries and not never:
+        facts.append(f"written since: {few(entries)}")
+    said = f"{found.name} {'was' if never else 'is of'} {found.of}"
+    said += f" ({'; '.join(facts)})" if facts else ""
+    return StaleReadError(
+        f"{said}: call sm.forward(model, data) before reading it",
+        name=found.name,
+        steps=found.steps,
+        writes=found.writes,
+        gaps=found.gaps,
+    )
+
+
+def _worst(one: tuple[Gap, ...], two: tuple[Gap, ...]) -> tuple[Gap, ...]:
+    """Of each kind the larger gap."""
+    found: dict[str, Gap] = {}
+    for gap in (*one, *two):
+        if gap.unit not in found or gap.shown > found[gap.unit].shown:
+            found[gap.unit] = gap
+    return tuple(found.values())
+
+
+def _place() -> str:
+    """File and line of the program that reads."""
+    frame: Any = sys._getframe(1)
+    while frame is not None and os.path.abspath(frame.f_code.co_filename).startswith(_PACKAGE):
+        frame = frame.f_back
+    if frame is None:
+        return "?"
+    return f"{Path(frame.f_code.co_filename).name}:{frame.f_lineno}"
