@@ -42,7 +42,7 @@ def test_milestones() -> None:
 
 def test_forces_sum_with_the_bias_on_the_other_side() -> None:
     names = ("bias", "actuator", "passive", "friction", "contact", "limit", "equality")
-    forces = {name: k + 1.0 for k, name in enumerate(names)}
+    forces: dict[str, float | None] = {name: k + 1.0 for k, name in enumerate(names)}
     assert summed(forces)["total"] == 2 + 3 + 4 + 5 + 6 + 7 - 1
     assert summed({**forces, "actuator": None})["total"] is None
 
