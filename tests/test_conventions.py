@@ -637,14 +637,6 @@ def test_the_answers_as_json(cli: Cli, engine: str) -> None:
         assert {"name", "value", "unit"} == finding["figures"][0].keys()
 
 
-def test_the_calls_as_json(cli: Cli, engine: str) -> None:
-    done = cli("conventions", "--calls", "--backend", engine, "--json")
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)["engines"][engine]
-    assert [call["concept"] for call in found] == list(phrasebook.CONCEPTS)
-    assert all(call["works"] and call["code"] for call in found)
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
