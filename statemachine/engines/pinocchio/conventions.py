@@ -91,14 +91,12 @@ def actuation(_seconds: float) -> list[LetGo]:
     return [("aba at zero torque", started, None, ())]
 
 
-def command(_torque: float) -> Absent:
-    """Whether it steps at all; a torque is an argument of each call."""
+def _no_step(*_given: float) -> Absent:
+    """Whether there is a step at all; a torque is an argument of each call."""
     return _absent("step", "simul")
 
 
-def damping(_seconds: float, _fast: float) -> Absent:
-    """Whether it steps at all."""
-    return _absent("step", "simul")
+command = damping = step = friction = _no_step
 
 
 def write(angle: float, _deep: float) -> list[ReadTwice]:
@@ -114,11 +112,6 @@ def write(angle: float, _deep: float) -> list[ReadTwice]:
     pin.updateFramePlacements(model, data)
     now, true = np.array(data.oMf[tip].translation), pendulum.tip_at(angle)
     return [(part, read, now, true) for part, read in reads.items()]
-
-
-def step(_speed: float, _deep: float) -> Absent:
-    """Whether there is a step at all."""
-    return _absent("step", "simul")
 
 
 def joints() -> dict[str, list[str]]:
@@ -139,12 +132,7 @@ def reset() -> Absent:
     return _absent("reset")
 
 
-def friction() -> Absent:
-    """Whether anything slides at all."""
-    return _absent("step", "simul")
-
-
-def save() -> float:
+def save(*_given: object) -> float:
     """Whether its Data holds a state: whether anything of its past shows in what comes out."""
     pin = require("pinocchio")
     model = pin.buildModelFromXML(pendulum.URDF)
@@ -156,6 +144,4 @@ def save() -> float:
     return float(np.abs(first - second).max())
 
 
-def future(_moments: Sequence[float], _steps: int) -> float:
-    """Whether a used Data computes anything else than a new one, of the same q and v."""
-    return save()
+future = save  # whether a used Data computes anything else than a new one, of the same q and v
