@@ -20,10 +20,9 @@ from rich.cells import cell_len
 from statemachine import engines
 from statemachine.cli import main
 from statemachine.compare.models.engines import own_ways
-from statemachine.engines import room
+from statemachine.engines import room, samples
 from statemachine.engines.mujoco import pile
-from statemachine.engines.samples import pendulum
-from statemachine.engines.samples.joint_tree import TREE
+from statemachine.engines.samples import TREE
 from statemachine.errors import BadInputError, MissingEngineError, UnknownNameError
 from statemachine.installed import ENGINES, require
 from statemachine.probes import phrasebook
@@ -249,9 +248,9 @@ def test_the_limp_pendulum_keeps_its_energy() -> None:
     """Half I ω² is what gravity gave; ω by a difference of two angles."""
     h = 1e-4
     for seconds in (0.1, 0.25, 0.4):
-        rate = (pendulum.limp(seconds + h) - pendulum.limp(seconds - h)) / (2 * h)
-        fallen = -pendulum.tip_at(pendulum.limp(seconds))[2] / pendulum.TIP
-        assert rate**2 == pytest.approx(2 * pendulum.RATE * fallen, rel=1e-5)
+        rate = (samples.limp(seconds + h) - samples.limp(seconds - h)) / (2 * h)
+        fallen = -samples.tip_at(samples.limp(seconds))[2] / samples.TIP
+        assert rate**2 == pytest.approx(2 * samples.RATE * fallen, rel=1e-5)
 
 
 def test_no_two_orders_of_the_joints_are_the_same() -> None:

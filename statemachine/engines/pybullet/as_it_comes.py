@@ -22,8 +22,7 @@ from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model
 from ..auditing import Restore, SavePoint
 from ..records import LeftAlone, Term, WayBack
-from ._audit_saves import Client, in_memory, put_back
-from .audit import PybulletDriver
+from .audit import Client, PybulletDriver, in_memory, put_back
 from .world import fresh_world, gravity_of, limp
 
 # Before a state is taken, while the jaws still touch what they hold; and after it.
