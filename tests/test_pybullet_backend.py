@@ -210,15 +210,10 @@ def test_replays_are_bit_identical(steps: int) -> None:
     assert len(set(runs)) == 1, runs
 
 
-def test_a_turning_body_adds_up_in_bulk(tmp_path: Path) -> None:
-    """Half a turn in one call is half a turn in many: of the two quaternions the same."""
-    one, many = _spun(tmp_path, (1, 20))
-    assert np.array_equal(one, many)
-
-
-def test_a_body_that_turns_far_adds_up_in_bulk(tmp_path: Path) -> None:
-    one, many = _spun(tmp_path, (1, 400))
-    assert np.array_equal(one, many)
+@pytest.mark.parametrize("size", [20, 400])
+def test_a_turning_body_adds_up_in_bulk(tmp_path: Path, size: int) -> None:
+    """However far it turns in one call: of the two quaternions of a rotation the same."""
+    assert np.array_equal(*_spun(tmp_path, (1, size)))
 
 
 def _spun(folder: Path, sizes: tuple[int, ...]) -> list[np.ndarray]:
