@@ -540,29 +540,6 @@ def test_a_contact_margin_is_told(tmp_path: Path) -> None:
         sm.load(mjcf(tmp_path, text), backend="pybullet", contacts=False)
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        (
-            f'<option integrator="discrete"/>{_JOINT}',
-            "the integrator discrete acts as implicitfast",
-        ),
-        (
-            _world(f'<body><joint name="wrist" stiffness="2" springyield="0.5"/>{_G}</body>'),
-            r"springyield has no effect \(wrist 0.00873\)",
-        ),
-        (
-            _world('<geom name="belt" type="plane" size="1 1 1" surfacevel="0 2 0"/>')
-            + _world(f"<body><freejoint/>{_G}</body>"),
-            r"surfacevel has no effect \(belt 2\)",
-        ),
-    ],
-)
-def test_what_acts_otherwise_is_told(text: str, says: str, tmp_path: Path) -> None:
-    with pytest.warns(EngineWarning, match=says):
-        sm.load(mjcf(tmp_path, text), backend="pybullet")
-
-
 def test_what_is_switched_off_at_load_is_not_refused(tmp_path: Path) -> None:
     file = mjcf(tmp_path, REFUSED["shape of a geom"])
     model = sm.load(file, backend="pybullet", contacts=False, timestep=0.01, substeps=2)
