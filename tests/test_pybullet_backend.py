@@ -213,7 +213,8 @@ def test_replays_are_bit_identical(steps: int) -> None:
 @pytest.mark.parametrize("size", [20, 400])
 def test_a_turning_body_adds_up_in_bulk(tmp_path: Path, size: int) -> None:
     """However far it turns in one call: of the two quaternions of a rotation the same."""
-    assert np.array_equal(*_spun(tmp_path, (1, size)))
+    one, many = _spun(tmp_path, (1, size))
+    assert np.array_equal(one, many)
 
 
 def _spun(folder: Path, sizes: tuple[int, ...]) -> list[np.ndarray]:
