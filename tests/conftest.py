@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,29 @@ def need_engine(name: str) -> None:
         if name in REQUIRED:
             pytest.fail(f"STATEMACHINE_REQUIRE names {name}: {error}")
         pytest.skip(str(error))
+
+
+Patch = Callable[[pytest.MonkeyPatch], None]
+
+
+def around(owner: Any, name: str) -> Callable[[Callable[..., Any]], Patch]:
+    """A fault that puts a function around another: it gets the right one, then its arguments.
+
+    Args:
+        owner: What has the other; or a function that gives that, where it cannot be imported yet.
+        name: What it is called there.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Patch:
+        def apply(monkeypatch: pytest.MonkeyPatch) -> None:
+            place = owner() if isinstance(owner, FunctionType) else owner
+            right = getattr(place, name)
+            faulty = lambda *arguments, **named: function(right, *arguments, **named)  # noqa: E731
+            monkeypatch.setattr(place, name, faulty)
+
+        return apply
+
+    return decorate
 
 
 @contextmanager

@@ -35,10 +35,9 @@ from statemachine.probes.audit.points import points
 from statemachine.probes.audit.trials import AuditFinding
 from statemachine.report import audit as report
 
-from .conftest import Cli, need_engine, registered
+from .conftest import Cli, Patch, around, need_engine, registered
 
 SCENE = "so101/scene_box"
-Patch = Callable[[pytest.MonkeyPatch], None]
 
 
 # Gaps, against closed forms.
@@ -326,35 +325,16 @@ def broken(findings: Iterable[AuditFinding]) -> set[tuple[str, str]]:
     return {(each.layer, each.case) for each in findings if not each.holds}
 
 
-def before(name: str, act: Callable[[MujocoData], None]) -> Patch:
-    """A fault in a method of MujocoData: something happens first."""
-
-    def apply(monkeypatch: pytest.MonkeyPatch) -> None:
-        right = getattr(MujocoData, name)
-
-        def faulty(self: MujocoData, *arguments: Any) -> Any:
-            act(self)
-            return right(self, *arguments)
-
-        monkeypatch.setattr(MujocoData, name, faulty)
-
-    return apply
-
-
 def after(name: str, act: Callable[[MujocoData], None]) -> Patch:
     """A fault in a method of MujocoData: something happens at its end."""
 
-    def apply(monkeypatch: pytest.MonkeyPatch) -> None:
-        right = getattr(MujocoData, name)
+    @around(MujocoData, name)
+    def faulty(right: Any, self: MujocoData, *arguments: Any) -> Any:
+        result = right(self, *arguments)
+        act(self)
+        return result
 
-        def faulty(self: MujocoData, *arguments: Any) -> Any:
-            result = right(self, *arguments)
-            act(self)
-            return result
-
-        monkeypatch.setattr(MujocoData, name, faulty)
-
-    return apply
+    return faulty
 
 
 def nudge(data: Any) -> None:
@@ -371,65 +351,56 @@ def leave_a_force(data: MujocoData) -> None:
     data.raw.qfrc_applied[1] = 1e-9
 
 
-def forward_of_the_engine_perturbs(monkeypatch: pytest.MonkeyPatch) -> None:
-    mj = require("mujoco")
-    right = mj.mj_forward
-
-    def faulty(model: Any, data: Any) -> None:
-        right(model, data)
-        nudge(data)
-
-    monkeypatch.setattr(mj, "mj_forward", faulty)
+@around(lambda: require("mujoco"), "mj_forward")
+def forward_of_the_engine_perturbs(right: Any, model: Any, data: Any) -> None:
+    right(model, data)
+    nudge(data)
 
 
-def bulk_of_the_engine_is_one_short(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = MujocoDriver.advance
-
-    def faulty(self: MujocoDriver, machine: Any, nstep: int = 1) -> None:
-        right(self, machine, max(1, nstep - 1))
-
-    monkeypatch.setattr(MujocoDriver, "advance", faulty)
+@around(MujocoData, "_recompute")
+def forward_takes_a_step(right: Any, self: MujocoData) -> None:
+    self._advance(self._raw_model, self._raw)
+    right(self)
 
 
-def bulk_is_one_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = mujoco_backend._transition
-
-    def faulty(model: Any, raw: Any) -> Callable[..., None]:
-        step = right(model, raw)
-        return lambda model, raw, nstep=1: step(model, raw, nstep + (nstep > 1))
-
-    monkeypatch.setattr(mujoco_backend, "_transition", faulty)
+@around(MujocoDriver, "advance")
+def bulk_of_the_engine_is_one_short(
+    right: Any, self: MujocoDriver, machine: Any, nstep: int = 1
+) -> None:
+    right(self, machine, max(1, nstep - 1))
 
 
-def noise(monkeypatch: pytest.MonkeyPatch) -> None:
+@around(mujoco_backend, "_transition")
+def bulk_is_one_long(right: Any, model: Any, raw: Any) -> Callable[..., None]:
+    step = right(model, raw)
+    return lambda model, raw, nstep=1: step(model, raw, nstep + (nstep > 1))
+
+
+_hidden = np.random.default_rng()
+
+
+@around(MujocoDriver, "advance")
+def noise(right: Any, self: MujocoDriver, machine: Any, nstep: int = 1) -> None:
     """Something decides the future that is nobody's state."""
-    hidden = np.random.default_rng()
-    right = MujocoDriver.advance
-
-    def faulty(self: MujocoDriver, machine: Any, nstep: int = 1) -> None:
-        machine.qvel[0] += 1e-12 * hidden.random()
-        right(self, machine, nstep)
-
-    monkeypatch.setattr(MujocoDriver, "advance", faulty)
+    machine.qvel[0] += 1e-12 * _hidden.random()
+    right(self, machine, nstep)
 
 
-def one_disturbs_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+_last: list[Any] = [None]
+
+
+@around(mujoco_backend, "_transition")
+def one_disturbs_the_other(right: Any, model: Any, raw: Any) -> Callable[..., None]:
     """Whoever is stepped after another one feels it."""
-    last: list[Any] = [None]
-    right = mujoco_backend._transition
+    step = right(model, raw)
 
-    def faulty(model: Any, raw: Any) -> Callable[..., None]:
-        step = right(model, raw)
+    def stepped(*args: Any) -> None:
+        if _last[0] is not raw and raw.time > 0.21:  # neither is on its way to the start
+            nudge(raw)
+        _last[0] = raw
+        step(*args)
 
-        def stepped(*args: Any) -> None:
-            if last[0] is not raw and raw.time > 0.21:  # neither is on its way to the start
-                nudge(raw)
-            last[0] = raw
-            step(*args)
-
-        return stepped
-
-    monkeypatch.setattr(mujoco_backend, "_transition", faulty)
+    return stepped
 
 
 STATE = "get_state, set_state"
@@ -453,7 +424,7 @@ FAULTS: dict[str, tuple[str, Patch, tuple[str, str]]] = {
     ),
     "forward takes a step": (
         "look",
-        before("_recompute", lambda data: data._advance(data._raw_model, data._raw)),
+        forward_takes_a_step,
         ("interface", "forward"),
     ),
     "a read perturbs": (
@@ -498,14 +469,13 @@ def test_without_a_fault_nothing_is_found(question: str, backend: str) -> None:
 
 def test_an_engine_whose_restore_drops_the_warm_start(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of the engine itself it is a fact; of the interface on it, a broken promise."""
-    mj = require("mujoco")
-    right = mj.mj_setState
 
-    def faulty(model: Any, data: Any, *rest: Any) -> None:
+    @around(require("mujoco"), "mj_setState")
+    def faulty(right: Any, model: Any, data: Any, *rest: Any) -> None:
         right(model, data, *rest)
         data.qacc_warmstart[:] = 0
 
-    monkeypatch.setattr(mj, "mj_setState", faulty)
+    faulty(monkeypatch)
     found = asked("restore")
     engine = conclude([each for each in found if each.layer == "engine"])
     assert engine.suffice == ("mj_copyData",)
@@ -540,9 +510,8 @@ def test_a_read_of_pybullet_that_perturbs(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_a_thread_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = MujocoDriver.advance
-
-    def faulty(self: MujocoDriver, machine: Any, nstep: int = 1) -> None:
+    @around(MujocoDriver, "advance")
+    def faulty(right: Any, self: MujocoDriver, machine: Any, nstep: int = 1) -> None:
         if threading.current_thread() is not threading.main_thread():
             nudge(machine)
         right(self, machine, nstep)
@@ -552,7 +521,7 @@ def test_a_thread_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch) -> No
         return list(trials.threads(driver, runs))
 
     assert broken(found()) == set()
-    monkeypatch.setattr(MujocoDriver, "advance", faulty)
+    faulty(monkeypatch)
     assert broken(found()) == {("engine", "a pool of 4 threads")}
 
 
@@ -582,14 +551,14 @@ def test_a_pool_of_the_engine_that_computes_otherwise(monkeypatch: pytest.Monkey
 @pytest.mark.slow
 def test_another_process_that_computes_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
     """This one does, always in the same way: only the other one can tell."""
-    after("_set_state", leave_a_force)(monkeypatch)
-    right = MujocoDriver.start
 
-    def faulty(self: MujocoDriver, machine: Any, point: Any) -> None:
+    @around(MujocoDriver, "start")
+    def faulty(right: Any, self: MujocoDriver, machine: Any, point: Any) -> None:
         right(self, machine, point)
         machine.qfrc_applied[1] = 1e-9
 
-    monkeypatch.setattr(MujocoDriver, "start", faulty)
+    after("_set_state", leave_a_force)(monkeypatch)
+    faulty(monkeypatch)
     result = audit.run(sm.load(SCENE), steps=10)
     engine, interface = result.audited
     assert {each.experiment for each in engine.findings if not each.holds} == {"process"}

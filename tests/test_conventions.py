@@ -20,10 +20,9 @@ from rich.cells import cell_len
 from statemachine import engines
 from statemachine.cli import main
 from statemachine.compare.models.engines import own_ways
-from statemachine.engines import room
+from statemachine.engines import room, samples
 from statemachine.engines.mujoco import pile
-from statemachine.engines.samples import pendulum
-from statemachine.engines.samples.joint_tree import TREE
+from statemachine.engines.samples import TREE
 from statemachine.errors import BadInputError, MissingEngineError, UnknownNameError
 from statemachine.installed import ENGINES, require
 from statemachine.probes import phrasebook
@@ -33,7 +32,7 @@ from statemachine.probes.conventions.answers import closest
 from statemachine.probes.conventions.frames import FIXED, ORDERS
 from statemachine.report import conventions as report
 
-from .conftest import ROOT, Cli, need_engine
+from .conftest import ROOT, Cli, around, need_engine
 
 DEPTH, ALPHABET = "depth first, children as listed", "depth first, children by alphabet"
 # What each engine answers, by part of the question; measured by others and by hand before.
@@ -249,9 +248,9 @@ def test_the_limp_pendulum_keeps_its_energy() -> None:
     """Half I ω² is what gravity gave; ω by a difference of two angles."""
     h = 1e-4
     for seconds in (0.1, 0.25, 0.4):
-        rate = (pendulum.limp(seconds + h) - pendulum.limp(seconds - h)) / (2 * h)
-        fallen = -pendulum.tip_at(pendulum.limp(seconds))[2] / pendulum.TIP
-        assert rate**2 == pytest.approx(2 * pendulum.RATE * fallen, rel=1e-5)
+        rate = (samples.limp(seconds + h) - samples.limp(seconds - h)) / (2 * h)
+        fallen = -samples.tip_at(samples.limp(seconds))[2] / samples.TIP
+        assert rate**2 == pytest.approx(2 * samples.RATE * fallen, rel=1e-5)
 
 
 def test_no_two_orders_of_the_joints_are_the_same() -> None:
@@ -287,21 +286,21 @@ def test_quaternions_in_another_order(pb: Any, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_velocities_in_another_order(pb: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    put = pb.resetBaseVelocity
-    monkeypatch.setattr(pb, "resetBaseVelocity", lambda body, v, w, client: put(body, w, v, client))
+    around(pb, "resetBaseVelocity")(lambda put, body, v, w, client: put(body, w, v, client))(
+        monkeypatch
+    )
     assert answers("velocity", "pybullet") == FACTS["velocity"]["pybullet"] | {
         "order": "angular first"
     }
 
 
 def test_velocities_in_other_axes(pin: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    integrate = pin.integrate
-
-    def along_the_world(model: Any, q: Any, v: Any) -> Any:
+    @around(pin, "integrate")
+    def along_the_world(right: Any, model: Any, q: Any, v: Any) -> Any:
         turn = pin.XYZQUATToSE3(q).rotation
-        return integrate(model, q, np.concatenate((turn.T @ v[:3], turn.T @ v[3:])))
+        return right(model, q, np.concatenate((turn.T @ v[:3], turn.T @ v[3:])))
 
-    monkeypatch.setattr(pin, "integrate", along_the_world)
+    along_the_world(monkeypatch)
     assert answers("velocity", "pinocchio") == FACTS["velocity"]["pinocchio"] | {
         "linear": "world axes, body origin",
         "angular": "world axes",
@@ -311,15 +310,14 @@ def test_velocities_in_other_axes(pin: Any, monkeypatch: pytest.MonkeyPatch) -> 
 def test_a_fresh_world_with_gravity_and_another_timestep(
     pb: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    connect = pb.connect
-
-    def prepared(mode: int) -> int:
-        client = connect(mode)
+    @around(pb, "connect")
+    def prepared(right: Any, mode: int) -> int:
+        client = right(mode)
         pb.setGravity(0, -1.5, -3, client)
         pb.setTimeStep(0.01, client)
         return client
 
-    monkeypatch.setattr(pb, "connect", prepared)
+    prepared(monkeypatch)
     assert answers("gravity", "pybullet") == {"": "0 -1.5 -3"}
     assert answers("timestep", "pybullet")["one step"] == "10 ms"
 
@@ -360,14 +358,15 @@ def test_a_body_that_is_not_damped_and_one_that_is(
     pb: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mj = require("mujoco")
-    step, put = mj.mj_step, pb.loadURDF
 
-    def damped(model: Any, data: Any, *count: int) -> None:
-        step(model, data, *count)
+    @around(mj, "mj_step")
+    def damped(right: Any, model: Any, data: Any, *count: int) -> None:
+        right(model, data, *count)
         data.qvel[0] = min(0.9 * data.qvel[0], 50)
 
-    def free(*words: Any, **named: Any) -> int:
-        body = put(*words, **named)
+    @around(pb, "loadURDF")
+    def free(right: Any, *words: Any, **named: Any) -> int:
+        body = right(*words, **named)
         client = named["physicsClientId"]
         for link in range(-1, pb.getNumJoints(body, client)):
             pb.changeDynamics(
@@ -375,12 +374,12 @@ def test_a_body_that_is_not_damped_and_one_that_is(
             )
         return body
 
-    monkeypatch.setattr(mj, "mj_step", damped)
+    damped(monkeypatch)
     assert answers("damping", "mujoco") == {
         "a body at 1 m/s": "loses 10.0 % in 1 s",
         "a joint at 200 rad/s": "cut to 50 rad/s",
     }
-    monkeypatch.setattr(pb, "loadURDF", free)
+    free(monkeypatch)
     assert answers("damping", "pybullet")["a body at 1 m/s"] == "keeps it"
     assert answers("damping", "pybullet")["a joint at 200 rad/s"] != "cut to 100 rad/s"
 
@@ -400,34 +399,33 @@ def test_an_engine_with_a_clock(pb: Any, monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_joints_without_a_motor(pb: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    load = pb.loadURDF
-
-    def limp(file: str, **more: Any) -> int:
-        body = load(file, **more)
+    @around(pb, "loadURDF")
+    def limp(right: Any, file: str, **more: Any) -> int:
+        body = right(file, **more)
         pb.setJointMotorControl2(
             body, 0, pb.VELOCITY_CONTROL, force=0, physicsClientId=more["physicsClientId"]
         )
         return body
 
-    monkeypatch.setattr(pb, "loadURDF", limp)
+    limp(monkeypatch)
     assert answers("actuation", "pybullet")["as loaded"] == "falls"
 
 
 def test_a_step_that_recomputes(mj: Any, pb: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    step, bullet = mj.mj_step, pb.stepSimulation
-
-    def fresh(model: Any, data: Any, nstep: int = 1) -> None:
-        step(model, data, nstep)
+    @around(mj, "mj_step")
+    def fresh(right: Any, model: Any, data: Any, nstep: int = 1) -> None:
+        right(model, data, nstep)
         mj.mj_forward(model, data)
 
-    def fresh_in_pybullet(client: int) -> None:
-        bullet(client)
+    @around(pb, "stepSimulation")
+    def fresh_in_pybullet(right: Any, client: int) -> None:
+        right(client)
         for body in range(pb.getNumBodies(client)):
             for link in range(pb.getNumJoints(body, client)):
                 pb.getLinkState(body, link, computeForwardKinematics=1, physicsClientId=client)
 
-    monkeypatch.setattr(mj, "mj_step", fresh)
-    monkeypatch.setattr(pb, "stepSimulation", fresh_in_pybullet)
+    fresh(monkeypatch)
+    fresh_in_pybullet(monkeypatch)
     assert answers("step", "mujoco") == {"the tip": "fresh", "the contact": "fresh"}
     assert answers("step", "pybullet") == {"the tip": "fresh", "the contact": "stale"}
 
@@ -453,41 +451,39 @@ def test_joints_in_another_order(pb: Any, monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_another_rule_of_friction(pb: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """The product of two roots is the geometric mean."""
-    change = pb.changeDynamics
-
-    def rooted(body: int, link: int, lateralFriction: float, **more: Any) -> None:  # noqa: N803
-        change(body, link, lateralFriction=lateralFriction**0.5, **more)
-
-    monkeypatch.setattr(pb, "changeDynamics", rooted)
+    around(pb, "changeDynamics")(
+        lambda right, *of, lateralFriction, **more: right(  # noqa: N803
+            *of, lateralFriction=lateralFriction**0.5, **more
+        )
+    )(monkeypatch)
     assert answers("friction", "pybullet") == {"": "their geometric mean"}
 
 
 def test_a_reset_that_keeps_other_things(mj: Any, pb: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    reset, bullet = mj.mj_resetData, pb.resetSimulation
-
-    def keeps_time(model: Any, data: Any) -> None:
+    @around(mj, "mj_resetData")
+    def keeps_time(right: Any, model: Any, data: Any) -> None:
         time = data.time
-        reset(model, data)
+        right(model, data)
         data.time = time
 
-    def forgets_the_timestep(physicsClientId: int) -> None:  # noqa: N803
-        bullet(physicsClientId=physicsClientId)
+    @around(pb, "resetSimulation")
+    def forgets_the_timestep(right: Any, physicsClientId: int) -> None:  # noqa: N803
+        right(physicsClientId=physicsClientId)
         pb.setTimeStep(1 / 240, physicsClientId)
 
-    monkeypatch.setattr(mj, "mj_resetData", keeps_time)
-    monkeypatch.setattr(pb, "resetSimulation", forgets_the_timestep)
+    keeps_time(monkeypatch)
+    forgets_the_timestep(monkeypatch)
     assert answers("reset", "mujoco") == {"mj_resetData": "keeps time, gravity, timestep, bodies"}
     assert answers("reset", "pybullet")["resetSimulation"] == "keeps nothing"
 
 
 def test_a_restore_that_loses_the_warm_start(mj: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    put = mj.mj_setState
-
-    def lossy(model: Any, data: Any, state: Any, part: Any) -> None:
-        put(model, data, state, part)
+    @around(mj, "mj_setState")
+    def lossy(right: Any, model: Any, data: Any, *state: Any) -> None:
+        right(model, data, *state)
         data.qacc_warmstart[:] = 0
 
-    monkeypatch.setattr(mj, "mj_setState", lossy)
+    lossy(monkeypatch)
     way = "mjSTATE_INTEGRATION"
     assert answers("save", "mujoco")[way] == "forgets warm start, gravity, timestep"
     assert answers("future", "mujoco")[way] == "differs"
@@ -635,14 +631,6 @@ def test_the_answers_as_json(cli: Cli, engine: str) -> None:
         (finding,) = each["findings"][engine]
         assert finding["answer"] == FACTS[each["name"]][engine][""]
         assert {"name", "value", "unit"} == finding["figures"][0].keys()
-
-
-def test_the_calls_as_json(cli: Cli, engine: str) -> None:
-    done = cli("conventions", "--calls", "--backend", engine, "--json")
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)["engines"][engine]
-    assert [call["concept"] for call in found] == list(phrasebook.CONCEPTS)
-    assert all(call["works"] and call["code"] for call in found)
 
 
 @pytest.mark.parametrize(

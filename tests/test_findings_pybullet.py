@@ -68,30 +68,6 @@ def load(pb: Any, client: int, tmp_path: Path) -> Load:
     return run
 
 
-def test_a_fresh_world_has_no_gravity_and_240_steps_a_second(
-    pb: Any, client: int, load: Load
-) -> None:
-    body = load(BOX, fixed=False)
-    parameters = pb.getPhysicsEngineParameters(client)
-    assert parameters["gravityAccelerationZ"] == 0
-    assert parameters["fixedTimeStep"] == pytest.approx(1 / 240)
-    friction = pb.getDynamicsInfo(body, -1, client)[1]
-    assert friction == 0.5
-
-
-def test_a_fresh_joint_has_a_motor(pb: Any, client: int, load: Load) -> None:
-    """It holds against gravity; switched off, the joint falls."""
-    body = load(ARM.format(dynamics=""))
-    pb.setGravity(0, 0, -9.81, client)
-    pb.stepSimulation(client)
-    held = pb.getJointState(body, 0, client)
-    assert abs(held[1]) < 1e-4
-    assert abs(held[3]) > 1.9  # m·g·r = 1.96 N·m
-    pb.setJointMotorControl2(body, 0, pb.VELOCITY_CONTROL, force=0, physicsClientId=client)
-    pb.stepSimulation(client)
-    assert abs(pb.getJointState(body, 0, client)[1]) > 0.01
-
-
 def test_bodies_are_damped_until_told_otherwise(pb: Any, client: int, load: Load) -> None:
     body = load(BOX, fixed=False)
     speeds = []
@@ -211,19 +187,6 @@ def test_inverse_dynamics_turns_gravity_with_a_base_that_has_mass(
     assert abs(torques[1]) < 0.1
 
 
-def test_after_a_step_contacts_are_those_of_before(pb: Any, client: int, load: Load) -> None:
-    shape = pb.createCollisionShape(pb.GEOM_PLANE, physicsClientId=client)
-    pb.createMultiBody(0, shape, physicsClientId=client)
-    body = load(BOX, fixed=False)
-    pb.setGravity(0, 0, -9.81, client)
-    pb.resetBasePositionAndOrientation(body, (0, 0, 0.199), (0, 0, 0, 1), client)
-    pb.resetBaseVelocity(body, (0, 0, 5), (0, 0, 0), client)
-    pb.stepSimulation(client)
-    points = pb.getContactPoints(physicsClientId=client)
-    assert pb.getBasePositionAndOrientation(body, client)[0][2] > 0.21
-    assert min(point[8] for point in points) == pytest.approx(-0.001, abs=1e-6)
-
-
 def test_a_box_on_a_plane_is_found_one_corner_at_a_time(pb: Any, client: int, load: Load) -> None:
     """Hence a reset tilts what is free, so that it stands on all its corners at once."""
     shape = pb.createCollisionShape(pb.GEOM_PLANE, physicsClientId=client)
@@ -250,25 +213,6 @@ def test_files_are_cached_until_told_otherwise(pb: Any, client: int, load: Load)
     assert masses[2:] == [2, 5]
     # What the cache serves is the engine's business; ours is that it is off.
     assert masses[:2] in ([2, 2], [2, 5])
-
-
-def test_friction_of_a_pair_is_the_product(pb: Any, client: int, load: Load) -> None:
-    """A box pushed along the floor is held by mu_1 · mu_2 · m · g, and no more."""
-    shape = pb.createCollisionShape(pb.GEOM_PLANE, physicsClientId=client)
-    floor = pb.createMultiBody(0, shape, physicsClientId=client)
-    body = load(BOX.replace('xyz="0.1 0 0"', 'xyz="0 0 0"'), fixed=False)
-    pb.changeDynamics(body, -1, linearDamping=0, lateralFriction=0.5, physicsClientId=client)
-    pb.changeDynamics(floor, -1, lateralFriction=0.6, physicsClientId=client)
-    pb.setGravity(0, 0, -10, client)
-    pb.resetBasePositionAndOrientation(body, (0, 0, 0.2), (0, 0, 0, 1), client)
-    for _ in range(60):
-        pb.stepSimulation(client)
-    pb.resetBaseVelocity(body, (1, 0, 0), (0, 0, 0), client)
-    before = pb.getBaseVelocity(body, client)[0][0]
-    for _ in range(24):
-        pb.stepSimulation(client)
-    slowed = (before - pb.getBaseVelocity(body, client)[0][0]) / 0.1
-    assert slowed == pytest.approx(0.3 * 10, rel=0.05)
 
 
 def test_a_body_turns_rightly_up_to_45_degrees_a_step(pb: Any, client: int, load: Load) -> None:

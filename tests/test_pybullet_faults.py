@@ -20,10 +20,9 @@ from statemachine import conformance
 from statemachine.interface import POSES, Model
 from statemachine.rotations import matrix_from_quat
 
+from . import conftest
 from . import test_pybullet_backend as ours
-from .conftest import need_engine, registered
-
-Patch = Callable[[pytest.MonkeyPatch], None]
+from .conftest import Patch, need_engine, registered
 
 
 @pytest.fixture(autouse=True)
@@ -55,26 +54,8 @@ def _parts() -> Any:
 
 
 def around(where: str, name: str) -> Callable[[Callable[..., Any]], Patch]:
-    """A fault that puts a function around another: it gets the right one, then its arguments.
-
-    Args:
-        where: Path of the owner from `_parts`, as "shared.Shared".
-        name: The function's name there.
-    """
-
-    def decorate(function: Callable[..., Any]) -> Patch:
-        def apply(monkeypatch: pytest.MonkeyPatch) -> None:
-            owner = functools.reduce(getattr, where.split("."), _parts())
-            right = getattr(owner, name)
-
-            def wrapper(*arguments: Any, **named: Any) -> Any:
-                return function(right, *arguments, **named)
-
-            monkeypatch.setattr(owner, name, wrapper)
-
-        return apply
-
-    return decorate
+    """As of conftest; `where` is a path from `_parts`, as "shared.Shared"."""
+    return conftest.around(lambda: functools.reduce(getattr, where.split("."), _parts()), name)
 
 
 @around("shared", "wxyz_from_xyzw")
@@ -146,22 +127,23 @@ def reset_without_moving_apart(right: Any, self: Any, *arguments: Any) -> None:
     self.put(*arguments)
 
 
+@around("world.World", "_put_free")
+def put_in_world_axes(right: Any, self: Any, tree: Any, qpos: Any, qvel: Any) -> None:
+    qvel, start = qvel.copy(), tree.qvel.start
+    turn = matrix_from_quat(qpos[tree.qpos][3:] / np.linalg.norm(qpos[tree.qpos][3:]))
+    qvel[start + 3 : start + 6] = turn.T @ qvel[start + 3 : start + 6]
+    right(self, tree, qpos, qvel)
+
+
+@around("world.World", "read_free")
+def read_in_world_axes(right: Any, self: Any, tree: Any) -> Any:
+    qpos, qvel = right(self, tree)
+    return qpos, [*qvel[:3], *(matrix_from_quat(np.array(qpos[3:])) @ qvel[3:])]
+
+
 def spin_in_world_axes(monkeypatch: pytest.MonkeyPatch) -> None:
-    world = _parts().world.World
-    put, read = world._put_free, world.read_free
-
-    def faulty_put(self: Any, tree: Any, qpos: Any, qvel: Any) -> None:
-        qvel, start = qvel.copy(), tree.qvel.start
-        turn = matrix_from_quat(qpos[tree.qpos][3:] / np.linalg.norm(qpos[tree.qpos][3:]))
-        qvel[start + 3 : start + 6] = turn.T @ qvel[start + 3 : start + 6]
-        put(self, tree, qpos, qvel)
-
-    def faulty_read(self: Any, tree: Any) -> Any:
-        qpos, qvel = read(self, tree)
-        return qpos, [*qvel[:3], *(matrix_from_quat(np.array(qpos[3:])) @ qvel[3:])]
-
-    monkeypatch.setattr(world, "_put_free", faulty_put)
-    monkeypatch.setattr(world, "read_free", faulty_read)
+    put_in_world_axes(monkeypatch)
+    read_in_world_axes(monkeypatch)
 
 
 def ctrl_is_not_clamped(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,9 +23,7 @@ from statemachine.backends.mujoco_backend import MujocoData, MujocoModel
 from statemachine.grading.mutants import faults as mutants
 from statemachine.interface import DERIVED, Model, State
 
-from .conftest import registered
-
-Patch = Callable[[pytest.MonkeyPatch], None]
+from .conftest import Patch, around, registered
 
 
 def replaced(owner: type, name: str) -> Callable[[Callable[..., Any]], Patch]:
@@ -137,36 +135,23 @@ def replace_in_place(monkeypatch: pytest.MonkeyPatch) -> None:
 def changes_with(*names: str) -> Patch:
     """A fault: what options change in these arrays of the compiled model is lost."""
 
-    def apply(monkeypatch: pytest.MonkeyPatch) -> None:
-        right = _edits.changes
+    @around(_edits, "changes")
+    def faulty(right: Any, raw: Any, options: Any) -> dict[str, Any]:
+        return {name: value for name, value in right(raw, options).items() if name not in names}
 
-        def faulty(raw: Any, options: Any) -> dict[str, Any]:
-            found = right(raw, options)
-            return {name: value for name, value in found.items() if name not in names}
-
-        monkeypatch.setattr(_edits, "changes", faulty)
-
-    return apply
+    return faulty
 
 
-def fresh_arrays_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = MujocoData._reset
-
-    def faulty(self: MujocoData, key: int | None) -> None:
-        right(self, key)
-        object.__setattr__(self, "qpos", self.raw.qpos[:])
-
-    monkeypatch.setattr(MujocoData, "_reset", faulty)
+@around(MujocoData, "_reset")
+def fresh_arrays_each_time(right: Any, self: MujocoData, key: int | None) -> None:
+    right(self, key)
+    object.__setattr__(self, "qpos", self.raw.qpos[:])
 
 
-def no_ctrl_clamp(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = MujocoModel.__init__
-
-    def faulty(self: MujocoModel, raw: Any, *rest: Any, **named: Any) -> None:
-        right(self, raw, *rest, **named)
-        raw.actuator_ctrllimited[:] = 0  # behind the back of the Model's own ranges
-
-    monkeypatch.setattr(MujocoModel, "__init__", faulty)
+@around(MujocoModel, "__init__")
+def no_ctrl_clamp(right: Any, self: MujocoModel, raw: Any, *rest: Any, **named: Any) -> None:
+    right(self, raw, *rest, **named)
+    raw.actuator_ctrllimited[:] = 0  # behind the back of the Model's own ranges
 
 
 @replaced(MujocoData, "qacc")
@@ -190,17 +175,13 @@ def contacts_with(part: str, change: Callable[[np.ndarray], np.ndarray]) -> Patc
 def facts_with(part: str, change: Callable[[np.ndarray], np.ndarray]) -> Patch:
     """A fault in one array of the Model."""
 
-    def apply(monkeypatch: pytest.MonkeyPatch) -> None:
-        right = Model.__init__
+    @around(Model, "__init__")
+    def faulty(right: Any, self: Model, **facts: Any) -> None:
+        if part in facts:
+            facts[part] = change(np.array(facts[part]))
+        right(self, **facts)
 
-        def faulty(self: Model, **facts: Any) -> None:
-            if part in facts:
-                facts[part] = change(np.array(facts[part]))
-            right(self, **facts)
-
-        monkeypatch.setattr(Model, "__init__", faulty)
-
-    return apply
+    return faulty
 
 
 FAULTS: dict[str, tuple[Patch, set[str]]] = {

@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
             table = phrasebook.run(engines, told)
         return show(report.calls_page(table), table, options.json)
     with progress("conventions") as told:
-        result = conventions.probe(engines, options.question or tuple(conventions.QUESTIONS), told)
+        result = conventions.probe(engines, options.question or conventions.QUESTIONS, told)
     footer = f"Which call does what on each engine: {PROGRAM} conventions --calls"
     return show(report.page(result), result, options.json, footer)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import types
+import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from typing import Any
 
 from ..interface import Model
 
-FUNCTIONS = (types.BuiltinFunctionType, types.FunctionType)
+_FUNCTIONS = (types.BuiltinFunctionType, types.FunctionType)
 Contents = dict[str, bytes]  # all that is in something, by name
 
 
@@ -42,7 +43,7 @@ class CallWords:
 
 
 class WatchedObject(ABC):
-    """Something that calls can change: an object of the engine's, or a world.
+    """Something that calls can change: an object, held weakly so that it lives no longer.
 
     Attributes:
         kind: What it is, for one that has no label.
@@ -51,23 +52,38 @@ class WatchedObject(ABC):
         seen: What was in it when it was last looked at.
     """
 
-    def __init__(self, kind: str, label: str = "") -> None:
-        self.kind, self.label, self.named = kind, label, False
+    def __init__(self, kind: str, thing: Any) -> None:
+        self.kind, self.label, self.named = kind, "", False
         self.seen: Contents | None = None
+        self._thing = weakref.ref(thing)
 
     @property
-    @abstractmethod
+    def thing(self) -> Any:
+        """The object; None if it is gone."""
+        return self._thing()
+
+    @property
     def gone(self) -> bool:
         """Whether it is no more."""
+        return self.thing is None
+
+    def lead(self, label: str) -> None:
+        """A variable leads here; the first that does gives the label."""
+        if not self.named:
+            self.label, self.named = label, True
 
     @property
     def title(self) -> str:
         """Its label, or what there is to say of one that no variable ever led to."""
         return self.label or f"{self.kind} {'for a moment' if self.gone else 'without a name'}"
 
-    @abstractmethod
     def look(self, thoroughly: bool = False) -> Contents | None:
         """All that is in it, as bytes by name; None if it is gone."""
+        return None if self.gone else self.contents(thoroughly)
+
+    @abstractmethod
+    def contents(self, thoroughly: bool) -> Contents:
+        """All that is in it, which is there; large things only if it is to be thorough."""
 
     @abstractmethod
     def spelled(self, field: str) -> str:
@@ -92,14 +108,18 @@ class CallWatch(ABC):
     Attributes:
         engine: Its name.
         words: What a page says of its calls.
+        module: The engine.
     """
 
     engine: str
     words: CallWords
+    module: Any
 
-    @abstractmethod
     def functions(self) -> Iterator[tuple[Any, str, str]]:
         """Owner and attribute of every function to be replaced, and its name for a reader."""
+        for name, value in vars(self.module).items():
+            if isinstance(value, _FUNCTIONS) and not name.startswith("_"):
+                yield self.module, name, name
 
     @abstractmethod
     def concerned(self, function: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
@@ -111,7 +131,7 @@ class CallWatch(ABC):
 
     @abstractmethod
     def name(self, namespace: Mapping[str, Any]) -> None:
-        """Label the objects that variables lead to."""
+        """Label the objects that variables lead to; nothing led to any of them before."""
 
     @abstractmethod
     def living(self) -> Sequence[WatchedObject]:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..interface import Array
-from .samples.pendulum import acceleration
+from .samples import acceleration
 
 ANGLE, TORQUE = 0.4, 1.0  # rad, N·m; of the phrasebook
 

@@ -160,6 +160,8 @@ class CallRecorder:
         self._listening = False
         due: list[str] = []
         for watch in self._watches:
+            for watched in watch.living():
+                watched.named = False
             watch.name(namespace)
             for watched in watch.living():
                 self._note_writes(watched, thoroughly=True)

@@ -4,7 +4,7 @@
         ...
 
 Bodies are put where the traces say they were, so that any engine's run is drawn, and one
-that was recorded elsewhere. An engine draws, without a screen: the part `rendering`
+that was recorded elsewhere. An engine draws, without a screen: the `drawer`
 of its room, in a process of its own, which an OpenGL library that is missing takes down.
 """
 

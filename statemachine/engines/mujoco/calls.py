@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from ...backends import mujoco_backend
 from ...interface import DERIVED, INPUTS, Data, Model
-from ..call_watch import FUNCTIONS, CallWatch, CallWords, Contents, WatchedObject, entries, named
+from ..call_watch import CallWatch, CallWords, Contents, WatchedObject, entries, named
 
 _OURS = ("time", *INPUTS, *DERIVED)
 # What comes before the rest in a list of what changed.
@@ -22,38 +21,24 @@ _LARGE = 1 << 16  # bytes
 
 
 class _Object(WatchedObject):
-    """An MjData or MjModel; held weakly, so that it lives no longer than without us."""
+    """An MjData or MjModel.
 
-    def __init__(self, thing: Any, kind: str) -> None:
-        super().__init__(kind)
-        self._thing = weakref.ref(thing)
-        self._raw = False  # whether the variable is the engine's own object
+    Attributes:
+        raw: Whether the variable that leads here is the engine's own object.
+    """
 
-    @property
-    def thing(self) -> Any:
-        """The object; None if it is gone."""
-        return self._thing()
-
-    @property
-    def gone(self) -> bool:
-        return self.thing is None
-
-    def lead(self, label: str, raw: bool) -> None:
-        """A variable leads here: by its `raw`, or because it is the object."""
-        self.label, self.named, self._raw = label, True, raw
+    raw = False
 
     def spelled(self, field: str) -> str:
         ours = field.partition("[")[0] in _OURS and isinstance(self, _MjData)
-        return f"{self.title}.{field}" if ours or self._raw else f"{self.title}.raw.{field}"
+        return f"{self.title}.{field}" if ours or self.raw else f"{self.title}.raw.{field}"
 
 
 class _MjData(_Object):
     _fields: tuple[str, ...] = ()
 
-    def look(self, thoroughly: bool = False) -> Contents | None:
+    def contents(self, thoroughly: bool) -> Contents:
         data = self.thing
-        if data is None:
-            return None
         if not _MjData._fields:
             _MjData._fields = _fields(data)
         contents = {}
@@ -71,8 +56,8 @@ class _MjData(_Object):
 
 
 class _MjModel(_Object):
-    def __init__(self, thing: Any, kind: str) -> None:
-        super().__init__(thing, kind)
+    def __init__(self, kind: str, thing: Any) -> None:
+        super().__init__(kind, thing)
         arrays = {
             name: value.nbytes
             for name in dir(type(thing))
@@ -82,10 +67,8 @@ class _MjModel(_Object):
         self._all = list(arrays)
         self._options = [name for name in dir(thing.opt) if not name.startswith("_")]
 
-    def look(self, thoroughly: bool = False) -> Contents | None:
+    def contents(self, thoroughly: bool) -> Contents:
         model = self.thing
-        if model is None:
-            return None
         options = model.opt
         contents = {f"opt.{name}": _bytes(getattr(options, name)) for name in self._options}
         for name in self._all if thoroughly else self._small:
@@ -120,14 +103,12 @@ class MujocoWatch(CallWatch):
     )
 
     def __init__(self) -> None:
-        self._module: Any = mujoco_backend.mujoco
+        self.module = mujoco_backend.mujoco
         self._known: dict[int, _Object] = {}
 
     def functions(self) -> Iterator[tuple[Any, str, str]]:
-        for name, value in vars(self._module).items():
-            if isinstance(value, FUNCTIONS) and not name.startswith("_"):
-                yield self._module, name, name
-        for owner in (self._module.MjModel, self._module.MjData, self._module.MjSpec):
+        yield from super().functions()
+        for owner in (self.module.MjModel, self.module.MjData, self.module.MjSpec):
             for name, value in vars(owner).items():
                 public = not name.startswith("_") or name in ("__copy__", "__deepcopy__")
                 if public and type(value).__name__ in _METHODS:
@@ -144,7 +125,7 @@ class MujocoWatch(CallWatch):
 
     @property
     def _kinds(self) -> tuple[type, type]:
-        return self._module.MjModel, self._module.MjData
+        return self.module.MjModel, self.module.MjData
 
     def made(self, function: str, args: Sequence[Any], result: Any) -> WatchedObject | None:
         thing = args[0] if function in ("MjModel", "MjData") else result
@@ -153,16 +134,14 @@ class MujocoWatch(CallWatch):
     def _watched(self, thing: Any) -> _Object:
         known = self._known.get(id(thing))
         if known is None or known.thing is not thing:
-            if isinstance(thing, self._module.MjModel):
-                known = _MjModel(thing, "an MjModel")
+            if isinstance(thing, self.module.MjModel):
+                known = _MjModel("an MjModel", thing)
             else:
-                known = _MjData(thing, "an MjData")
+                known = _MjData("an MjData", thing)
             self._known[id(thing)] = known
         return known
 
     def name(self, namespace: Mapping[str, Any]) -> None:
-        for known in self._known.values():
-            known.named = False
         for label, value in named(namespace):
             if isinstance(value, Model):
                 self._name_model(label, value)
@@ -182,8 +161,8 @@ class MujocoWatch(CallWatch):
 
     def _label(self, thing: Any, label: str, raw: bool = False) -> None:
         watched = self._watched(thing)
-        if not watched.named:
-            watched.lead(label, raw)
+        watched.raw = watched.raw if watched.named else raw
+        watched.lead(label)
 
     def living(self) -> Sequence[WatchedObject]:
         self._known = {key: known for key, known in self._known.items() if known.thing is not None}

@@ -10,8 +10,8 @@ import numpy as np
 
 from ...installed import require
 from ...interface import Array
+from .. import samples
 from ..measured import LetGo, Measurement, OneStep, ReadTwice, Sliding
-from ..samples import floor, joint_tree, marked, pendulum
 from .pile import MujocoPile
 
 
@@ -24,7 +24,7 @@ def _loaded(text: str) -> tuple[Any, Any, Any]:
 
 def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
     """Four numbers into the qpos of a free joint."""
-    mj, model, data = _loaded(marked.MJCF)
+    mj, model, data = _loaded(samples.MARKED_MJCF)
     turned = []
     for four in fours:
         data.qpos[3:] = four
@@ -35,7 +35,7 @@ def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
 
 def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Array, Array]:
     """Six numbers into the qvel of a free joint, and one short step."""
-    mj, model, data = _loaded(marked.MJCF)
+    mj, model, data = _loaded(samples.MARKED_MJCF)
     model.opt.timestep = seconds
     data.qpos[:], data.qvel[:] = (*place, *four), six
     mj.mj_kinematics(model, data)
@@ -56,7 +56,7 @@ def gravity(steps: int) -> tuple[Array, Array]:
 
 def timestep() -> OneStep:
     """A body at 1 m/s, one step."""
-    mj, model, data = _loaded(marked.MJCF)
+    mj, model, data = _loaded(samples.MARKED_MJCF)
     data.qvel[0] = 1
     mj.mj_step(model, data)
     return (model.opt.timestep, float(data.qpos[0]), "data.time", float(data.time))
@@ -69,7 +69,7 @@ def actuation(seconds: float) -> list[LetGo]:
         ("no actuator", ""),
         ("a position actuator", '<actuator><position joint="j" kp="1000" kv="50"/></actuator>'),
     ):
-        mj, model, data = _loaded(pendulum.MJCF % actuator)
+        mj, model, data = _loaded(samples.PENDULUM_MJCF % actuator)
         mj.mj_step(model, data, round(seconds / model.opt.timestep))
         torque = Measurement("it exerts", float(data.qfrc_actuator[0]), "N·m")
         runs.append((part, float(data.qpos[0]), data.time, (torque,) if actuator else ()))
@@ -78,7 +78,7 @@ def actuation(seconds: float) -> list[LetGo]:
 
 def command(torque: float) -> dict[str, list[float]]:
     """A motor, without gravity."""
-    mj, model, data = _loaded(pendulum.MJCF % '<actuator><motor joint="j"/></actuator>')
+    mj, model, data = _loaded(samples.PENDULUM_MJCF % '<actuator><motor joint="j"/></actuator>')
     model.opt.gravity[:] = 0
     data.ctrl[0] = torque
     speeds = [float(data.qvel[0])]
@@ -90,10 +90,10 @@ def command(torque: float) -> dict[str, list[float]]:
 
 def damping(seconds: float, fast: float) -> tuple[float, float]:
     """A free body for a while; a joint for a step."""
-    mj, model, data = _loaded(marked.MJCF)
+    mj, model, data = _loaded(samples.MARKED_MJCF)
     data.qvel[0] = 1
     mj.mj_step(model, data, round(seconds / model.opt.timestep))
-    _, joint, turning = _loaded(pendulum.MJCF % "")
+    _, joint, turning = _loaded(samples.PENDULUM_MJCF % "")
     joint.opt.gravity[:] = 0
     turning.qvel[0] = fast
     mj.mj_step(joint, turning)
@@ -106,45 +106,45 @@ def _depth(data: Any) -> float:
 
 
 def write(angle: float, deep: float) -> list[ReadTwice]:
-    """Write qpos of a pendulum, then of a ball that is put into the floor."""
-    mj, model, data = _loaded(pendulum.MJCF % "")
+    """Write qpos of a pendulum, then of a ball that is put into the samples."""
+    mj, model, data = _loaded(samples.PENDULUM_MJCF % "")
     mj.mj_forward(model, data)
     data.qpos[0] = angle
     read = np.array(data.site("tip").xpos)
     mj.mj_forward(model, data)
-    tip = ("the tip", read, np.array(data.site("tip").xpos), pendulum.tip_at(angle))
+    tip = ("the tip", read, np.array(data.site("tip").xpos), samples.tip_at(angle))
 
-    mj, model, data = _loaded(floor.BALL)
+    mj, model, data = _loaded(samples.BALL)
     mj.mj_forward(model, data)
-    data.qpos[2] = floor.RADIUS - deep
+    data.qpos[2] = samples.RADIUS - deep
     depth = _depth(data)
     mj.mj_forward(model, data)
     return [tip, ("the contact", depth, _depth(data), deep)]
 
 
 def step(speed: float, deep: float) -> list[ReadTwice]:
-    """A pendulum on its way, and a ball on its way out of the floor."""
-    mj, model, data = _loaded(pendulum.MJCF % "")
+    """A pendulum on its way, and a ball on its way out of the samples."""
+    mj, model, data = _loaded(samples.PENDULUM_MJCF % "")
     data.qvel[0] = speed
     mj.mj_step(model, data)
     read = np.array(data.site("tip").xpos)
     mj.mj_kinematics(model, data)
-    true = pendulum.tip_at(data.qpos[0])
+    true = samples.tip_at(data.qpos[0])
     tip = ("the tip", read, np.array(data.site("tip").xpos), true)
 
-    mj, model, data = _loaded(floor.BALL)
-    data.qpos[2], data.qvel[2] = floor.RADIUS - deep, speed
+    mj, model, data = _loaded(samples.BALL)
+    data.qpos[2], data.qvel[2] = samples.RADIUS - deep, speed
     mj.mj_step(model, data)
     depth = _depth(data)
     mj.mj_forward(model, data)
-    now = max(floor.RADIUS - float(data.qpos[2]), 0.0)
+    now = max(samples.RADIUS - float(data.qpos[2]), 0.0)
     return [tip, ("the contact", depth, _depth(data), now)]
 
 
 def joints() -> dict[str, list[str]]:
     """The ids of the joints, from a URDF and from an MJCF."""
     names = {}
-    for form, text in (("URDF", joint_tree.URDF), ("MJCF", joint_tree.MJCF)):
+    for form, text in (("URDF", samples.TREE_URDF), ("MJCF", samples.TREE_MJCF)):
         mj, model, _ = _loaded(text)
         name = partial(mj.mj_id2name, model, mj.mjtObj.mjOBJ_JOINT)
         names[form] = [name(joint) for joint in range(model.njnt)]
@@ -155,16 +155,16 @@ def friction() -> dict[str, Sliding]:
     """A block on a floor, with elliptic cones: the same friction in every direction."""
 
     def speed(block: float, ground: float, lean: float, priority: int = 0) -> float:
-        x, y, z = floor.BLOCK
+        x, y, z = samples.BLOCK
         mj, model, data = _loaded(
-            f'<mujoco><option gravity="0 0 {-floor.GRAVITY}" cone="elliptic"/><worldbody>'
+            f'<mujoco><option gravity="0 0 {-samples.SLOPE_GRAVITY}" cone="elliptic"/><worldbody>'
             f'<geom type="plane" size="9 9 1" friction="{ground}"/>'
             f'<body pos="0 0 {z}"><freejoint/><geom type="box" size="{x} {y} {z}" '
             f'friction="{block}" priority="{priority}"/></body></worldbody></mujoco>'
         )
-        mj.mj_step(model, data, round(floor.REST / model.opt.timestep))
-        model.opt.gravity[0] = lean * floor.GRAVITY
-        mj.mj_step(model, data, round(floor.PULL / model.opt.timestep))
+        mj.mj_step(model, data, round(samples.REST / model.opt.timestep))
+        model.opt.gravity[0] = lean * samples.SLOPE_GRAVITY
+        mj.mj_step(model, data, round(samples.PULL / model.opt.timestep))
         return float(data.qvel[0])
 
     return {"equal priority": speed, "the block has priority": partial(speed, priority=1)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..measured import ANGLE, TORQUE, Cell, Phrases, accelerated, near
-from ..samples.pendulum import MJCF, acceleration, tip_at
+from ..samples import PENDULUM_MJCF, acceleration, tip_at
 
 
 def _loaded(n: Any) -> bool:
@@ -80,6 +80,6 @@ _CELLS = {
     "many worlds": Cell("worlds = [mujoco.MjData(m) for _ in range(3)]", _apart),
 }
 PHRASES = Phrases(
-    ("arm.xml", MJCF % '<actuator><motor joint="j"/></actuator>'),
+    ("arm.xml", PENDULUM_MJCF % '<actuator><motor joint="j"/></actuator>'),
     _CELLS,
 )

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...installed import require
 from ...interface import Array
-from ..samples.pile import HALF, PLACES, TILT, Pile
+from ..pile import HALF, PLACES, TILT, Pile
 
 MJCF = f"""<mujoco><worldbody><geom type="plane" size="5 5 1"/>
 {

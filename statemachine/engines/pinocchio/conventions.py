@@ -11,8 +11,8 @@ import numpy as np
 
 from ...installed import require
 from ...interface import Array
+from .. import samples
 from ..measured import Absent, LetGo, Measurement, ReadTwice
-from ..samples import joint_tree, marked, pendulum
 
 
 def names_with(pin: Any, *words: str) -> tuple[str, ...]:
@@ -28,14 +28,14 @@ def names_with(pin: Any, *words: str) -> tuple[str, ...]:
 def _marks(pin: Any, model: Any, data: Any, q: Array) -> Array:
     """The marks in the world (3, 3) [m]."""
     pin.framesForwardKinematics(model, data, q)
-    frames = [model.getFrameId(f"mark{k}") for k in range(len(marked.MARKS))]
+    frames = [model.getFrameId(f"mark{k}") for k in range(len(samples.MARKS))]
     return np.array([data.oMf[frame].translation for frame in frames])
 
 
 def _free_body() -> tuple[Any, Any, Any]:
     """The engine, a Model of the marked body on a free-flyer, and a Data."""
     pin = require("pinocchio")
-    model = pin.buildModelFromXML(marked.URDF, pin.JointModelFreeFlyer())
+    model = pin.buildModelFromXML(samples.MARKED_URDF, pin.JointModelFreeFlyer())
     return pin, model, model.createData()
 
 
@@ -85,26 +85,24 @@ def timestep() -> Absent:
 def actuation(_seconds: float) -> list[LetGo]:
     """The acceleration at zero torque: there is nothing else that could act."""
     pin = require("pinocchio")
-    model = pin.buildModelFromXML(pendulum.URDF)
+    model = pin.buildModelFromXML(samples.PENDULUM_URDF)
     rest = np.zeros(model.nv)
     started = float(pin.aba(model, model.createData(), pin.neutral(model), rest, rest)[0])
     return [("aba at zero torque", started, None, ())]
 
 
-def command(_torque: float) -> Absent:
-    """Whether it steps at all; a torque is an argument of each call."""
+def _no_step(*_given: float) -> Absent:
+    """Whether there is a step at all; a torque is an argument of each call."""
     return _absent("step", "simul")
 
 
-def damping(_seconds: float, _fast: float) -> Absent:
-    """Whether it steps at all."""
-    return _absent("step", "simul")
+command = damping = step = friction = _no_step
 
 
 def write(angle: float, _deep: float) -> list[ReadTwice]:
     """Another q, handed to one function after the other."""
     pin = require("pinocchio")
-    model = pin.buildModelFromXML(pendulum.URDF)
+    model = pin.buildModelFromXML(samples.PENDULUM_URDF)
     data, tip = model.createData(), model.getFrameId("tip")
     pin.framesForwardKinematics(model, data, pin.neutral(model))
     q = np.array([angle])
@@ -112,13 +110,8 @@ def write(angle: float, _deep: float) -> list[ReadTwice]:
     pin.forwardKinematics(model, data, q)
     reads["the tip, after forwardKinematics"] = np.array(data.oMf[tip].translation)
     pin.updateFramePlacements(model, data)
-    now, true = np.array(data.oMf[tip].translation), pendulum.tip_at(angle)
+    now, true = np.array(data.oMf[tip].translation), samples.tip_at(angle)
     return [(part, read, now, true) for part, read in reads.items()]
-
-
-def step(_speed: float, _deep: float) -> Absent:
-    """Whether there is a step at all."""
-    return _absent("step", "simul")
 
 
 def joints() -> dict[str, list[str]]:
@@ -126,9 +119,9 @@ def joints() -> dict[str, list[str]]:
     pin = require("pinocchio")
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "tree.xml"  # of an MJCF it takes files only
-        file.write_text(joint_tree.MJCF, encoding="utf-8")
+        file.write_text(samples.TREE_MJCF, encoding="utf-8")
         models = {
-            "URDF": pin.buildModelFromXML(joint_tree.URDF),
+            "URDF": pin.buildModelFromXML(samples.TREE_URDF),
             "MJCF": pin.buildModelFromMJCF(str(file)),
         }
     return {form: list(model.names)[1:] for form, model in models.items()}
@@ -139,15 +132,10 @@ def reset() -> Absent:
     return _absent("reset")
 
 
-def friction() -> Absent:
-    """Whether anything slides at all."""
-    return _absent("step", "simul")
-
-
-def save() -> float:
+def save(*_given: object) -> float:
     """Whether its Data holds a state: whether anything of its past shows in what comes out."""
     pin = require("pinocchio")
-    model = pin.buildModelFromXML(pendulum.URDF)
+    model = pin.buildModelFromXML(samples.PENDULUM_URDF)
     used, new = model.createData(), model.createData()
     q = pin.neutral(model)
     v, torque = np.full(model.nv, 0.3), np.full(model.nv, 0.1)
@@ -156,6 +144,4 @@ def save() -> float:
     return float(np.abs(first - second).max())
 
 
-def future(_moments: Sequence[float], _steps: int) -> float:
-    """Whether a used Data computes anything else than a new one, of the same q and v."""
-    return save()
+future = save  # whether a used Data computes anything else than a new one, of the same q and v

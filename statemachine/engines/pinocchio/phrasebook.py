@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..measured import ANGLE, TORQUE, Cell, Phrases, accelerated, near
-from ..samples.pendulum import TIP, URDF, acceleration, tip_at
+from ..samples import PENDULUM_URDF, TIP, acceleration, tip_at
 from .conventions import names_with
 
 _STEP = 0.002  # s; whatever its user likes
@@ -95,4 +95,4 @@ _CELLS = {
     ),
     "many worlds": Cell("worlds = [m.createData() for _ in range(3)]", _apart),
 }
-PHRASES = Phrases(("arm.urdf", URDF), _CELLS)
+PHRASES = Phrases(("arm.urdf", PENDULUM_URDF), _CELLS)

@@ -22,8 +22,7 @@ from ...backends.pybullet_backend import PybulletModel
 from ...interface import Array, Model
 from ..auditing import Restore, SavePoint
 from ..records import LeftAlone, Term, WayBack
-from ._audit_saves import Client, in_memory, put_back
-from .audit import PybulletDriver
+from .audit import Client, PybulletDriver, in_memory, put_back
 from .world import fresh_world, gravity_of, limp
 
 # Before a state is taken, while the jaws still touch what they hold; and after it.
@@ -49,33 +48,24 @@ def _raw(model: Model, gravity: bool = True, damping: bool = True) -> Iterator[W
 
 def terms(model: Model) -> tuple[Term, ...]:
     """What the interface's names are on this engine, by looking at a loaded model."""
-    raw = model.compiled
-    rows = []
     with _raw(model) as world:
-        for tree in world.trees:
-            names = [pb.getJointInfo(tree.body, i, world.client) for i in _all_joints(world, tree)]
-            for index, place in zip(tree.joints, raw.dof_jntid[tree.dofs], strict=False):
-                slot = int(raw.jnt_qposadr[place])
-                rows.append(
-                    Term(
-                        f"joint {model.joint_names[place]}",
-                        f"qpos[{slot}]",
-                        f"joint {index} of body {tree.body}",
-                    )
-                )
-            fixed = [f"{info[1].decode()} is {info[0]}" for info in names if info[3] < 0]
-            if fixed:
-                rows.append(Term("fixed joints", "none", f"take an index too: {', '.join(fixed)}"))
-        for tree in world.trees:
-            if tree.free:
-                rows += _free_terms(world, tree, model)
-        for tree in world.trees:
-            rows += _frame_terms(world, tree, model)
-    return tuple(rows)
+        joints = [term for tree in world.trees for term in _joint_terms(world, tree, model)]
+        free = [tree for tree in world.trees if tree.free]
+        turned = [term for tree in free for term in _free_terms(world, tree, model)]
+        frames = [term for tree in world.trees for term in _frame_terms(world, tree, model)]
+    return (*joints, *turned, *frames)
 
 
-def _all_joints(world: World, tree: Tree) -> range:
-    return range(pb.getNumJoints(tree.body, world.client))
+def _joint_terms(world: World, tree: Tree, model: Model) -> Iterator[Term]:
+    """The numbers of the joints, and of the fixed ones among them."""
+    for index, place in zip(tree.joints, model.compiled.dof_jntid[tree.dofs], strict=False):
+        thing, slot = f"joint {model.joint_names[place]}", int(model.jnt_qposadr[place])
+        yield Term(thing, f"qpos[{slot}]", f"joint {index} of body {tree.body}")
+    count = pb.getNumJoints(tree.body, world.client)
+    infos = [pb.getJointInfo(tree.body, i, world.client) for i in range(count)]
+    fixed = [f"{info[1].decode()} is {info[0]}" for info in infos if info[3] < 0]
+    if fixed:
+        yield Term("fixed joints", "none", f"take an index too: {', '.join(fixed)}")
 
 
 def _free_terms(world: World, tree: Tree, model: Model) -> Iterator[Term]:

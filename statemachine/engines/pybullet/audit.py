@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ...installed import require
+from ...backends._bullet_client import pb
 from ...interface import Array, JointType, Model, make_data
 from ..auditing import (
     Disturbance,
@@ -27,14 +28,100 @@ from ..auditing import (
     SavePoint,
 )
 from ..futures import Coordinates
-from . import _audit_saves as saves
-from ._audit_saves import Client
-from .world import aim, servos_of
+from .world import aim, read_into, saved_in_a_file, saved_in_memory, servos_of
 
 _RETARGET = 0.2  # what a target is changed by, to see whether a restore brings it back [rad or m]
 _PUSH = 5.0  # of a force that waits for the next step [N]
 _BEST = "written + targets"  # all that can be read and written
 _SLIPPERY = 0.05  # a friction that the model does not have
+
+
+@dataclass
+class Client:
+    """A world, and what its user knows of it that the engine does not tell.
+
+    Attributes:
+        data: Holds the world; none of its verbs is called.
+        time: Simulated time [s]: the engine has no clock.
+        targets: (nu,) what the motors aim at; None where they are off.
+    """
+
+    data: Any
+    time: float = 0.0
+    targets: Array | None = None
+
+    @property
+    def world(self) -> Any:
+        """The bodies and their ids."""
+        return self.data.raw
+
+    @property
+    def id(self) -> int:
+        """What the engine's functions want as physicsClientId."""
+        return self.world.client
+
+
+def bases(machine: Client) -> list[int]:
+    """PyBullet's ids of the free bodies."""
+    return [tree.body for tree in machine.world.trees if tree.free]
+
+
+def solids(machine: Client) -> list[tuple[int, int]]:
+    """PyBullet's body and link of all that can touch."""
+    return [(body, link) for body, link, _ in machine.world.solids()]
+
+
+def written(machine: Client) -> Iterator[Restore]:
+    """What can be read of positions and velocities is written back."""
+    joints = [
+        pb.getJointStates(tree.body, tree.joints, machine.id) if tree.joints else ()
+        for tree in machine.world.trees
+    ]
+    poses = [
+        (pb.getBasePositionAndOrientation(b, machine.id), pb.getBaseVelocity(b, machine.id))
+        for b in bases(machine)
+    ]
+
+    def restore(other: Client) -> None:
+        for tree, states in zip(other.world.trees, joints, strict=True):
+            for index, state in zip(tree.joints, states, strict=False):
+                pb.resetJointState(tree.body, index, state[0], state[1], other.id)
+        for body, (pose, rates) in zip(bases(other), poses, strict=True):
+            pb.resetBasePositionAndOrientation(body, *pose, other.id)
+            pb.resetBaseVelocity(body, *rates, other.id)
+
+    yield restore
+
+
+def in_memory(machine: Client) -> Iterator[Restore]:
+    """The engine's saveState."""
+    with saved_in_memory(machine.id) as restore:
+        yield lambda other: restore(other.id)
+
+
+def in_a_file(machine: Client) -> Iterator[Restore]:
+    """The engine's file."""
+    with saved_in_a_file(machine.id) as restore:
+        yield lambda other: restore(other.id)
+
+
+def put_back(machine: Client, how: str = "put") -> Iterator[Restore]:
+    """What can be read of positions and velocities, as the backend writes it."""
+    qpos, qvel = machine.data.qpos.copy(), machine.data.qvel.copy()
+    read_into(machine.world, qpos, qvel)
+    yield lambda other: getattr(other.world, how)(qpos, qvel)
+
+
+def taken_apart(machine: Client) -> Iterator[Restore]:
+    """Every body is taken far away and brought back, which leaves no memory of contacts."""
+    yield from put_back(machine, "place")
+
+
+def let_pass(machine: Client) -> None:
+    """Nothing touches anything any more."""
+    for body, link in solids(machine):
+        pb.setCollisionFilterGroupMask(body, link, 0, 0, machine.id)
+    pb.performCollisionDetection(machine.id)
 
 
 class PybulletDriver(Driver):
@@ -53,7 +140,6 @@ class PybulletDriver(Driver):
     def __init__(self, model: Model, seed: int) -> None:
         super().__init__(model, seed)
         self.name = f"PyBullet {model.engine_version} itself"
-        self.pb: Any = require("pybullet")
         self._servos = servos_of(model)
 
     def lacks(self, point: SavePoint) -> str:
@@ -77,7 +163,7 @@ class PybulletDriver(Driver):
                 for dof in tree.dofs.tolist() if tree.joints else ():
                     (lengths if dof in slides else angles).append(at)
                     at += 1
-            for _ in saves.bases(machine):
+            for _ in bases(machine):
                 lengths += range(at, at + 3)
                 quats.append(at + 3)
                 at += 7
@@ -100,7 +186,7 @@ class PybulletDriver(Driver):
 
     def advance(self, machine: Client, nstep: int = 1) -> None:
         for _ in range(nstep):
-            self.pb.stepSimulation(machine.id)
+            pb.stepSimulation(machine.id)
             machine.time += self.model.timestep
 
     def read(self, machine: Client) -> Array:
@@ -108,9 +194,9 @@ class PybulletDriver(Driver):
         for joint in self._joints(machine):
             places.append(joint[0])
             speeds.append(joint[1])
-        for body in saves.bases(machine):
-            pos, quat = self.pb.getBasePositionAndOrientation(body, machine.id)
-            linear, angular = self.pb.getBaseVelocity(body, machine.id)
+        for body in bases(machine):
+            pos, quat = pb.getBasePositionAndOrientation(body, machine.id)
+            linear, angular = pb.getBaseVelocity(body, machine.id)
             places += (*pos, *quat)
             speeds += (*linear, *angular)
         return np.array(places + speeds)
@@ -118,7 +204,7 @@ class PybulletDriver(Driver):
     def _joints(self, machine: Client) -> Iterator[Any]:
         for tree in machine.world.trees:
             if tree.joints:
-                yield from self.pb.getJointStates(tree.body, tree.joints, machine.id)
+                yield from pb.getJointStates(tree.body, tree.joints, machine.id)
 
     def time(self, machine: Client) -> float:
         return machine.time
@@ -126,7 +212,7 @@ class PybulletDriver(Driver):
     def _measure(self, point: SavePoint) -> Measured:
         with self.at(point) as machine:
             speeds = self.read(machine)[self.coordinates.width :]
-            points = self.pb.getContactPoints(physicsClientId=machine.id)
+            points = pb.getContactPoints(physicsClientId=machine.id)
             return Measured(
                 point.name,
                 point.how,
@@ -139,11 +225,11 @@ class PybulletDriver(Driver):
     def save_methods(self, point: SavePoint) -> tuple[SaveMethod, ...]:
         """The engine's ways with and without what its user must add: targets and time."""
         return (
-            SaveMethod("written", self._way(saves.written, known=False)),
-            SaveMethod(_BEST, self._way(saves.written)),
-            SaveMethod("saveState + targets", self._way(saves.in_memory), travels=False),
-            SaveMethod("saveBullet + targets", self._way(saves.in_a_file)),
-            SaveMethod("taken apart + targets", self._way(saves.taken_apart)),
+            SaveMethod("written", self._way(written, known=False)),
+            SaveMethod(_BEST, self._way(written)),
+            SaveMethod("saveState + targets", self._way(in_memory), travels=False),
+            SaveMethod("saveBullet + targets", self._way(in_a_file)),
+            SaveMethod("taken apart + targets", self._way(taken_apart)),
         )
 
     def _way(self, save: Callable[[Client], Iterator[Restore]], known: bool = True) -> Save:
@@ -169,33 +255,31 @@ class PybulletDriver(Driver):
     def hidden_state(self, point: SavePoint) -> HiddenState:
         """What the engine's ways forget, each way without what its user must add."""
         ways = {
-            "written": self._way(saves.written, known=False),
-            "saveState": self._way(saves.in_memory, known=False),
-            "saveBullet": self._way(saves.in_a_file, known=False),
+            "written": self._way(written, known=False),
+            "saveState": self._way(in_memory, known=False),
+            "saveBullet": self._way(in_a_file, known=False),
         }
-        best = SaveMethod(_BEST, self._way(saves.written))
-        return HiddenState(ways, self._changes(point), saves.let_pass, best)
+        best = SaveMethod(_BEST, self._way(written))
+        return HiddenState(ways, self._changes(point), let_pass, best)
 
     def _changes(self, point: SavePoint) -> dict[str, Callable[[Client], None]]:
-        pb = self.pb
-
         def motor_targets(machine: Client) -> None:
             self.command(machine, point.ctrl - _RETARGET)
 
         def waiting_force(machine: Client) -> None:
-            for body, link in saves.solids(machine):
+            for body, link in solids(machine):
                 pb.applyExternalForce(
                     body, link, (_PUSH, 0, 0), (0, 0, 0), pb.LINK_FRAME, physicsClientId=machine.id
                 )
 
         def friction(machine: Client) -> None:
-            for body, link in saves.solids(machine):
+            for body, link in solids(machine):
                 pb.changeDynamics(body, link, lateralFriction=_SLIPPERY, physicsClientId=machine.id)
 
         found: dict[str, Callable[[Client], None]] = {
             "motor targets": motor_targets,
             "a waiting force": waiting_force,
-            "collision masks": saves.let_pass,
+            "collision masks": let_pass,
             "frictions": friction,
         }
         if not point.powered or not self._servos:
@@ -203,8 +287,6 @@ class PybulletDriver(Driver):
         return found
 
     def disturbances(self, point: SavePoint) -> tuple[Disturbance, ...]:
-        pb = self.pb
-
         def links(machine: Client) -> None:
             for tree in machine.world.trees:
                 for index in range(pb.getNumJoints(tree.body, machine.id)):

@@ -9,14 +9,14 @@ from __future__ import annotations
 import marshal
 import types
 import weakref
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 from ...backends._hidden_data import Machine
 from ...backends.pybullet_backend import PybulletData, PybulletModel
 from ...installed import require
 from ...interface import DERIVED, INPUTS
-from ..call_watch import FUNCTIONS, CallWatch, CallWords, Contents, WatchedObject, entries, named
+from ..call_watch import CallWatch, CallWords, Contents, WatchedObject, entries, named
 
 # How many arguments come before `physicsClientId` where it is given by its place, which the
 # engine's functions do not tell. It is the last one in all of these.
@@ -64,7 +64,7 @@ class _World(WatchedObject):
     """One world of the engine's, from its `connect` to its `disconnect`."""
 
     def __init__(self, engine: Any, client: int) -> None:
-        super().__init__("a world")
+        super().__init__("a world", self)
         self._pb, self._client, self._open = engine, client, True
 
     @property
@@ -73,9 +73,7 @@ class _World(WatchedObject):
         self._open = self._open and bool(self._pb.isConnected(self._client))
         return not self._open
 
-    def look(self, thoroughly: bool = False) -> Contents | None:
-        if self.gone:
-            return None
+    def contents(self, thoroughly: bool) -> Contents:
         pb, client = self._pb, self._client
         bodies = [pb.getBodyUniqueId(i, client) for i in range(pb.getNumBodies(client))]
         poses = [pb.getBasePositionAndOrientation(body, client) for body in bodies]
@@ -117,19 +115,12 @@ class _World(WatchedObject):
 class _Arrays(WatchedObject):
     """The interface's own arrays of a Data: copies, and what was computed for a reader."""
 
-    def __init__(self, machine: Machine, label: str) -> None:
-        super().__init__("a Data", label)
-        self._machine = weakref.ref(machine)  # a Data ends when the code lets go of it
+    def __init__(self, machine: Machine) -> None:
+        super().__init__("a Data", machine)  # a Data ends when the code lets go of it
         self._moment = machine.moment
 
-    @property
-    def gone(self) -> bool:
-        return self._machine() is None
-
-    def look(self, thoroughly: bool = False) -> Contents | None:
-        machine = self._machine()
-        if machine is None:
-            return None
+    def contents(self, thoroughly: bool) -> Contents:
+        machine = self.thing
         contents = {name: getattr(machine, name).tobytes() for name in INPUTS}
         contents["time"] = marshal.dumps(machine.time, 2)
         # Not by asking the Data, which would compute what nobody has read.
@@ -144,7 +135,7 @@ class _Arrays(WatchedObject):
         return [name for name, new in now.items() if before.get(name, bytes(len(new))) != new]
 
     def due(self) -> bool:
-        machine = self._machine()
+        machine = self.thing
         if machine is None or machine.moment is self._moment:
             return False
         self._moment = machine.moment
@@ -181,16 +172,11 @@ class PybulletWatch(CallWatch):
     )
 
     def __init__(self) -> None:
-        self._module: Any = require("pybullet")
+        self.module = require("pybullet")
         # Looks must not come by way of what is replaced.
-        self._bare = types.SimpleNamespace(**vars(self._module))
+        self._bare = types.SimpleNamespace(**vars(self.module))
         self._worlds: dict[int, _World] = {}
         self._arrays: weakref.WeakKeyDictionary[Machine, _Arrays] = weakref.WeakKeyDictionary()
-
-    def functions(self) -> Iterator[tuple[Any, str, str]]:
-        for name, value in vars(self._module).items():
-            if isinstance(value, FUNCTIONS) and not name.startswith("_"):
-                yield self._module, name, name
 
     def concerned(self, function: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
         if function == "connect":
@@ -209,8 +195,6 @@ class PybulletWatch(CallWatch):
         return world
 
     def name(self, namespace: Mapping[str, Any]) -> None:
-        for known in (*self._worlds.values(), *self._arrays.values()):
-            known.named = False
         arrays: weakref.WeakKeyDictionary[Machine, _Arrays] = weakref.WeakKeyDictionary()
         for label, value in named(namespace):
             if isinstance(value, PybulletModel):
@@ -219,10 +203,8 @@ class PybulletWatch(CallWatch):
                 self._name_model(f"{label}.model", cast("PybulletModel", value.model))
                 self._label(value.machine.world.raw, f"the world of {label}")
                 machine = value.machine
-                if machine not in arrays:
-                    kept = self._arrays.get(machine) or _Arrays(machine, label)
-                    kept.label, kept.named = label, True
-                    arrays[machine] = kept
+                kept = self._arrays.get(machine) or _Arrays(machine)
+                arrays.setdefault(machine, kept).lead(label)
         self._arrays = arrays  # the others no variable leads to
 
     def _name_model(self, label: str, model: PybulletModel) -> None:
@@ -231,11 +213,9 @@ class PybulletWatch(CallWatch):
 
     def _label(self, world: Any, label: str) -> None:
         # Of one that is closed the number may be another's by now.
-        if world.closed:
-            return
-        known = self._worlds.get(world.client)
-        if known is not None and not known.named:
-            known.label, known.named = label, True
+        known = None if world.closed else self._worlds.get(world.client)
+        if known is not None:
+            known.lead(label)
 
     def living(self) -> Sequence[WatchedObject]:
         self._worlds = {c: world for c, world in self._worlds.items() if not world.gone}

@@ -10,8 +10,8 @@ import numpy as np
 
 from ...backends._bullet_client import pb
 from ...interface import Array
+from .. import samples
 from ..measured import LetGo, Measurement, OneStep, ReadTwice, Sliding
-from ..samples import floor, joint_tree, marked, pendulum
 from .pile import BulletPile
 from .world import fresh_world, gravity_of, limp, load, put_floor
 from .world import timestep as step_of
@@ -34,7 +34,7 @@ def _marks(client: int, body: int) -> Array:
     return np.array(
         [
             pb.getLinkState(body, k, computeForwardKinematics=1, physicsClientId=client)[0]
-            for k in range(len(marked.MARKS))
+            for k in range(len(samples.MARKS))
         ]
     )
 
@@ -42,7 +42,7 @@ def _marks(client: int, body: int) -> Array:
 def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
     """Four numbers into resetBasePositionAndOrientation."""
     turned = []
-    with _loaded(marked.URDF) as (client, body):
+    with _loaded(samples.MARKED_URDF) as (client, body):
         for four in fours:
             pb.resetBasePositionAndOrientation(body, (0, 0, 0), four, client)
             marks = _marks(client, body)
@@ -54,7 +54,7 @@ def quaternion(fours: Sequence[Sequence[float]]) -> list[tuple[Array, Array]]:
 
 def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Array, Array]:
     """Three and three numbers into resetBaseVelocity, in this order, and one short step."""
-    with _loaded(marked.URDF) as (client, body):
+    with _loaded(samples.MARKED_URDF) as (client, body):
         pb.setTimeStep(seconds, client)
         pb.resetBasePositionAndOrientation(body, place.tolist(), four.tolist(), client)
         pb.resetBaseVelocity(body, six[:3].tolist(), six[3:].tolist(), client)
@@ -65,7 +65,7 @@ def velocity(place: Array, four: Array, six: Array, seconds: float) -> tuple[Arr
 
 def gravity(steps: int) -> tuple[tuple[float, ...], Array]:
     """A body in a world that was told nothing, let go; without the damping that bodies have."""
-    with _loaded(marked.URDF) as (client, body):
+    with _loaded(samples.MARKED_URDF) as (client, body):
         pb.changeDynamics(body, -1, linearDamping=0, physicsClientId=client)
         _run(client, steps)
         seconds = steps * step_of(client)
@@ -74,7 +74,7 @@ def gravity(steps: int) -> tuple[tuple[float, ...], Array]:
 
 def timestep() -> OneStep:
     """A body at 1 m/s, one step; and whatever number of the world's has changed in it."""
-    with _loaded(marked.URDF) as (client, body):
+    with _loaded(samples.MARKED_URDF) as (client, body):
         pb.changeDynamics(body, -1, linearDamping=0, physicsClientId=client)
         start = pb.getBasePositionAndOrientation(body, client)[0][0]
         pb.resetBaseVelocity(body, (1, 0, 0), (0, 0, 0), client)
@@ -91,8 +91,8 @@ def actuation(seconds: float) -> list[LetGo]:
     """As loadURDF leaves the joint, with gravity set, and with its motor switched off."""
     runs = []
     for part, off in (("as loaded", False), ("motor off", True)):
-        with _loaded(pendulum.URDF, fixed=True) as (client, body):
-            pb.setGravity(0, 0, -pendulum.GRAVITY, client)
+        with _loaded(samples.PENDULUM_URDF, fixed=True) as (client, body):
+            pb.setGravity(0, 0, -samples.GRAVITY, client)
             if off:
                 limp(body, client)
             step = step_of(client)
@@ -101,7 +101,7 @@ def actuation(seconds: float) -> list[LetGo]:
             angle, _, _, torque = pb.getJointState(body, 0, client)
             forces = (
                 Measurement("its motor exerts", torque, "N·m"),
-                Measurement("gravity", pendulum.TORQUE, "N·m"),
+                Measurement("gravity", samples.TORQUE, "N·m"),
             )
             runs.append((part, angle, steps * step, forces))
     return runs
@@ -112,7 +112,7 @@ def command(torque: float) -> dict[str, list[float]]:
     modes = {"TORQUE_CONTROL": {}, "VELOCITY_CONTROL": {"targetVelocity": 1e3}}
     speeds: dict[str, list[float]] = {}
     for mode, values in modes.items():
-        with _loaded(pendulum.URDF, fixed=True) as (client, body):
+        with _loaded(samples.PENDULUM_URDF, fixed=True) as (client, body):
             limp(body, client)
             pb.setJointMotorControl2(
                 body, 0, getattr(pb, mode), force=torque, physicsClientId=client, **values
@@ -126,11 +126,11 @@ def command(torque: float) -> dict[str, list[float]]:
 
 def damping(seconds: float, fast: float) -> tuple[float, float]:
     """As loadURDF leaves them; of the joint, the motor is switched off."""
-    with _loaded(marked.URDF) as (client, body):
+    with _loaded(samples.MARKED_URDF) as (client, body):
         pb.resetBaseVelocity(body, (1, 0, 0), (0, 0, 0), client)
         _run(client, round(seconds / step_of(client)))
         end = pb.getBaseVelocity(body, client)[0][0]
-    with _loaded(pendulum.URDF, fixed=True) as (client, body):
+    with _loaded(samples.PENDULUM_URDF, fixed=True) as (client, body):
         limp(body, client)
         pb.resetJointState(body, 0, 0, fast, physicsClientId=client)
         pb.stepSimulation(client)
@@ -148,7 +148,7 @@ def _tip(client: int, body: int, compute: bool = False) -> Array:
 def _put_ball(client: int, height: float) -> int:
     """The floor, and the ball at a height [m]; its number."""
     put_floor(client)
-    ball = pb.createCollisionShape(pb.GEOM_SPHERE, radius=floor.RADIUS, physicsClientId=client)
+    ball = pb.createCollisionShape(pb.GEOM_SPHERE, radius=samples.RADIUS, physicsClientId=client)
     return pb.createMultiBody(1, ball, basePosition=(0, 0, height), physicsClientId=client)
 
 
@@ -159,7 +159,7 @@ def _depth(client: int) -> float:
 
 def _tip_twice(client: int, body: int) -> ReadTwice:
     tip = partial(_tip, client, body)
-    true = pendulum.tip_at(pb.getJointState(body, 0, client)[0])
+    true = samples.tip_at(pb.getJointState(body, 0, client)[0])
     return "the tip", tip(), tip(compute=True), true
 
 
@@ -170,57 +170,57 @@ def _contact_twice(client: int, true: float) -> ReadTwice:
 
 
 def write(angle: float, deep: float) -> list[ReadTwice]:
-    """Write by resetJointState to a pendulum, then a ball that is put into the floor."""
-    with _loaded(pendulum.URDF, fixed=True) as (client, body):
+    """Write by resetJointState to a pendulum, then a ball that is put into the samples."""
+    with _loaded(samples.PENDULUM_URDF, fixed=True) as (client, body):
         _tip(client, body, compute=True)
         pb.resetJointState(body, 0, angle, 0, client)
         tip = _tip_twice(client, body)
     with fresh_world() as client:
         ball = _put_ball(client, 1)
         pb.performCollisionDetection(client)
-        at = (0, 0, floor.RADIUS - deep)
+        at = (0, 0, samples.RADIUS - deep)
         pb.resetBasePositionAndOrientation(ball, at, (0, 0, 0, 1), client)
         return [tip, _contact_twice(client, deep)]
 
 
 def step(speed: float, deep: float) -> list[ReadTwice]:
-    """A limp pendulum on its way, and a ball on its way out of the floor."""
-    with _loaded(pendulum.URDF, fixed=True) as (client, body):
+    """A limp pendulum on its way, and a ball on its way out of the samples."""
+    with _loaded(samples.PENDULUM_URDF, fixed=True) as (client, body):
         limp(body, client)
         pb.resetJointState(body, 0, 0, speed, client)
         pb.stepSimulation(client)
         tip = _tip_twice(client, body)
     with fresh_world() as client:
-        ball = _put_ball(client, floor.RADIUS - deep)
+        ball = _put_ball(client, samples.RADIUS - deep)
         pb.resetBaseVelocity(ball, (0, 0, speed), (0, 0, 0), client)
         pb.stepSimulation(client)
         height = pb.getBasePositionAndOrientation(ball, client)[0][2]
-        return [tip, _contact_twice(client, max(floor.RADIUS - height, 0.0))]
+        return [tip, _contact_twice(client, max(samples.RADIUS - height, 0.0))]
 
 
 def joints() -> dict[str, list[str]]:
     """The indices of the joints, from a URDF."""
-    with _loaded(joint_tree.URDF, fixed=True) as (client, body):
+    with _loaded(samples.TREE_URDF, fixed=True) as (client, body):
         count = pb.getNumJoints(body, client)
         return {"URDF": [pb.getJointInfo(body, k, client)[1].decode() for k in range(count)]}
 
 
 def friction() -> dict[str, Sliding]:
-    """A block on a floor."""
+    """A block on a samples."""
 
     def speed(block: float, ground: float, lean: float) -> float:
         with fresh_world() as client:
             below = put_floor(client)
             box = pb.createCollisionShape(
-                pb.GEOM_BOX, halfExtents=floor.BLOCK, physicsClientId=client
+                pb.GEOM_BOX, halfExtents=samples.BLOCK, physicsClientId=client
             )
-            at = (0, 0, floor.BLOCK[2])
+            at = (0, 0, samples.BLOCK[2])
             body = pb.createMultiBody(1, box, basePosition=at, physicsClientId=client)
             pb.changeDynamics(below, -1, lateralFriction=ground, physicsClientId=client)
             pb.changeDynamics(body, -1, lateralFriction=block, physicsClientId=client)
             step = step_of(client)
-            for seconds, tangent in ((floor.REST, 0.0), (floor.PULL, lean)):
-                pb.setGravity(tangent * floor.GRAVITY, 0, -floor.GRAVITY, client)
+            for seconds, tangent in ((samples.REST, 0.0), (samples.PULL, lean)):
+                pb.setGravity(tangent * samples.SLOPE_GRAVITY, 0, -samples.SLOPE_GRAVITY, client)
                 _run(client, round(seconds / step))
             return pb.getBaseVelocity(body, client)[0][0]
 

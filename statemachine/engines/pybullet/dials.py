@@ -88,39 +88,30 @@ class PybulletDials:
     def _with_motors(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
         raw = self.model.compiled
         model = self.model.replace(**_world_options(dials, values))
-        acts: list[Act] = []
-        if "inertia" in dials:
-            acts.append(partial(_set_inertias, inertias=raw.body_inertia))
-        if "damping" in dials:
-            joint = values["damping"] if dials["damping"] == "model" else np.zeros(raw.nv)
-            acts.append(partial(_set_damping, body=0.0, joint=joint))
-        if "limits" in dials:
-            acts.append(partial(_set_limits, ranges=None))
-        if "surfaces" in dials:
-            acts.append(partial(_set_surfaces, surfaces=self.emulated.plan.surfaces))
-        if "contact" in dials:
-            acts.append(_touch_nothing)
-        return _dialled(model, acts)
+        joint = values["damping"] if dials.get("damping") == "model" else np.zeros(raw.nv)
+        acts: dict[str, Act] = {
+            "inertia": partial(_set_inertias, inertias=raw.body_inertia),
+            "damping": partial(_set_damping, body=0.0, joint=joint),
+            "limits": partial(_set_limits, ranges=None),
+            "surfaces": partial(_set_surfaces, surfaces=self.emulated.plan.surfaces),
+            "contact": _touch_nothing,
+        }
+        return _dialled(model, [act for name, act in acts.items() if name in dials])
 
     def _with_law(self, dials: Mapping[str, Setting], values: Mapping[str, Any]) -> Model:
-        own, options, acts = self.emulated, dict[str, Any](), list[Act]()
-        fresh = self.model.compiled
-        for name in ("gravity", "timestep"):
-            if name not in dials:
-                options[name] = getattr(self.model, name)
-        if "timestep" not in dials:
-            options["substeps"] = self.model.substeps
+        own, fresh = self.emulated, self.model.compiled
+        ways: dict[str, Act] = {
+            "damping": partial(_set_damping, body=BODY_DAMPING, joint=fresh.dof_damping),
+            "limits": partial(_set_limits, ranges=_ranges(self.model)),
+            "surfaces": partial(_fresh_surfaces, plan=own.plan),
+        }
+        acts = [act for name, act in ways.items() if name not in dials]
+        options = {name: getattr(self.model, name) for name in ("gravity", "timestep", "substeps")}
         options |= _world_options(dials, values)
         for name in ("armature", "damping", "frictionloss"):
             options[name] = values[name] if dials.get(name) == "model" else np.zeros(own.nv)
-        if "damping" not in dials:
-            acts.append(partial(_set_damping, body=BODY_DAMPING, joint=fresh.dof_damping))
         if dials.get("limits") != "model":
             options["limits"] = False
-        if "limits" not in dials:
-            acts.append(partial(_set_limits, ranges=_ranges(self.model)))
-        if "surfaces" not in dials:
-            acts.append(partial(_fresh_surfaces, plan=own.plan))
         if "contact" in dials:
             options["contacts"] = False
         # An option that changes nothing may still change the last bit of what follows from it.

@@ -6,7 +6,7 @@ from contextlib import suppress
 from typing import Any
 
 from ..measured import ANGLE, Cell, Phrases, accelerated, near
-from ..samples.pendulum import GRAVITY, INERTIA, URDF, tip_at
+from ..samples import GRAVITY, INERTIA, PENDULUM_URDF, tip_at
 
 # A link's frame is told in single precision.
 _SINGLE = 1e-6
@@ -118,4 +118,4 @@ _CELLS = {
     ),
     "many worlds": Cell("worlds = [pb.connect(pb.DIRECT) for _ in range(3)]", _apart),
 }
-PHRASES = Phrases(("arm.urdf", URDF), _CELLS, _close)
+PHRASES = Phrases(("arm.urdf", PENDULUM_URDF), _CELLS, _close)

@@ -15,8 +15,8 @@ import numpy as np
 
 from ...backends._bullet_client import pb
 from ...interface import Array
-from ..samples.pendulum import GRAVITY, URDF
-from ..samples.pile import HALF, PLACES, TILT, Pile, Saved
+from ..pile import HALF, PLACES, TILT, Pile, Saved
+from ..samples import GRAVITY, PENDULUM_URDF
 from .world import (
     Restore,
     fresh_world,
@@ -161,7 +161,7 @@ class BulletPile(Pile):
             for place, turn in zip(PLACES, _TURNS, strict=True)
         )
         self.box = self.boxes[0]  # the lowest, at which quantities are looked at
-        self.arm = load(client, URDF, fixed=True)
+        self.arm = load(client, PENDULUM_URDF, fixed=True)
         pb.resetBasePositionAndOrientation(self.arm, (2, 0, 2), (0, 0, 0, 1), client)
 
     @classmethod

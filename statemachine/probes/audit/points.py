@@ -32,28 +32,16 @@ def points(model: Model, seed: int) -> tuple[tuple[SavePoint, ...], tuple[str, .
     """
     with make_data(model) as data:
         zero = data.qpos.copy()
-    makers: dict[str, Callable[[], SavePoint | str]] = {
-        "default": lambda: _default(model, zero),
-        "motion": lambda: _motion(model, zero, seed),
-        "keyframe": lambda: _keyframe(model),
-        "limp": lambda: _limp(model, zero),
-        "limit": lambda: _limit(model, zero),
-        "clock": lambda: _clock(model, zero),
-    }
     found, without = [], []
-    for name, make in makers.items():
+    for name, make in _MAKERS.items():
         try:
-            made = make()
-        except UnsupportedError as error:
-            made = str(error)
-        if isinstance(made, SavePoint):
-            found.append(made)
-        else:
-            without.append(f"{name}: {made}")
+            found.append(make(model, zero, seed))
+        except (UnsupportedError, LookupError) as error:
+            without.append(f"{name}: {error}")
     return tuple(found), tuple(without)
 
 
-def _default(model: Model, zero: Array) -> SavePoint:
+def _default(model: Model, zero: Array, _seed: int) -> SavePoint:
     how = "default pose, no command, and time to settle"
     still, none = np.zeros(model.nv), within(model, np.zeros(model.nu))
     return SavePoint("default", how, model, zero, still, none, _steps(model, _SETTLE))
@@ -68,9 +56,9 @@ def _motion(model: Model, zero: Array, seed: int) -> SavePoint:
     return SavePoint("motion", how, model, qpos, qvel, within(model, stir), _steps(model, _WAY))
 
 
-def _keyframe(model: Model) -> SavePoint | str:
+def _keyframe(model: Model, _zero: Array, _seed: int) -> SavePoint:
     if not model.keyframes:
-        return "the model has no keyframe"
+        raise LookupError("the model has no keyframe")
     key, ctrl = model.keyframes[0], model.keyframes[0].ctrl.copy()
     ctrl[: len(_MOVE)] += _MOVE[: model.nu]
     how = f"{_named(key)}, command moved away from it"
@@ -78,21 +66,21 @@ def _keyframe(model: Model) -> SavePoint | str:
     return SavePoint("keyframe", how, model, key.qpos, key.qvel, within(model, ctrl), steps)
 
 
-def _limp(model: Model, zero: Array) -> SavePoint | str:
+def _limp(model: Model, zero: Array, _seed: int) -> SavePoint:
     if not model.nu:
-        return "the model has no servo to switch off"
+        raise LookupError("the model has no servo to switch off")
     how = "default pose, servos off, and time to fall"
     still, none = np.zeros(model.nv), np.zeros(model.nu)
     limp = model.replace(actuation=False)
     return SavePoint("limp", how, limp, zero, still, none, _steps(model, _FALL), powered=False)
 
 
-def _limit(model: Model, zero: Array) -> SavePoint | str:
+def _limit(model: Model, zero: Array, _seed: int) -> SavePoint:
     qpos, qvel = _lifted(model, zero)
     scalar = np.isin(model.jnt_type, (JointType.HINGE, JointType.SLIDE))
     limited = np.flatnonzero(model.jnt_limited & scalar)
     if not len(limited):
-        return "no joint of the model has a limit"
+        raise LookupError("no joint of the model has a limit")
     lower, upper = model.jnt_range[limited].T
     reach = np.minimum(_REACH, (upper - lower) / 10)
     qpos[model.jnt_qposadr[limited]] = upper - reach
@@ -105,17 +93,26 @@ def _limit(model: Model, zero: Array) -> SavePoint | str:
     )
 
 
-def _clock(model: Model, zero: Array) -> SavePoint | str:
+def _clock(model: Model, zero: Array, _seed: int) -> SavePoint:
     if not model.nu:
-        return "the model has no actuator"
-    qpos, qvel, ctrl = zero, np.zeros(model.nv), np.zeros(model.nu)
-    start = "default pose"
+        raise LookupError("the model has no actuator")
+    qpos, qvel, ctrl, start = zero, np.zeros(model.nv), np.zeros(model.nu), "default pose"
     if model.keyframes:
         key = model.keyframes[0]
         qpos, qvel, ctrl, start = key.qpos, key.qvel, key.ctrl, _named(key)
     how = f"{start}, a controller that reads the time before each step"
     steps = _steps(model, 2 * _WAY)
     return SavePoint("clock", how, model, qpos, qvel, ctrl, steps, swings=True)
+
+
+_MAKERS: dict[str, Callable[[Model, Array, int], SavePoint]] = {
+    "default": _default,
+    "motion": _motion,
+    "keyframe": _keyframe,
+    "limp": _limp,
+    "limit": _limit,
+    "clock": _clock,
+}
 
 
 def _named(key: Keyframe) -> str:

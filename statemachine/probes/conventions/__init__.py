@@ -8,7 +8,7 @@ the adapters that keep our contract. An engine whose room measures nothing is no
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from ...engines import room, room_names
@@ -99,7 +99,7 @@ def _absent(looked: Absent) -> Answers:
 
 def probe(
     engines: Sequence[str],
-    questions: Sequence[str] = tuple(QUESTIONS),
+    questions: Iterable[str] = QUESTIONS,
     progress: Callable[[float], None] = lambda _fraction: None,
 ) -> Conventions:
     """Ask each engine each question.
@@ -113,9 +113,9 @@ def probe(
         MissingEngineError: An engine is not installed here.
         UnknownNameError: There is no such question, or no such engine.
     """
-    check_questions(questions)
     asked: dict[str, dict[str, Answers | None]] = {name: {} for name in questions}
-    pairs = [(name, engine) for name in questions for engine in engines]
+    check_questions(asked)
+    pairs = [(name, engine) for name in asked for engine in engines]
     for done, (name, engine) in enumerate(pairs):
         progress(done / len(pairs))
         asked[name][engine] = ask(name, engine)
@@ -125,7 +125,7 @@ def probe(
     )
 
 
-def check_questions(questions: Sequence[str]) -> None:
+def check_questions(questions: Iterable[str]) -> None:
     """Raise UnknownNameError for a question that there is not."""
     for name in questions:
         if name not in QUESTIONS:

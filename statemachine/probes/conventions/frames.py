@@ -8,8 +8,7 @@ from itertools import permutations, product
 import numpy as np
 
 from ...engines.measured import Measurement
-from ...engines.samples.joint_tree import FIXED, TREE
-from ...engines.samples.marked import CENTRE, MARKS
+from ...engines.samples import CENTRE, FIXED, MARKS, TREE
 from ...interface import Array
 from .answers import UNDECIDED, Answers, EngineAnswer, closest, question
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from ...engines.measured import LetGo, Measurement, OneStep, Sliding
-from ...engines.samples.pendulum import RATE, limp
+from ...engines.samples import RATE, limp
 from .answers import UNDECIDED, Answers, EngineAnswer, closest, question
 
 _SAME = 1e-6  # m/s², s, m/s

@@ -8,8 +8,8 @@ from contextlib import AbstractContextManager
 from functools import partial
 from typing import Any, ClassVar
 
-from ...interface import Array
-from ..measured import Futures
+from ..interface import Array
+from .measured import Futures
 
 HALF = 0.1  # an edge [m]
 # Where the boxes begin, one over the other [m], and how the lowest is turned (w, x, y, z).

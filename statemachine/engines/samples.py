@@ -1,0 +1,165 @@
+"""Tiny models to measure engines by, and what they must do."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+# A pendulum with a tip, straight out along x; and what it must do, by its equation of motion.
+
+MASS, REACH, INERTIA = 1.0, 0.5, 0.01  # kg; m to the centre of mass; kg m² about it
+TIP = 0.8  # m from the axis
+GRAVITY = 9.81
+
+PENDULUM_MJCF = f"""<mujoco><option gravity="0 0 {-GRAVITY}"/><worldbody><body>
+<joint name="j" axis="0 1 0"/>
+<inertial pos="{REACH} 0 0" mass="{MASS}" diaginertia="{INERTIA} {INERTIA} {INERTIA}"/>
+<site name="tip" pos="{TIP} 0 0"/></body></worldbody>%s</mujoco>"""
+
+_ARM_INERTIA = (
+    f'<inertia ixx="{INERTIA}" ixy="0" ixz="0" iyy="{INERTIA}" iyz="0" izz="{INERTIA}"/></inertial>'
+)
+PENDULUM_URDF = (
+    '<robot name="pendulum"><link name="world"/>'
+    f'<link name="arm"><inertial><origin xyz="{REACH} 0 0"/><mass value="{MASS}"/>'
+    f"{_ARM_INERTIA}"
+    '</link><joint name="j" type="revolute"><parent link="world"/><child link="arm"/>'
+    '<axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="1000" velocity="1000"/></joint>'
+    '<link name="tip"><inertial><mass value="1e-9"/><inertia ixx="1e-12" ixy="0" ixz="0" '
+    'iyy="1e-12" iyz="0" izz="1e-12"/></inertial></link>'
+    '<joint name="to_tip" type="fixed"><parent link="arm"/><child link="tip"/>'
+    f'<origin xyz="{TIP} 0 0"/></joint></robot>'
+)
+TORQUE = MASS * GRAVITY * REACH  # of gravity, straight out [N·m]
+RATE = TORQUE / (MASS * REACH**2 + INERTIA)  # the acceleration of letting go [rad/s²]
+
+
+def tip_at(angle: float) -> tuple[float, float, float]:
+    """Where the tip is [m]."""
+    return TIP * math.cos(angle), 0.0, -TIP * math.sin(angle)
+
+
+def acceleration(angle: float, torque: float) -> float:
+    """Of the joint under a torque [N·m], without friction [rad/s²]."""
+    return RATE * math.cos(angle) + torque / (MASS * REACH**2 + INERTIA)
+
+
+def limp(seconds: float, pieces: int = 2000) -> float:
+    """The angle to which it falls from rest [rad], by Runge and Kutta's fourth order."""
+
+    def rate(angle: float) -> float:
+        return RATE * math.cos(angle)
+
+    angle = speed = 0.0
+    h = seconds / pieces
+    for _ in range(pieces):
+        a1 = rate(angle)
+        a2 = rate(angle + h / 2 * speed)
+        a3 = rate(angle + h / 2 * speed + h * h / 4 * a1)
+        a4 = rate(angle + h * speed + h * h / 2 * a2)
+        angle += h * speed + h * h / 6 * (a1 + a2 + a3)
+        speed += h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+    return angle
+
+
+# One free body with three marks on it, which show where it is without any convention: the body's
+# origin and the ends of its x and y axes. Its centre of mass is somewhere else, so that the two can
+# be told apart.
+
+MARKS = np.array([(0.0, 0, 0), (1, 0, 0), (0, 1, 0)])
+CENTRE = np.array([0.3, -0.2, 0.1])  # of mass, in the body's frame [m]
+
+
+def _numbers(values: Any) -> str:
+    return " ".join(f"{value:g}" for value in values)
+
+
+MARKED_MJCF = f"""<mujoco><option gravity="0 0 0"/><worldbody><body><freejoint/>
+<inertial pos="{_numbers(CENTRE)}" mass="1" diaginertia="1 1 1"/>
+{"".join(f'<site pos="{_numbers(mark)}"/>' for mark in MARKS)}
+</body></worldbody></mujoco>"""
+
+_MARKED_INERTIAL = (
+    '<inertial><origin xyz="{at}"/><mass value="{mass}"/>'
+    '<inertia ixx="{mass}" ixy="0" ixz="0" iyy="{mass}" iyz="0" izz="{mass}"/></inertial>'
+)
+# A mark is a link of next to no mass: of a centre of mass PyBullet tells the place in double.
+MARKED_URDF = (
+    '<robot name="marked"><link name="body">'
+    + _MARKED_INERTIAL.format(at=_numbers(CENTRE), mass=1)
+    + "</link>"
+    + "".join(
+        f'<link name="mark{k}">{_MARKED_INERTIAL.format(at="0 0 0", mass=1e-12)}</link>'
+        f'<joint name="to{k}" type="fixed"><parent link="body"/><child link="mark{k}"/>'
+        f'<origin xyz="{_numbers(mark)}"/></joint>'
+        for k, mark in enumerate(MARKS)
+    )
+    + "</robot>"
+)
+
+
+# A tree of hinges and a fixed joint, whose order tells by which rule an engine counts joints.
+
+# (name, parent, kind) in the order of the file; the parent is named by the joint above it.
+# Listed, depth first, breadth first, each by file or by alphabet: all different here.
+TREE = (
+    ("lima", "zulu", "hinge"),
+    ("zulu", "base", "hinge"),
+    ("weld", "zulu", "fixed"),
+    ("kilo", "weld", "hinge"),
+    ("echo", "base", "hinge"),
+    ("bravo", "echo", "hinge"),
+    ("alpha", "zulu", "hinge"),
+)
+FIXED = "weld"
+
+_TREE_INERTIAL = (
+    '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
+    "</inertial>"
+)
+
+
+def _link(joint: str) -> str:
+    """The link under a joint: its name backwards, whose alphabet is another one."""
+    return joint if joint == "base" else joint[::-1]
+
+
+# The links stand in the opposite order, so that no rule about links passes for one about joints.
+TREE_URDF = (
+    f'<robot name="tree"><link name="base">{_TREE_INERTIAL}</link>'
+    + "".join(
+        f'<link name="{_link(name)}">{_TREE_INERTIAL}</link>' for name, _, _ in reversed(TREE)
+    )
+    + "".join(
+        f'<joint name="{name}" type="{"continuous" if kind == "hinge" else "fixed"}">'
+        f'<parent link="{_link(parent)}"/><child link="{_link(name)}"/></joint>'
+        for name, parent, kind in TREE
+    )
+    + "</robot>"
+)
+
+
+def _mjcf(parent: str) -> str:
+    """The bodies below one, with their joints; a fixed joint is a body without one."""
+    return "".join(
+        f'<body name="{name}"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+        + (f'<joint name="{name}"/>' if kind == "hinge" else "")
+        + f"{_mjcf(name)}</body>"
+        for name, above, kind in TREE
+        if above == parent
+    )
+
+
+TREE_MJCF = f'<mujoco><worldbody><body name="base">{_mjcf("base")}</body></worldbody></mujoco>'
+
+# What is put on a floor: a ball, where contacts are looked at, and a block that may slide.
+
+RADIUS = 0.1  # of the ball, 1 kg [m]
+BALL = f"""<mujoco><option gravity="0 0 0"/><worldbody><geom type="plane" size="5 5 1"/>
+<body pos="0 0 1"><freejoint/><geom size="{RADIUS}" mass="1"/></body></worldbody></mujoco>"""
+
+BLOCK = (0.2, 0.2, 0.05)  # half its edges [m]
+SLOPE_GRAVITY = 10.0  # on the block [m/s²]
+REST, PULL = 0.5, 0.5  # for how long it lies, and is then pulled [s]

@@ -1,1 +1,0 @@
-"""Tiny models that the rooms of engines load, in the formats that engines read."""
