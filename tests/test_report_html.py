@@ -43,7 +43,7 @@ from statemachine.report.contacts import contact_words
 from statemachine.report.events import events_of
 from statemachine.report.finding import headline
 from statemachine.report.html import SideDrawing, check_target, report, write_report
-from statemachine.report.html.between import shown_series
+from statemachine.report.html.between import shown_series, shown_traces
 from statemachine.report.html.charts import difference_chart, spread
 from statemachine.report.html.geometry import bones_of, mesh_of, octahedral
 from statemachine.report.html.timeline import frames_of
@@ -504,7 +504,7 @@ def test_figures_between_moments_are_those_of_the_picture() -> None:
     two = shipped("hold", "pybullet", "engine")
     frames = frames_of(one, two)
     curves = series(one, two)
-    found = {each.name: each for each in shown_series(one, two, frames, None, curves)}
+    found = {each.name: each for each in shown_series(shown_traces(one, two, frames), None, curves)}
     other = np.interp(frames.time, two.time - two.time[0], two.qpos[:, 2])
     assert found["elbow_flex"].two == pytest.approx(other, abs=1e-12)
     assert found["elbow_flex"].difference == pytest.approx(
