@@ -235,7 +235,7 @@ def _one_line(cell: str) -> str:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of cells, already formatted.
+    """Rows of cells, already formatted; a line break in one is shown as "?".
 
     Attributes:
         headers: One for each column.
@@ -244,7 +244,6 @@ class Table:
         words: Columns of words, by number; they are aligned to the left, others right.
         emphasis: Rows to set off, by number.
         wide: Columns, by number, that are left out where there are 80 characters to a line.
-        code: Whether cells may be code of several lines; in others a line break is shown as "?".
     """
 
     headers: Sequence[str]
@@ -253,12 +252,10 @@ class Table:
     words: frozenset[int] = frozenset({0})
     emphasis: frozenset[int] = frozenset()
     wide: frozenset[int] = frozenset()
-    code: bool = False
 
     def __post_init__(self) -> None:
-        if not self.code:
-            rows = [[_one_line(cell) for cell in row] for row in self.rows]
-            object.__setattr__(self, "rows", rows)
+        rows = [[_one_line(cell) for cell in row] for row in self.rows]
+        object.__setattr__(self, "rows", rows)
 
     def narrow(self) -> Table:
         """The table without its wide columns."""

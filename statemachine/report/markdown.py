@@ -146,15 +146,11 @@ def _table(block: Table) -> str:
 
     title = f"*{_escaped(block.title)}*\n\n" if block.title else ""
     marks = (":--" if k in block.words else "--:" for k in range(len(block.headers)))
-    lines = [row(_cell(header) for header in block.headers), row(marks)]
+    lines = [row(_escaped(header) for header in block.headers), row(marks)]
     for k, cells in enumerate(block.rows):
         bold = "**" if k in block.emphasis else ""
-        lines.append(row(f"{bold}{_cell(c)}{bold}" if c else "" for c in cells))
+        lines.append(row(f"{bold}{_escaped(c)}{bold}" if c else "" for c in cells))
     return title + "\n".join(lines)
-
-
-def _cell(text: str) -> str:
-    return "<br>".join(_escaped(line.strip()) for line in text.splitlines())
 
 
 def _fenced(text: str, language: str) -> str:
