@@ -225,15 +225,12 @@ def test_the_points_of_a_design() -> None:
 def test_the_points_of_indices() -> None:
     one, two = Vary("damping", bounds=(0.0, 2.0)), Vary("kp", bounds=(10.0, 20.0))
     design = Design((one, two), samples=4, indices=True)
-    block: dict[str, Any] = {}
-    for point in design.points():
-        block.setdefault(point.block, []).append(point.values)
-    assert {name: len(rows) for name, rows in block.items()} == dict.fromkeys(
-        ("A", "B", "damping", "kp"), 4
-    )
-    assert len(design) == 16
-    a, b, mixed = (np.array(block[name]) for name in ("A", "B", "damping"))
-    assert np.array_equal(mixed, np.column_stack([b[:, 0], a[:, 1]]))
+    points = np.array([point.values for point in design.points()])
+    assert len(design) == len(points) == 16
+    a, b, damping, kp = points.reshape(4, 4, 2)
+    assert np.array_equal(damping, np.column_stack([b[:, 0], a[:, 1]]))
+    assert np.array_equal(kp, np.column_stack([a[:, 0], b[:, 1]]))
+    assert len(np.unique(np.concatenate([a, b]), axis=0)) == 8
 
 
 def test_a_start_outside_the_range_of_its_joint_is_told_once() -> None:
