@@ -148,7 +148,12 @@ def _stage(runs: BothRuns, frames: Frames, start: int, still: Html, strongest: f
         tag("div", *checks, class_="checks", id="checks", hidden=True),
         tag(
             "p",
-            kept(_arrows(strongest)) if strongest else "",
+            kept(
+                "Arrows: contact forces, each as long as the root of its force; the longest of "
+                f"the run is {figure(strongest)} N."
+            )
+            if strongest
+            else "",
             class_="foot",
             id="arrows",
             hidden=True,
@@ -185,13 +190,6 @@ def _stage(runs: BothRuns, frames: Frames, start: int, still: Html, strongest: f
 def tip_name(tip: str) -> str:
     """The site that is followed, as it is called in the model."""
     return "gripperframe (tool frame)" if tip == "gripperframe" else tip or "a site"
-
-
-def _arrows(strongest: float) -> str:
-    return (
-        "Arrows: contact forces, each as long as the root of its force; the longest of the run is "
-        f"{figure(strongest)} N."
-    )
 
 
 def _readout(runs: BothRuns) -> Html:
