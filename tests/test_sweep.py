@@ -557,6 +557,12 @@ def test_a_worker_that_dies_or_hangs_is_a_row(policy: str, tmp_path: Path, jobs:
         assert failed == [2.0, 2.0]
 
 
+def slow_sweep(policy: str, *more: str) -> list[str]:
+    """The command of a sweep that takes some seconds."""
+    words = ["sweep", f"{policy}:slow", "--vary", "gain=1:60:60", "--model", "so101"]
+    return [*words, "--seconds", "0.1", "--backend", "mujoco", "--out", "out", *more]
+
+
 def _until(what: Callable[[], Any], seconds: float = 120.0) -> Any:
     end = time.monotonic() + seconds
     while time.monotonic() < end:
@@ -575,17 +581,15 @@ def _group(leader: int) -> list[str]:
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="no SIGKILL")
 def test_a_driver_that_is_killed_goes_on(policy: str, tmp_path: Path, start: Start) -> None:
-    words = ["sweep", f"{policy}:slow", "--vary", "gain=1:60:60", "--model", "so101"]
-    words += ["--seconds", "0.1", "--backend", "mujoco", "--jobs", "2", "--json"]
-    out = tmp_path / "killed"
-    driver = start(*words, "--out", str(out))
+    words, out = slow_sweep(policy, "--jobs", "2", "--json"), tmp_path / "out"
+    driver = start(*words)
     _until(lambda: list(out.glob("cells/*/part-*.parquet")))
     os.kill(driver.pid, signal.SIGKILL)
     driver.communicate()
     before = dict(counted(out))
     assert 0 < len(before) < 60
     _until(lambda: not _group(driver.pid))  # its workers end by themselves
-    second = start(*words, "--out", str(out))
+    second = start(*words)
     told, error = second.communicate()
     assert second.returncode == 0, error
     summary = json.loads(told)
@@ -601,8 +605,7 @@ def test_a_driver_that_is_killed_goes_on(policy: str, tmp_path: Path, start: Sta
 def test_a_sweep_that_is_killed_with_its_workers_leaves_nothing_for_long(
     policy: str, tmp_path: Path, start: Start
 ) -> None:
-    words = ["sweep", f"{policy}:slow", "--vary", "gain=1:60:60", "--model", "so101"]
-    words += ["--seconds", "0.1", "--backend", "mujoco", "--jobs", "2", "--out", "out"]
+    words = slow_sweep(policy, "--jobs", "2")
     driver = start(*words)
     _until(lambda: list((tmp_path / "out").glob("cells/*/part-*.parquet")))
     shared = {path.name for path in Path("/dev/shm").glob(f"*{driver.pid}*")}
@@ -624,9 +627,7 @@ STOPPED = "statemachine: stopped; out has what was done. Type the same to go on\
 def test_a_sweep_that_is_stopped_keeps_what_was_done(
     policy: str, tmp_path: Path, start: Start, jobs: str, begun: str, how: str
 ) -> None:
-    words = ["sweep", f"{policy}:slow", "--vary", "gain=1:60:60", "--model", "so101"]
-    words += ["--seconds", "0.1", "--backend", "mujoco", "--jobs", jobs, "--out", "out"]
-    driver = start(*words)
+    driver = start(*slow_sweep(policy, "--jobs", jobs))
     _until(lambda: list((tmp_path / "out").glob(begun)))
     time.sleep(0.4)  # its workers begin, and must not say that they were interrupted
     if how == "SIGTERM":  # of a batch system, to the driver alone
@@ -653,8 +654,7 @@ def test_a_sweep_on_dask_that_is_stopped_goes_on(
     policy: str, tmp_path: Path, start: Start, number: int
 ) -> None:
     distributed = pytest.importorskip("distributed")
-    words = ["sweep", f"{policy}:slow", "--vary", "gain=1:60:60", "--model", "so101", "--json"]
-    words += ["--seconds", "0.1", "--backend", "mujoco", "--out", "out", "--scheduler"]
+    words = slow_sweep(policy, "--json", "--scheduler")
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
     ) as cluster:
