@@ -38,7 +38,7 @@ from statemachine.sweep import (
 from statemachine.sweep.factors import parse_vary, with_kinds
 from statemachine.sweep.folder import locked, settle_manifest
 from statemachine.sweep.rows import KEY, MEASURED, RowWriter, counted, remove_failed
-from statemachine.sweep.worker import run_batch
+from statemachine.sweep.worker import differing, run_batch
 
 from .conftest import ROOT, in_its_own_python, need_engine
 
@@ -756,6 +756,16 @@ def test_dask_with_a_worker_that_is_killed(policy: str, tmp_path: Path) -> None:
     assert (summary.done, summary.missing, dict(summary.failed)) == (24, 0, {})
     run_sweep(sweep, tmp_path / "here", jobs=1)
     assert values(tmp_path / "dask").equals(values(tmp_path / "here"))
+
+
+def test_a_worker_with_another_version_or_file_is_told_of(policy: str) -> None:
+    rules = prepared(small(f"{policy}:still")).rules
+    assert differing(rules, sm.__version__) == ""
+    others = dataclasses.replace(rules, files={"so101": "", "none": ""}, places={
+        "so101": "so101", "none": "none.xml"}, function="")  # fmt: skip
+    assert differing(others, "0") == "statemachine, so101 and none"
+    Path(policy).write_text("")
+    assert differing(rules, sm.__version__) == f"{policy}:still"
 
 
 def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
