@@ -76,16 +76,6 @@ class Question:
     because: str
     always: bool = False
 
-    @property
-    def lettered(self) -> list[str]:
-        """The choices as they are shown: "a) 12"."""
-        return [f"{letter}) {text}" for letter, text in zip(LETTERS, self.choices, strict=False)]
-
-    @property
-    def answer(self) -> str:
-        """The choice that the run gave."""
-        return "none of them" if self.right is None else self.lettered[self.right]
-
 
 @dataclass(frozen=True)
 class Traces:

@@ -21,6 +21,7 @@ from ..page import (
     Text,
     Verdict,
 )
+from .quiz import answer_of, lettered
 from .terminal import together
 
 # What Markdown would take for its own; underscores within words it leaves alone.
@@ -126,13 +127,13 @@ def _section(block: Section, picture: Callable[[Picture], str]) -> str:
 def asked(block: Question) -> str:
     """A question and its choices, without the answer."""
     text = "" if block.always else "**Before you read on:** "
-    choices = [f"- {_escaped(choice)}" for choice in block.lettered]
+    choices = [f"- {_escaped(choice)}" for choice in lettered(block)]
     return "\n".join([f"{text}{_escaped(block.text)}", "", *choices])
 
 
 def answer(block: Question) -> str:
     """What the run says about it."""
-    return f"{_escaped(block.answer)}. {_escaped(block.because)}"
+    return f"{_escaped(answer_of(block))}. {_escaped(block.because)}"
 
 
 def _folded(inside: list[str], summary: str = "What the run says") -> str:
