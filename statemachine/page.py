@@ -76,16 +76,6 @@ class Question:
     because: str
     always: bool = False
 
-    @property
-    def lettered(self) -> list[str]:
-        """The choices as they are shown: "a) 12"."""
-        return [f"{letter}) {text}" for letter, text in zip(LETTERS, self.choices, strict=False)]
-
-    @property
-    def answer(self) -> str:
-        """The choice that the run gave."""
-        return "none of them" if self.right is None else self.lettered[self.right]
-
 
 @dataclass(frozen=True)
 class Traces:
@@ -235,7 +225,7 @@ def _one_line(cell: str) -> str:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of cells, already formatted.
+    """Rows of cells, already formatted; a line break in one is shown as "?".
 
     Attributes:
         headers: One for each column.
@@ -244,7 +234,6 @@ class Table:
         words: Columns of words, by number; they are aligned to the left, others right.
         emphasis: Rows to set off, by number.
         wide: Columns, by number, that are left out where there are 80 characters to a line.
-        code: Whether cells may be code of several lines; in others a line break is shown as "?".
     """
 
     headers: Sequence[str]
@@ -253,12 +242,10 @@ class Table:
     words: frozenset[int] = frozenset({0})
     emphasis: frozenset[int] = frozenset()
     wide: frozenset[int] = frozenset()
-    code: bool = False
 
     def __post_init__(self) -> None:
-        if not self.code:
-            rows = [[_one_line(cell) for cell in row] for row in self.rows]
-            object.__setattr__(self, "rows", rows)
+        rows = [[_one_line(cell) for cell in row] for row in self.rows]
+        object.__setattr__(self, "rows", rows)
 
     def narrow(self) -> Table:
         """The table without its wide columns."""

@@ -29,7 +29,8 @@ from statemachine.rendering.compose import compose, halved
 from statemachine.rendering.motion import corners
 from statemachine.report.film import Film, write_film
 from statemachine.report.film_overlay import Overlay, Strip
-from statemachine.report.plot import drawn, plot, plot_trace, write_plot
+from statemachine.report.plot_draw import FIGURE_SETTINGS, draw, drawn, write_plot
+from statemachine.report.plot_panels import of_comparison, of_trace
 from statemachine.runs import Trace, record, shipped, write
 from statemachine.runs.header import INPUTS
 
@@ -571,7 +572,7 @@ def _texts(svg: bytes) -> str:
 def test_an_svg_says_in_text_what_it_shows(compared: tuple[Trace, Trace, Any]) -> None:
     pytest.importorskip("matplotlib")
     one, two, found = compared
-    text = _texts(drawn(plot(one, two, found), "svg"))
+    text = _texts(drawn(of_comparison(one, two, found), "svg"))
     for word in (one.header.label, two.header.label, "hold", *one.header.joints, "gripperframe"):
         assert word in text
     for word in ("energy", "tolerance", "gripper on floor", "time [s]", "statemachine 0."):
@@ -583,7 +584,7 @@ def test_the_same_figure_has_the_same_bytes(
     compared: tuple[Trace, Trace, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     matplotlib = pytest.importorskip("matplotlib")
-    figure = plot(*compared)
+    figure = of_comparison(*compared)
     for form in ("svg", "png", "pdf"):
         once = drawn(figure, form)
         # Another day, and a reader who likes other fonts.
@@ -602,7 +603,7 @@ def test_a_png_is_a_picture_with_both_sides_in_it(compared: tuple[Trace, Trace, 
     image_of = pytest.importorskip("PIL.Image")
     import io
 
-    image = image_of.open(io.BytesIO(drawn(plot(*compared), "png"))).convert("RGB")
+    image = image_of.open(io.BytesIO(drawn(of_comparison(*compared), "png"))).convert("RGB")
     assert image.width == pytest.approx(80 / 25.4 * 300, abs=1)
     pixels = np.asarray(image).astype(int)
     for colour in ((240, 168, 48), (75, 31, 120)):
@@ -615,7 +616,7 @@ def test_a_png_is_a_picture_with_both_sides_in_it(compared: tuple[Trace, Trace, 
 
 def test_panels_hold_the_figures_of_the_comparison(compared: tuple[Trace, Trace, Any]) -> None:
     one, two, found = compared
-    figure = plot(one, two, found)
+    figure = of_comparison(one, two, found)
     panels = {panel.title: panel for panel in figure.panels}
     assert [panel.wide for panel in figure.panels] == [True, *[False] * (len(panels) - 1)]
     lift = panels["shoulder_lift"]
@@ -645,7 +646,7 @@ def test_what_never_differs_is_drawn_too(compared: tuple[Trace, Trace, Any]) -> 
     """A difference of zero has no logarithm."""
     pytest.importorskip("matplotlib")
     one, _, _ = compared
-    figure = plot(one, one, compare(one, one))
+    figure = of_comparison(one, one, compare(one, one))
     assert figure.part is None
     assert "they part" not in _texts(drawn(figure, "svg"))
 
@@ -656,14 +657,11 @@ def test_nothing_is_cut_off_at_the_edges(compared: tuple[Trace, Trace, Any], wha
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.text import Text
 
-    from statemachine.report.plot import _SETTINGS
-    from statemachine.report.plot_draw import draw
-
     one, two, found = compared
     if what == "recorded":
         one = Trace(dataclasses.replace(one.header, recorded=True, defaults="engine"), one.columns)
-    figure = plot_trace(two) if what == "alone" else plot(one, two, found)
-    with matplotlib.rc_context(_SETTINGS):
+    figure = of_trace(two) if what == "alone" else of_comparison(one, two, found)
+    with matplotlib.rc_context(FIGURE_SETTINGS):
         canvas = draw(figure)
         pen = FigureCanvasAgg(canvas)
         pen.draw()
@@ -678,6 +676,6 @@ def test_nothing_is_cut_off_at_the_edges(compared: tuple[Trace, Trace, Any], wha
 def test_one_trace_alone(compared: tuple[Trace, Trace, Any]) -> None:
     pytest.importorskip("matplotlib")
     _, two, _ = compared
-    text = _texts(drawn(plot_trace(two), "svg"))
+    text = _texts(drawn(of_trace(two), "svg"))
     for word in (two.header.label, "the command", *two.header.joints, "energy"):
         assert word in text

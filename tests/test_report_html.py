@@ -9,7 +9,8 @@ import io
 import itertools
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -43,7 +44,7 @@ from statemachine.report.contacts import contact_words
 from statemachine.report.events import events_of
 from statemachine.report.finding import headline
 from statemachine.report.html import SideDrawing, check_target, report, write_report
-from statemachine.report.html.between import shown_series
+from statemachine.report.html.between import shown_series, shown_traces
 from statemachine.report.html.charts import difference_chart, spread
 from statemachine.report.html.geometry import bones_of, mesh_of, octahedral
 from statemachine.report.html.timeline import frames_of
@@ -57,6 +58,7 @@ from .conftest import ROOT, Cli, need_engine
 
 LIMIT = 2_000_000  # bytes
 Made = tuple[Comparison, Trace, Trace, SideDrawing]
+Seen = Callable[..., Any]
 
 
 def of(one: Trace, two: Trace) -> Made:
@@ -99,6 +101,37 @@ def page(hold: Made, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def open_page(tab: Tab, path: Path) -> None:
     tab.goto(path.as_uri())
     tab.wait_for_timeout(300)
+
+
+@pytest.fixture
+def tab(page: Path) -> Iterator[Tab]:
+    """A browser with the page."""
+    with browser(height=1000) as opened:
+        open_page(opened, page)
+        yield opened
+        opened.nothing_wrong()
+
+
+@pytest.fixture
+def seen(tmp_path: Path) -> Seen:
+    """Opens the page of a comparison in a browser."""
+
+    @contextmanager
+    def opened(made: Made, **more: Any) -> Iterator[Tab]:
+        with browser(height=1000) as tab:
+            open_page(tab, write_report(tmp_path / "x.html", page_of(made, **more)))
+            yield tab
+            tab.nothing_wrong()
+
+    return opened
+
+
+@pytest.fixture
+def bare(page: Path) -> Iterator[Tab]:
+    """A browser with the page that runs no script."""
+    with browser(java_script_enabled=False) as opened:
+        open_page(opened, page)
+        yield opened
 
 
 def picture(tab: Tab, where: str = "#scene") -> np.ndarray:
@@ -178,7 +211,7 @@ def hostile(text: str) -> str:
 
 
 @pytest.mark.slow
-def test_names_that_are_markup_do_nothing(hold: Made, tmp_path: Path) -> None:
+def test_names_that_are_markup_do_nothing(hold: Made, seen: Seen) -> None:
     def spoiled(trace: Trace) -> Trace:
         header = trace.header
         names = {
@@ -198,15 +231,10 @@ def test_names_that_are_markup_do_nothing(hold: Made, tmp_path: Path) -> None:
 
     _, one, two, look = hold
     made = of_look(spoiled(one), spoiled(two), look)
-    target = write_report(
-        tmp_path / "x.html", page_of(made, said=(hostile("said"),), command=hostile("typed"))
-    )
-    with browser() as tab:
-        open_page(tab, target)
+    with seen(made, said=(hostile("said"),), command=hostile("typed")) as tab:
         assert tab.evaluate("window.hit") is None
         assert tab.locator("img").count() == 0
         assert "onerror" in tab.locator("main").inner_text()
-        tab.nothing_wrong()
 
 
 def of_look(one: Trace, two: Trace, look: SideDrawing) -> Made:
@@ -459,10 +487,8 @@ def texts(blocks: list[Block]) -> list[str]:
 
 
 @pytest.mark.slow
-def test_names_in_a_list_have_no_comma(hold: Made, page: Path) -> None:
-    with browser() as tab:
-        open_page(tab, page)
-        text = tab.locator("main").inner_text()
+def test_names_in_a_list_have_no_comma(hold: Made, tab: Tab) -> None:
+    text = tab.locator("main").inner_text()
     assert "gripperframe rotation" in text
     assert "gripperframe, " not in text
     assert "gripper, normal force" not in text
@@ -504,7 +530,7 @@ def test_figures_between_moments_are_those_of_the_picture() -> None:
     two = shipped("hold", "pybullet", "engine")
     frames = frames_of(one, two)
     curves = series(one, two)
-    found = {each.name: each for each in shown_series(one, two, frames, None, curves)}
+    found = {each.name: each for each in shown_series(shown_traces(one, two, frames), None, curves)}
     other = np.interp(frames.time, two.time - two.time[0], two.qpos[:, 2])
     assert found["elbow_flex"].two == pytest.approx(other, abs=1e-12)
     assert found["elbow_flex"].difference == pytest.approx(
@@ -549,21 +575,19 @@ def test_names_at_the_end_of_a_chart_do_not_cover_each_other() -> None:
 
 
 @pytest.mark.slow
-def test_ticks_have_their_labels_under_them(page: Path) -> None:
-    with browser() as tab:
-        open_page(tab, page)
-        far = tab.evaluate(
-            """() => [...document.querySelectorAll('.area + .times')].filter((t) => t.offsetWidth)
-            .flatMap((times) => [...times.children].map((label) => {
-              const range = document.createRange();
-              range.selectNode(label.firstChild);
-              const text = range.getBoundingClientRect(), box = times.getBoundingClientRect();
-              const at = box.left + parseFloat(label.style.left) / 100 * box.width;
-              return Math.abs(text.left + text.width / 2 - at);
-            }))"""
-        )
-        assert len(far) > 20
-        assert max(far) < 1.5
+def test_ticks_have_their_labels_under_them(tab: Tab) -> None:
+    far = tab.evaluate(
+        """() => [...document.querySelectorAll('.area + .times')].filter((t) => t.offsetWidth)
+        .flatMap((times) => [...times.children].map((label) => {
+          const range = document.createRange();
+          range.selectNode(label.firstChild);
+          const text = range.getBoundingClientRect(), box = times.getBoundingClientRect();
+          const at = box.left + parseFloat(label.style.left) / 100 * box.width;
+          return Math.abs(text.left + text.width / 2 - at);
+        }))"""
+    )
+    assert len(far) > 20
+    assert max(far) < 1.5
 
 
 @pytest.mark.slow
@@ -614,15 +638,10 @@ def test_other_figures_make_another_headline(hold: Made) -> None:
     assert comparison.agreements != apart.agreements
 
 
-def test_every_figure_of_the_comparison_is_on_the_page(hold: Made, page: Path) -> None:
-    with browser(java_script_enabled=False) as tab:
-        open_page(tab, page)
-        text = (
-            tab.locator("#figures table")
-            .first.inner_text()
-            .replace("−", "-")
-            .replace("\u00a0", " ")
-        )
+def test_every_figure_of_the_comparison_is_on_the_page(hold: Made, bare: Tab) -> None:
+    text = (
+        bare.locator("#figures table").first.inner_text().replace("−", "-").replace("\u00a0", " ")
+    )
     for found in hold[0].agreements:
         (line,) = [
             row for row in text.splitlines() if row.startswith(found.name.replace(", ", " ") + "\t")
@@ -634,15 +653,13 @@ def test_every_figure_of_the_comparison_is_on_the_page(hold: Made, page: Path) -
                 assert quantity(value, found.unit) in line
 
 
-def test_it_reads_without_a_script(page: Path) -> None:
-    with browser(java_script_enabled=False) as tab:
-        open_page(tab, page)
-        assert tab.locator("#still svg").is_visible()
-        assert tab.locator("#curves .plot").first.is_visible()
-        assert not tab.locator("#slider").is_visible()
-        assert not tab.locator("#play").is_visible()
-        assert not tab.locator(".cursor").first.is_visible()
-        text = tab.locator("main").inner_text()
+def test_it_reads_without_a_script(bare: Tab) -> None:
+    assert bare.locator("#still svg").is_visible()
+    assert bare.locator("#curves .plot").first.is_visible()
+    assert not bare.locator("#slider").is_visible()
+    assert not bare.locator("#play").is_visible()
+    assert not bare.locator(".cursor").first.is_visible()
+    text = bare.locator("main").inner_text()
     for heading in ("How far apart, over time", "What happens when", "Where this comes from"):
         assert heading in text
 
@@ -651,47 +668,42 @@ def test_it_reads_without_a_script(page: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_slider_moves_both_arms_the_cursors_and_the_figures(page: Path, hold: Made) -> None:
-    with browser(height=1000) as tab:
-        open_page(tab, page)
-        for name in ("marks", "trails"):
-            tab.locator(f"#{name}").uncheck()
-        for alone in ("solid", "ghost"):
-            for name in ("solid", "ghost"):
-                tab.locator(f"#{name}").set_checked(name == alone)
-            go(tab, 20)
-            first, at = picture(tab), tab.locator("#readout-box").inner_text()
-            assert changed(first, picture(tab)) == 0  # it stands still by itself
-            go(tab, 120)
-            assert changed(first, picture(tab)) > 2000, alone
-            assert tab.locator("#readout-box").inner_text() != at
-        assert tab.locator("#clock").inner_text() == "0.600 s"
-        places = cursors(tab)
-        assert len(places) > 15
-        assert places == pytest.approx([0.6 / 2.0] * len(places), abs=0.004)
-        values = hold[1].qpos[120, 3], hold[2].qpos[120, 3]
-        cells = tab.locator("#readout tr", has_text="wrist_flex").locator("td").all_inner_texts()
-        shown = [float(cell.rstrip("°").replace("−", "-")) for cell in cells]
-        assert shown[:2] == pytest.approx(np.degrees(values), abs=0.06)
-        assert shown[2] == pytest.approx(abs(np.degrees(values[0] - values[1])), abs=0.006)
-        tab.nothing_wrong()
+def test_the_slider_moves_both_arms_the_cursors_and_the_figures(tab: Tab, hold: Made) -> None:
+    for name in ("marks", "trails"):
+        tab.locator(f"#{name}").uncheck()
+    for alone in ("solid", "ghost"):
+        for name in ("solid", "ghost"):
+            tab.locator(f"#{name}").set_checked(name == alone)
+        go(tab, 20)
+        first, at = picture(tab), tab.locator("#readout-box").inner_text()
+        assert changed(first, picture(tab)) == 0  # it stands still by itself
+        go(tab, 120)
+        assert changed(first, picture(tab)) > 2000, alone
+        assert tab.locator("#readout-box").inner_text() != at
+    assert tab.locator("#clock").inner_text() == "0.600 s"
+    places = cursors(tab)
+    assert len(places) > 15
+    assert places == pytest.approx([0.6 / 2.0] * len(places), abs=0.004)
+    values = hold[1].qpos[120, 3], hold[2].qpos[120, 3]
+    cells = tab.locator("#readout tr", has_text="wrist_flex").locator("td").all_inner_texts()
+    shown = [float(cell.rstrip("°").replace("−", "-")) for cell in cells]
+    assert shown[:2] == pytest.approx(np.degrees(values), abs=0.06)
+    assert shown[2] == pytest.approx(abs(np.degrees(values[0] - values[1])), abs=0.006)
 
 
 @pytest.mark.slow
-def test_each_side_is_drawn_and_can_be_left_out(page: Path) -> None:
-    with browser(height=1000) as tab:
-        open_page(tab, page)
-        before = picture(tab)
-        for name in ("solid", "ghost", "marks", "trails"):
-            tab.locator(f"#{name}").uncheck()
-            without = picture(tab)
-            assert changed(before, without) > 150, name
-            tab.locator(f"#{name}").check()
-            assert changed(before, picture(tab)) == 0, name
+def test_each_side_is_drawn_and_can_be_left_out(tab: Tab) -> None:
+    before = picture(tab)
+    for name in ("solid", "ghost", "marks", "trails"):
+        tab.locator(f"#{name}").uncheck()
+        without = picture(tab)
+        assert changed(before, without) > 150, name
+        tab.locator(f"#{name}").check()
+        assert changed(before, picture(tab)) == 0, name
 
 
 @pytest.mark.slow
-def test_the_sides_are_drawn_where_they_are(hold: Made, tmp_path: Path) -> None:
+def test_the_sides_are_drawn_where_they_are(hold: Made, seen: Seen) -> None:
     """A run against itself turned by a quarter: the ghost is somewhere else."""
     _, one, _, look = hold
     xpos = one["xpos"][..., [1, 0, 2]] * [-1, 1, 1]
@@ -699,9 +711,7 @@ def test_the_sides_are_drawn_where_they_are(hold: Made, tmp_path: Path) -> None:
     w, x, y, z = np.moveaxis(one["xquat"], -1, 0)
     turned = np.stack([w - z, x - y, y + x, z + w], axis=-1) * half
     two = Trace(one.header, {**one.columns, "xpos": xpos, "xquat": turned})
-    target = write_report(tmp_path / "x.html", page_of(of_look(one, two, look)))
-    with browser(height=1000) as tab:
-        open_page(tab, target)
+    with seen(of_look(one, two, look)) as tab:
         for name in ("marks", "trails"):
             tab.locator(f"#{name}").uncheck()
         both = picture(tab)
@@ -731,59 +741,55 @@ def moved(tab: Tab, since: float) -> float:
 
 
 @pytest.mark.slow
-def test_it_plays_and_pauses(page: Path) -> None:
-    with browser(height=1000) as tab:
-        open_page(tab, page)
-        slowest = tab.locator("#speed option").evaluate_all(
-            "options => options.map(o => o.value).sort((a, b) => a - b)[0]"
-        )
-        tab.locator("#speed").select_option(slowest)  # a busy machine must not miss its end
-        tab.locator("#play").click()
-        assert tab.locator("#play").inner_text() == "Pause"
-        first = moved(tab, 0)
-        moved(tab, first)
-        tab.locator("#play").click()
-        then = float(tab.locator("#slider").input_value())
-        assert 0 < first < then < 400
-        tab.wait_for_timeout(400)
-        assert float(tab.locator("#slider").input_value()) == then
-        assert cursors(tab)[0] == pytest.approx(then / 400, abs=0.004)
-        until(tab, lambda: tab.locator("#said").text_content().startswith("Paused at "))
+def test_it_plays_and_pauses(tab: Tab) -> None:
+    slowest = tab.locator("#speed option").evaluate_all(
+        "options => options.map(o => o.value).sort((a, b) => a - b)[0]"
+    )
+    tab.locator("#speed").select_option(slowest)  # a busy machine must not miss its end
+    tab.locator("#play").click()
+    assert tab.locator("#play").inner_text() == "Pause"
+    first = moved(tab, 0)
+    moved(tab, first)
+    tab.locator("#play").click()
+    then = float(tab.locator("#slider").input_value())
+    assert 0 < first < then < 400
+    tab.wait_for_timeout(400)
+    assert float(tab.locator("#slider").input_value()) == then
+    assert cursors(tab)[0] == pytest.approx(then / 400, abs=0.004)
+    until(tab, lambda: tab.locator("#said").text_content().startswith("Paused at "))
 
 
 @pytest.mark.slow
-def test_it_can_be_used_by_keyboard(page: Path) -> None:
-    with browser(height=1000) as tab:
-        open_page(tab, page)
-        slider = tab.locator("#slider")
-        slider.focus()
-        for key, value in (("Home", 0), ("ArrowRight", 1), ("End", 400), ("ArrowLeft", 399)):
-            tab.keyboard.press(key)
-            assert int(slider.input_value()) == value
-        assert re.fullmatch(
-            r"1\.995 s: wrist_flex [\d.]+°; gripperframe position [\d.]+\u00a0mm apart",
-            slider.get_attribute("aria-valuetext"),
+def test_it_can_be_used_by_keyboard(tab: Tab) -> None:
+    slider = tab.locator("#slider")
+    slider.focus()
+    for key, value in (("Home", 0), ("ArrowRight", 1), ("End", 400), ("ArrowLeft", 399)):
+        tab.keyboard.press(key)
+        assert int(slider.input_value()) == value
+    assert re.fullmatch(
+        r"1\.995 s: wrist_flex [\d.]+°; gripperframe position [\d.]+\u00a0mm apart",
+        slider.get_attribute("aria-valuetext"),
+    )
+    tab.keyboard.press("Home")
+    tab.keyboard.press(" ")
+    moved(tab, 0)
+    tab.keyboard.press(" ")
+    assert 0 < int(slider.input_value()) < 400
+    tab.locator("#scene").press("0")
+    before = picture(tab)
+    tab.locator("#scene").press("ArrowLeft")
+    assert changed(before, picture(tab)) > 1000
+    tab.locator("#scene").press("0")
+    assert changed(before, picture(tab)) == 0
+    # Whatever can be reached shows that it was.
+    for _ in range(12):
+        tab.keyboard.press("Tab")
+        style = tab.evaluate(
+            "(() => { const s = getComputedStyle(document.activeElement);"
+            "return [s.outlineStyle, parseFloat(s.outlineWidth)]; })()"
         )
-        tab.keyboard.press("Home")
-        tab.keyboard.press(" ")
-        moved(tab, 0)
-        tab.keyboard.press(" ")
-        assert 0 < int(slider.input_value()) < 400
-        tab.locator("#scene").press("0")
-        before = picture(tab)
-        tab.locator("#scene").press("ArrowLeft")
-        assert changed(before, picture(tab)) > 1000
-        tab.locator("#scene").press("0")
-        assert changed(before, picture(tab)) == 0
-        # Whatever can be reached shows that it was.
-        for _ in range(12):
-            tab.keyboard.press("Tab")
-            style = tab.evaluate(
-                "(() => { const s = getComputedStyle(document.activeElement);"
-                "return [s.outlineStyle, parseFloat(s.outlineWidth)]; })()"
-            )
-            assert style[0] != "none"
-            assert style[1] >= 2
+        assert style[0] != "none"
+        assert style[1] >= 2
 
 
 @pytest.mark.slow
@@ -802,22 +808,20 @@ def test_a_time_in_a_table_and_a_press_on_a_chart_go_there(page: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_view_turns_and_comes_back(page: Path) -> None:
-    with browser(height=1000) as tab:
-        open_page(tab, page)
-        tab.locator("#view-all").click()
-        before = picture(tab)
-        box = tab.locator("#scene").bounding_box()
-        tab.mouse.move(box["x"] + 200, box["y"] + 200)
-        tab.mouse.down()
-        tab.mouse.move(box["x"] + 300, box["y"] + 230, steps=4)
-        tab.mouse.up()
-        assert changed(before, picture(tab)) > 2000
-        tab.locator("#view-near").click()
-        near = picture(tab)
-        assert changed(before, near) > 2000
-        tab.locator("#view-all").click()
-        assert changed(before, picture(tab)) == 0
+def test_the_view_turns_and_comes_back(tab: Tab) -> None:
+    tab.locator("#view-all").click()
+    before = picture(tab)
+    box = tab.locator("#scene").bounding_box()
+    tab.mouse.move(box["x"] + 200, box["y"] + 200)
+    tab.mouse.down()
+    tab.mouse.move(box["x"] + 300, box["y"] + 230, steps=4)
+    tab.mouse.up()
+    assert changed(before, picture(tab)) > 2000
+    tab.locator("#view-near").click()
+    near = picture(tab)
+    assert changed(before, near) > 2000
+    tab.locator("#view-all").click()
+    assert changed(before, picture(tab)) == 0
 
 
 # How it looks, and to whom.
@@ -906,46 +910,44 @@ def test_the_sides_differ_for_the_colour_blind() -> None:
 
 
 @pytest.mark.slow
-def test_what_a_screen_reader_hears(page: Path) -> None:
-    with browser() as tab:
-        open_page(tab, page)
-        heard = tab.locator("body").aria_snapshot()
-        for part in (
-            "- main:",
-            "- contentinfo:",
-            'heading "Joint wrist_flex is up to',
-            "[level=1]",
-            '- slider "Moment of the run": ',
-            '- button "Play"',
-            '- checkbox "mujoco',
-            '- region "How far apart, over time"',
-            '- columnheader "largest"',
-            '- rowheader "wrist_flex"',
-            'img "wrist_flex, difference over time: at most 2.58° at 0.355 s',
-            '- img "Both runs in three dimensions',
-        ):
-            assert part in heard, part
-        levels = [
-            int(name[1])
-            for name in tab.evaluate(
-                "[...document.querySelectorAll('h1,h2,h3,h4')].map((h) => h.tagName)"
-            )
-        ]
-        assert levels[0] == 1
-        assert levels.count(1) == 1
-        assert all(b - a <= 1 for a, b in itertools.pairwise(levels))
-        nameless = tab.evaluate(
-            """[...document.querySelectorAll('button, input, select, a, [role=img], [tabindex]')]
-            .filter((e) => !(e.getAttribute('aria-label') || e.textContent.trim()
-              || (e.labels && e.labels.length))).map((e) => e.outerHTML)"""
+def test_what_a_screen_reader_hears(tab: Tab) -> None:
+    heard = tab.locator("body").aria_snapshot()
+    for part in (
+        "- main:",
+        "- contentinfo:",
+        'heading "Joint wrist_flex is up to',
+        "[level=1]",
+        '- slider "Moment of the run": ',
+        '- button "Play"',
+        '- checkbox "mujoco',
+        '- region "How far apart, over time"',
+        '- columnheader "largest"',
+        '- rowheader "wrist_flex"',
+        'img "wrist_flex, difference over time: at most 2.58° at 0.355 s',
+        '- img "Both runs in three dimensions',
+    ):
+        assert part in heard, part
+    levels = [
+        int(name[1])
+        for name in tab.evaluate(
+            "[...document.querySelectorAll('h1,h2,h3,h4')].map((h) => h.tagName)"
         )
-        assert nameless == []
-        tables = tab.evaluate(
-            "[...document.querySelectorAll('table')].map((t) => [!!t.caption?.textContent,"
-            "[...t.querySelectorAll('th')].every((h) => h.scope)])"
-        )
-        assert all(caption and scoped for caption, scoped in tables)
-        assert tab.locator("#said").get_attribute("aria-live") == "polite"
+    ]
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert all(b - a <= 1 for a, b in itertools.pairwise(levels))
+    nameless = tab.evaluate(
+        """[...document.querySelectorAll('button, input, select, a, [role=img], [tabindex]')]
+        .filter((e) => !(e.getAttribute('aria-label') || e.textContent.trim()
+          || (e.labels && e.labels.length))).map((e) => e.outerHTML)"""
+    )
+    assert nameless == []
+    tables = tab.evaluate(
+        "[...document.querySelectorAll('table')].map((t) => [!!t.caption?.textContent,"
+        "[...t.querySelectorAll('th')].every((h) => h.scope)])"
+    )
+    assert all(caption and scoped for caption, scoped in tables)
+    assert tab.locator("#said").get_attribute("aria-live") == "polite"
 
 
 @pytest.mark.slow
@@ -1031,11 +1033,9 @@ def not_finite(made: Made) -> Made:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [ended, single, same, not_finite])
-def test_other_traces(hold: Made, kind: Callable[[Made], Made], tmp_path: Path) -> None:
+def test_other_traces(hold: Made, kind: Callable[[Made], Made], seen: Seen) -> None:
     made = kind(hold)
-    target = write_report(tmp_path / "x.html", page_of(made))
-    with browser() as tab:
-        open_page(tab, target)
+    with seen(made) as tab:
         assert tab.locator("#scene").is_visible()
         last = int(tab.locator("#slider").get_attribute("max"))
         go(tab, last)
@@ -1047,11 +1047,10 @@ def test_other_traces(hold: Made, kind: Callable[[Made], Made], tmp_path: Path) 
             assert "The two runs are the same in every figure" in text
         assert "NaN" not in text
         assert tab.locator("#play").is_visible() == (kind is not single)
-        tab.nothing_wrong()
 
 
 @pytest.mark.slow
-def test_timesteps_that_differ_are_drawn_between_and_it_is_said(tmp_path: Path) -> None:
+def test_timesteps_that_differ_are_drawn_between_and_it_is_said(seen: Seen) -> None:
     scenario = SCENARIOS["hold"]
     one = record_scenario(scenario, sm.load(scenario.model, defaults="engine"), defaults="engine")
     two = shipped("hold", "pybullet", "engine")
@@ -1062,8 +1061,7 @@ def test_timesteps_that_differ_are_drawn_between_and_it_is_said(tmp_path: Path) 
     # At a compared moment nothing is taken between.
     common = np.isclose(frames.time % 0.025, 0, atol=1e-9) | np.isclose(frames.time % 0.025, 0.025)
     assert (frames.share[common] == 0).all()
-    with browser() as tab:
-        open_page(tab, write_report(tmp_path / "x.html", page_of(of(one, two))))
+    with seen(of(one, two)) as tab:
         assert "taken between two of its rows" in tab.locator("#picture").inner_text()
         go(tab, 7)
         assert "between two of its rows" in tab.locator("#now").inner_text()
@@ -1071,36 +1069,29 @@ def test_timesteps_that_differ_are_drawn_between_and_it_is_said(tmp_path: Path) 
         # Rows of 5 ms and of 1/240 s: at 35 ms the other is between its rows 8 and 9.
         apart = abs(one.qpos[7, 2] - (0.6 * two.qpos[8, 2] + 0.4 * two.qpos[9, 2]))
         assert float(cell.strip("● °")) == pytest.approx(np.degrees(apart), rel=0.01)
-        tab.nothing_wrong()
 
 
 @pytest.mark.slow
-def test_without_the_model_there_are_sticks(hold: Made, tmp_path: Path) -> None:
+def test_without_the_model_there_are_sticks(hold: Made, seen: Seen) -> None:
     none = SideDrawing(None, "there is no so101/scene.xml here")
-    target = write_report(tmp_path / "x.html", page_of(hold, looks=(none, none)))
-    with browser(height=1000) as tab:
-        open_page(tab, target)
+    with seen(hold, looks=(none, none)) as tab:
         assert "there is no so101/scene.xml here" in tab.locator("#picture").inner_text()
         tab.locator("#view-all").click()
         before = picture(tab)
         go(tab, 0)
         assert changed(before, picture(tab)) > 2000
-        tab.nothing_wrong()
 
 
 @pytest.mark.slow
-def test_without_poses_there_is_no_scene_and_it_is_said(hold: Made, tmp_path: Path) -> None:
+def test_without_poses_there_is_no_scene_and_it_is_said(hold: Made, seen: Seen) -> None:
     bare = [
         Trace(t.header, {k: v for k, v in t.columns.items() if k not in ("xpos", "xquat")})
         for t in hold[1:3]
     ]
-    target = write_report(tmp_path / "x.html", page_of(of_look(bare[0], bare[1], hold[3])))
-    with browser() as tab:
-        open_page(tab, target)
+    with seen(of_look(bare[0], bare[1], hold[3])) as tab:
         assert "no poses" in tab.locator("#stage").inner_text()
         go(tab, 100)
         assert tab.locator("#clock").inner_text() == "0.500 s"
-        tab.nothing_wrong()
 
 
 # Shapes.

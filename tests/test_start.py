@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -65,55 +66,48 @@ def test_everything_promised_is_there() -> None:
         sm.stpe  # noqa: B018  # pyright: ignore
 
 
-def test_the_clash_of_import_names_is_said_in_one_line(tmp_path: Path) -> None:
-    """The other distribution's files lie among ours when it was installed before us."""
-    package = tmp_path / "statemachine"
-    package.mkdir()
-    (package / "__init__.py").write_text((ROOT / "statemachine" / "__init__.py").read_text())
-    (package / "statemachine.py").write_text("")
+THEIRS = {
+    "statemachine/__init__.py": "class StateMachine: ...\n__version__ = '3.0'\n",
+    "statemachine/statemachine.py": "",
+}
+
+
+@pytest.mark.parametrize(
+    ("theirs", "ours", "typed", "code"),
+    [
+        # Their files lie among ours: they were installed before us.
+        (
+            ("statemachine/statemachine.py",),
+            ("statemachine/__init__.py",),
+            ("-c", "import statemachine"),
+            1,
+        ),
+        # Theirs is found first, alone or with our files around it.
+        (THEIRS, ("statemachine_sim.py",), ("-m", "statemachine_sim"), 2),
+        (THEIRS, ("statemachine_sim.py", "statemachine/cli.py"), ("-m", "statemachine_sim"), 2),
+        # No clash: only ours is there.
+        ((), (), ("-m", "statemachine_sim", "--version"), 0),
+    ],
+)
+def test_a_clash_of_import_names_is_said_in_one_line(
+    tmp_path: Path, theirs: Iterable[str], ours: Iterable[str], typed: tuple[str, ...], code: int
+) -> None:
+    files = {name: THEIRS[name] for name in theirs}
+    files |= {name: (ROOT / name).read_text() for name in ours}
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
     done = subprocess.run(
-        [sys.executable, "-c", "import statemachine"],
+        [sys.executable, *typed],
         capture_output=True,
         text=True,
-        cwd=tmp_path,
+        cwd=tmp_path if files else ROOT,
         check=False,
     )
-    assert done.returncode == 1
-    last = done.stderr.strip().splitlines()[-1]
-    assert "pip uninstall python-statemachine" in last
-
-
-@pytest.mark.parametrize("ours_beside", [True, False])
-def test_the_command_says_it_in_one_line(tmp_path: Path, ours_beside: bool) -> None:
-    """Theirs is found first, alone or with our files around it."""
-    package = tmp_path / "statemachine"
-    package.mkdir()
-    (package / "__init__.py").write_text("class StateMachine: ...\n__version__ = '3.0'\n")
-    (package / "statemachine.py").write_text("")
-    if ours_beside:
-        (package / "cli.py").write_text((ROOT / "statemachine" / "cli.py").read_text())
-    (tmp_path / "statemachine_sim.py").write_text((ROOT / "statemachine_sim.py").read_text())
-    done = subprocess.run(
-        [sys.executable, "-m", "statemachine_sim"],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-        check=False,
-    )
-    assert done.returncode == 2
-    assert len(done.stderr.splitlines()) == 1, done.stderr
-    assert "pip uninstall python-statemachine" in done.stderr
-
-
-def test_the_command_runs_where_there_is_no_clash() -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "statemachine_sim", "--version"],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        check=True,
-    )
-    assert done.stdout.startswith("statemachine ")
+    assert done.returncode == code
+    said = done.stdout if code == 0 else done.stderr.splitlines()[-1]
+    assert ("pip uninstall python-statemachine" if code else "statemachine ") in said
+    assert code == 1 or len(done.stderr.splitlines()) == bool(code), done.stderr
 
 
 @pytest.mark.parametrize(
@@ -134,7 +128,6 @@ def test_a_missing_or_broken_engine_is_one_line(
     tmp_path: Path, engine: str, content: str | None, words: str
 ) -> None:
     if content is None:
-        block = f"sys.modules[{engine!r}] = None"
         block = (
             "import importlib.abc\n"
             "class Gone(importlib.abc.MetaPathFinder):\n"

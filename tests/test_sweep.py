@@ -38,7 +38,7 @@ from statemachine.sweep import (
 from statemachine.sweep.factors import parse_vary, with_kinds
 from statemachine.sweep.folder import locked, settle_manifest
 from statemachine.sweep.rows import KEY, MEASURED, RowWriter, counted, remove_failed
-from statemachine.sweep.worker import run_batch
+from statemachine.sweep.worker import differing, run_batch
 
 from .conftest import ROOT, in_its_own_python, need_engine
 
@@ -225,15 +225,12 @@ def test_the_points_of_a_design() -> None:
 def test_the_points_of_indices() -> None:
     one, two = Vary("damping", bounds=(0.0, 2.0)), Vary("kp", bounds=(10.0, 20.0))
     design = Design((one, two), samples=4, indices=True)
-    block: dict[str, Any] = {}
-    for point in design.points():
-        block.setdefault(point.block, []).append(point.values)
-    assert {name: len(rows) for name, rows in block.items()} == dict.fromkeys(
-        ("A", "B", "damping", "kp"), 4
-    )
-    assert len(design) == 16
-    a, b, mixed = (np.array(block[name]) for name in ("A", "B", "damping"))
-    assert np.array_equal(mixed, np.column_stack([b[:, 0], a[:, 1]]))
+    points = np.array([point.values for point in design.points()])
+    assert len(design) == len(points) == 16
+    a, b, damping, kp = points.reshape(4, 4, 2)
+    assert np.array_equal(damping, np.column_stack([b[:, 0], a[:, 1]]))
+    assert np.array_equal(kp, np.column_stack([a[:, 0], b[:, 1]]))
+    assert len(np.unique(np.concatenate([a, b]), axis=0)) == 8
 
 
 def test_a_start_outside_the_range_of_its_joint_is_told_once() -> None:
@@ -560,6 +557,12 @@ def test_a_worker_that_dies_or_hangs_is_a_row(policy: str, tmp_path: Path, jobs:
         assert failed == [2.0, 2.0]
 
 
+def slow_sweep(policy: str, *more: str) -> list[str]:
+    """The command of a sweep that takes some seconds."""
+    words = ["sweep", f"{policy}:slow", "--vary", "gain=1:60:60", "--model", "so101"]
+    return [*words, "--seconds", "0.1", "--backend", "mujoco", "--out", "out", *more]
+
+
 def _until(what: Callable[[], Any], seconds: float = 120.0) -> Any:
     end = time.monotonic() + seconds
     while time.monotonic() < end:
@@ -578,17 +581,15 @@ def _group(leader: int) -> list[str]:
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="no SIGKILL")
 def test_a_driver_that_is_killed_goes_on(policy: str, tmp_path: Path, start: Start) -> None:
-    words = ["sweep", f"{policy}:slow", "--vary", "gain=1:60:60", "--model", "so101"]
-    words += ["--seconds", "0.1", "--backend", "mujoco", "--jobs", "2", "--json"]
-    out = tmp_path / "killed"
-    driver = start(*words, "--out", str(out))
+    words, out = slow_sweep(policy, "--jobs", "2", "--json"), tmp_path / "out"
+    driver = start(*words)
     _until(lambda: list(out.glob("cells/*/part-*.parquet")))
     os.kill(driver.pid, signal.SIGKILL)
     driver.communicate()
     before = dict(counted(out))
     assert 0 < len(before) < 60
     _until(lambda: not _group(driver.pid))  # its workers end by themselves
-    second = start(*words, "--out", str(out))
+    second = start(*words)
     told, error = second.communicate()
     assert second.returncode == 0, error
     summary = json.loads(told)
@@ -604,8 +605,7 @@ def test_a_driver_that_is_killed_goes_on(policy: str, tmp_path: Path, start: Sta
 def test_a_sweep_that_is_killed_with_its_workers_leaves_nothing_for_long(
     policy: str, tmp_path: Path, start: Start
 ) -> None:
-    words = ["sweep", f"{policy}:slow", "--vary", "gain=1:60:60", "--model", "so101"]
-    words += ["--seconds", "0.1", "--backend", "mujoco", "--jobs", "2", "--out", "out"]
+    words = slow_sweep(policy, "--jobs", "2")
     driver = start(*words)
     _until(lambda: list((tmp_path / "out").glob("cells/*/part-*.parquet")))
     shared = {path.name for path in Path("/dev/shm").glob(f"*{driver.pid}*")}
@@ -627,9 +627,7 @@ STOPPED = "statemachine: stopped; out has what was done. Type the same to go on\
 def test_a_sweep_that_is_stopped_keeps_what_was_done(
     policy: str, tmp_path: Path, start: Start, jobs: str, begun: str, how: str
 ) -> None:
-    words = ["sweep", f"{policy}:slow", "--vary", "gain=1:60:60", "--model", "so101"]
-    words += ["--seconds", "0.1", "--backend", "mujoco", "--jobs", jobs, "--out", "out"]
-    driver = start(*words)
+    driver = start(*slow_sweep(policy, "--jobs", jobs))
     _until(lambda: list((tmp_path / "out").glob(begun)))
     time.sleep(0.4)  # its workers begin, and must not say that they were interrupted
     if how == "SIGTERM":  # of a batch system, to the driver alone
@@ -656,8 +654,7 @@ def test_a_sweep_on_dask_that_is_stopped_goes_on(
     policy: str, tmp_path: Path, start: Start, number: int
 ) -> None:
     distributed = pytest.importorskip("distributed")
-    words = ["sweep", f"{policy}:slow", "--vary", "gain=1:60:60", "--model", "so101", "--json"]
-    words += ["--seconds", "0.1", "--backend", "mujoco", "--out", "out", "--scheduler"]
+    words = slow_sweep(policy, "--json", "--scheduler")
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
     ) as cluster:
@@ -759,6 +756,16 @@ def test_dask_with_a_worker_that_is_killed(policy: str, tmp_path: Path) -> None:
     assert (summary.done, summary.missing, dict(summary.failed)) == (24, 0, {})
     run_sweep(sweep, tmp_path / "here", jobs=1)
     assert values(tmp_path / "dask").equals(values(tmp_path / "here"))
+
+
+def test_a_worker_with_another_version_or_file_is_told_of(policy: str) -> None:
+    rules = prepared(small(f"{policy}:still")).rules
+    assert differing(rules, sm.__version__) == ""
+    others = dataclasses.replace(rules, files={"so101": "", "none": ""}, places={
+        "so101": "so101", "none": "none.xml"}, function="")  # fmt: skip
+    assert differing(others, "0") == "statemachine, so101 and none"
+    Path(policy).write_text("")
+    assert differing(rules, sm.__version__) == f"{policy}:still"
 
 
 def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

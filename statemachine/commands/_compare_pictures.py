@@ -118,15 +118,16 @@ def write(
     from ..report.progress import progress
 
     if pictures.plot is not None:
-        from ..report import plot as plots
+        from ..report import plot_panels
+        from ..report.plot_draw import write_plot
 
         with progress("figure"):
             figure = (
-                plots.plot_trace(one)
+                plot_panels.of_trace(one)
                 if two is None
-                else plots.plot(one, two, comparison, floor=floor)
+                else plot_panels.of_comparison(one, two, comparison, floor=floor)
             )
-            size = plots.write_plot(figure, pictures.plot)
+            size = write_plot(figure, pictures.plot)
         complain(f"{pictures.plot}: a figure, {_bytes(size)}", 0)
     if pictures.film is not None:
         from ..report import film as films

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..engines.measured import Measurement
-from ..measures.text import reading, significant
-from ..page import Block, Page, Table, Text, Verdict
+from ..measures.text import capital, reading, significant
+from ..page import Block, Code, Page, Section, Table, Text, Verdict
 from ..probes.conventions import Answered, Conventions
 from ..probes.phrasebook import CONCEPTS, Phrasebook
 
@@ -29,17 +29,17 @@ def page(result: Conventions) -> Page:
 
 
 def calls_page(result: Phrasebook) -> Page:
-    """One table for each concept, and whether all of its calls did what they should."""
+    """For each concept what to type on each engine, and whether all of it did what it should."""
     blocks: list[Block] = []
     for concept in CONCEPTS:
-        rows = []
+        shown: list[Block] = []
         for engine, calls in result.engines.items():
             call = next((each for each in calls if each.concept == concept), None)
-            mark = "✓" if call and call.works else "✗" if call else ""
-            rows.append((engine, mark, call.code if call else _NOT_ASKED))
-        blocks.append(
-            Table(("", "", "what to type"), rows, concept, frozenset({0, 1, 2}), code=True)
-        )
+            if call is None:
+                shown.append(Text(f"{engine}: {_NOT_ASKED}"))
+                continue
+            shown += [Text(f"{engine} {'✓' if call.works else '✗'}"), Code(call.code.splitlines())]
+        blocks.append(Section("", capital(concept), shown))
     every = [(engine, call) for engine, calls in result.engines.items() for call in calls]
     wrong = [(engine, call) for engine, call in every if not call.works]
     blocks += [Verdict(f"{engine}, {call.concept}: {call.said}", False) for engine, call in wrong]

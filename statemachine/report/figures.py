@@ -158,11 +158,7 @@ def _traces(axes: Any, picture: Traces) -> None:
         along, up = log.line(np.asarray(x), np.asarray(y)) if log else (x, y)
         axes.plot(along, up, style, color=colour, label=name)
     if log is not None:
-        axes.set_ylim(log.bottom, log.high)
-        ticks, labels = zip(*log.ticks(_POWERS), strict=True)
-        axes.set_yticks(ticks, labels)
-        if log.edge is not None:
-            axes.axhspan(log.bottom, log.edge, color=_BELOW, linewidth=0, zorder=0)
+        log_scale(axes, log, _POWERS)
     axes.set_xlabel(picture.across)
     axes.set_ylabel(picture.up)
     axes.grid(alpha=0.3)
@@ -170,6 +166,20 @@ def _traces(axes: Any, picture: Traces) -> None:
     if len(picture.curves) > 1:
         beside = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0)}
         axes.legend(fontsize="small", frameon=False, **beside)
+
+
+def log_scale(axes: Any, log: LogAxis, most: int) -> None:
+    """Give the vertical axis of matplotlib's axes the places of a log axis.
+
+    Args:
+        axes: On which places are drawn.
+        log: What gives the places.
+        most: How many powers of ten are named.
+    """
+    axes.set_ylim(log.bottom, log.high)
+    axes.set_yticks(*zip(*log.ticks(most), strict=True))
+    if log.edge is not None:
+        axes.axhspan(log.bottom, log.edge, color=_BELOW, linewidth=0, zorder=0)
 
 
 def _slots(axes: Any, picture: Slots) -> None:

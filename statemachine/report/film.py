@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..compare import Comparison, Series, labels_of, series
+from ..compare import Comparison, labels_of, series
 from ..errors import BadInputError
 from ..installed import require_extra
 from ..interface import Model
@@ -124,27 +124,18 @@ def _strip(one: Trace, two: Trace | None, comparison: Comparison | None) -> Stri
     """How far apart the fingertips are; without one, what is farthest beyond its tolerance."""
     if two is None:
         return None
-    curves = series(one, two)
-    curve = next((found for found in curves if found.kind == "tip"), None)
     worst = comparison.worst.name if comparison is not None and comparison.worst else ""
-    if curve is None:
-        curve = next((found for found in curves if found.name == worst), None)
-    if curve is None and curves:
-        curve = curves[0]
-    return None if curve is None else _strip_of(curve, comparison)
-
-
-def _strip_of(curve: Series, comparison: Comparison | None) -> Strip:
+    by_rank = sorted(series(one, two), key=lambda each: (each.kind != "tip", each.name != worst))
+    if not by_rank:
+        return None
+    curve = by_rank[0]
     scale, unit = reading(curve.unit)
     found = comparison.agreements if comparison is not None else ()
-    allowed = next(
-        (agreement.tolerance for agreement in found if agreement.name == curve.name), None
-    )
-    name = curve.name.removesuffix(", position")
+    tolerances = {each.name: scale * each.tolerance for each in found}
     return Strip(
-        name,
+        curve.name.removesuffix(", position"),
         unit.strip(),
         curve.time,
         scale * curve.difference,
-        None if allowed is None else scale * allowed,
+        tolerances.get(curve.name),
     )

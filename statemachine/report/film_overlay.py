@@ -84,7 +84,9 @@ class Overlay:
         if strip is not None:
             self._left, self._right = 3.4 * self._text, size[0] - 0.8 * self._text
             self._top, self._bottom = 1.75 * self._text, low - 0.6 * self._text
-            self._scale()
+            marks = [strip.tolerance] if strip.tolerance else []
+            self._log = LogAxis.around(strip.values, marks, _DECADES)
+            self._places = self._log.places(strip.values).tolist()
             self._done, self._to_come = self._drawn(_VIOLET), self._drawn(_PALE)
 
     def paint(self, frame: Any, k: int) -> Any:
@@ -149,13 +151,6 @@ class Overlay:
         if strip.tolerance:
             text = f"- - tolerance {figure(strip.tolerance)}{unit}"
             draw.text((self._right, y), text, font=self._small, fill=_INK, anchor="ra")
-
-    def _scale(self) -> None:
-        """The decades that the strip shows."""
-        assert self._strip is not None
-        tolerance = self._strip.tolerance
-        self._log = LogAxis.around(self._strip.values, [tolerance] if tolerance else [], _DECADES)
-        self._places = self._log.places(self._strip.values).tolist()
 
     def _x(self, time: float) -> float:
         span = max(self._timing.seconds, 1e-12)

@@ -21,6 +21,7 @@ from ..page import (
     Text,
     Verdict,
 )
+from .quiz import answer_of, lettered
 from .terminal import together
 
 # What Markdown would take for its own; underscores within words it leaves alone.
@@ -126,13 +127,13 @@ def _section(block: Section, picture: Callable[[Picture], str]) -> str:
 def asked(block: Question) -> str:
     """A question and its choices, without the answer."""
     text = "" if block.always else "**Before you read on:** "
-    choices = [f"- {_escaped(choice)}" for choice in block.lettered]
+    choices = [f"- {_escaped(choice)}" for choice in lettered(block)]
     return "\n".join([f"{text}{_escaped(block.text)}", "", *choices])
 
 
 def answer(block: Question) -> str:
     """What the run says about it."""
-    return f"{_escaped(block.answer)}. {_escaped(block.because)}"
+    return f"{_escaped(answer_of(block))}. {_escaped(block.because)}"
 
 
 def _folded(inside: list[str], summary: str = "What the run says") -> str:
@@ -146,15 +147,11 @@ def _table(block: Table) -> str:
 
     title = f"*{_escaped(block.title)}*\n\n" if block.title else ""
     marks = (":--" if k in block.words else "--:" for k in range(len(block.headers)))
-    lines = [row(_cell(header) for header in block.headers), row(marks)]
+    lines = [row(_escaped(header) for header in block.headers), row(marks)]
     for k, cells in enumerate(block.rows):
         bold = "**" if k in block.emphasis else ""
-        lines.append(row(f"{bold}{_cell(c)}{bold}" if c else "" for c in cells))
+        lines.append(row(f"{bold}{_escaped(c)}{bold}" if c else "" for c in cells))
     return title + "\n".join(lines)
-
-
-def _cell(text: str) -> str:
-    return "<br>".join(_escaped(line.strip()) for line in text.splitlines())
 
 
 def _fenced(text: str, language: str) -> str:

@@ -11,18 +11,15 @@ _WIDTH, _SHOWN = 30, 200  # characters of a test's name, and of what it said
 
 def page(found: Examination) -> Page:
     """The examination as a page."""
-    return Page(
-        f"The tests of {found.file}",
-        f"{count(len(found.tests), 'test')}, on {found.backend} {found.engine_version}",
-        _unhealthy(found) if found.failures else _trials(found),
-    )
-
-
-def _unhealthy(found: Examination) -> list[Block]:
-    return [
+    unhealthy: list[Block] = [
         Verdict("your tests fail on the healthy arm; no fault was tried", False),
         *(Text(_told(failure)) for failure in found.failures),
     ]
+    return Page(
+        f"The tests of {found.file}",
+        f"{count(len(found.tests), 'test')}, on {found.backend} {found.engine_version}",
+        unhealthy if found.failures else _trials(found),
+    )
 
 
 def _trials(found: Examination) -> list[Block]:

@@ -1,17 +1,32 @@
-"""Draw a figure with matplotlib: panels at places in millimetres, one above the other."""
+"""A figure of traces for a paper or a slide, one column wide and readable without colour.
+
+It is drawn with matplotlib: panels at places in millimetres, one above the other.
+"""
 
 from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..runs.whole import replace_bytes
+from .figures import SETTINGS, check_suffix, log_scale, saved
 from .log_axis import LogAxis
 from .plot_panels import Panel, Plot
 
+FIGURE_SETTINGS = {
+    **SETTINGS,
+    "font.family": ["DejaVu Sans", "sans-serif"],
+    "font.size": 6.5,
+    "axes.linewidth": 0.5,
+    "axes.unicode_minus": True,
+    "path.simplify": True,
+}
+_DOTS = 300  # a PNG has to an inch
 # A colour-blind-safe pair, pale and broad under dark and dashed: told apart in grey too.
 STYLES: tuple[dict[str, Any], ...] = (
     {"color": "#f0a830", "linewidth": 2.0, "linestyle": "-", "solid_capstyle": "butt"},
@@ -27,7 +42,25 @@ _SAMPLE, _LETTER = 9.5, 1.25  # of a label: the line before it, and one letter
 _DECADES = 6  # at most, of a difference
 _POWERS = 2  # that its axis names, at most
 _FLOOR = "#bdbdbd"
-_BELOW = "#ececec"  # behind the level of zero
+
+
+def drawn(figure: Plot, form: str) -> bytes:
+    """A figure as svg, png or pdf; the same figure gives the same bytes.
+
+    Raises:
+        MissingEngineError: matplotlib is not installed.
+    """
+    return saved(lambda: draw(figure), form, FIGURE_SETTINGS, dpi=_DOTS)
+
+
+def write_plot(figure: Plot, path: Path) -> int:
+    """Write a figure to a file .svg, .png or .pdf, whole or not at all; its bytes.
+
+    Raises:
+        BadInputError: Another suffix.
+        MissingEngineError: matplotlib is not installed.
+    """
+    return replace_bytes(path, drawn(figure, check_suffix(path)))
 
 
 def draw(figure: Plot) -> Any:
@@ -187,7 +220,6 @@ def _apart(axes: Any, panel: Panel) -> None:
     assert panel.apart is not None
     time, values = panel.apart
     log = LogAxis.around(values, [panel.tolerance] if panel.tolerance else [], _DECADES)
-    axes.set_ylim(log.bottom, log.high)
     places = log.places(values)
     if panel.floor is not None:
         width = np.minimum(panel.floor[1], 10.0**log.high)
@@ -195,16 +227,13 @@ def _apart(axes: Any, panel: Panel) -> None:
             panel.floor[0], log.bottom, log.area(width), color=_FLOOR, linewidth=0, zorder=0.5,
         )  # fmt: skip
     axes.plot(time, places, color=_APART, linewidth=0.7)
-    if log.edge is not None:
-        axes.axhspan(log.bottom, log.edge, color=_BELOW, linewidth=0, zorder=0)
     if panel.tolerance:
         limit = float(np.log10(panel.tolerance))
         axes.axhline(limit, color=_INK, linewidth=0.6, linestyle=(0, (1, 1.5)))
         axes.fill_between(
             time, limit, places, where=places > limit, color=_APART, alpha=0.35, linewidth=0,
         )  # fmt: skip
-    ticks, labels = zip(*log.ticks(_POWERS), strict=True)
-    axes.set_yticks(ticks, labels)
+    log_scale(axes, log, _POWERS)
     axes.get_yticklabels()[-1].set_verticalalignment("top")  # above it is another panel's label
 
 

@@ -19,6 +19,16 @@ class Stopped(Exception):  # noqa: N818  (nothing is wrong)
     """The reader has had enough for now."""
 
 
+def lettered(question: Question) -> list[str]:
+    """Its choices as they are shown: "a) 12"."""
+    return [f"{letter}) {text}" for letter, text in zip(LETTERS, question.choices, strict=False)]
+
+
+def answer_of(question: Question) -> str:
+    """The choice that the run gave."""
+    return "none of them" if question.right is None else lettered(question)[question.right]
+
+
 def can_ask() -> bool:
     """Whether somebody is there to answer: both ends are a terminal."""
     return sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
@@ -125,5 +135,5 @@ def _asked(question: Question) -> Iterator[str]:
     width = max(min(shutil.get_terminal_size().columns, _WIDTH_MOST), 20)
     text = question.text if question.always else f"Before you read on: {question.text}"
     yield from textwrap.wrap(text, width)
-    for choice in question.lettered:
+    for choice in lettered(question):
         yield from textwrap.wrap(choice, width, initial_indent="  ", subsequent_indent="     ")

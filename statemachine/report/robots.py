@@ -67,14 +67,7 @@ def _headers(others: Sequence[str]) -> list[str]:
 
 
 def _row(survey: Survey, row: ExaminedModel, others: Sequence[str]) -> list[str]:
-    gaps = [
-        cell
-        for other in others
-        for cell in (
-            _gap(row, other, without=True),
-            _gap(row, other, without=False),
-        )
-    ]
+    gaps = [_gap(row, other, without) for other in others for without in (True, False)]
     return [_bits(survey, row), *gaps, _witness(row), _runs(row), _cost(row)]
 
 
@@ -89,12 +82,8 @@ def _bits(survey: Survey, row: ExaminedModel) -> str:
     first = row.backends.get(survey.default)
     if first is None or (first.refusal and first.refusal_without):
         return "no"
-    told = [value for each in row.backends.values() for value in _same(each)]
+    told = [v for each in row.backends.values() for v in (each.equals_engine, each.restores)]
     return "✗" if False in told else "✓" if True in told else NONE
-
-
-def _same(row: BackendRow) -> tuple[bool | None, bool | None]:
-    return row.equals_engine, row.restores
 
 
 def _gap(model: ExaminedModel, other: str, without: bool) -> str:
@@ -122,12 +111,8 @@ def _witness(row: ExaminedModel) -> str:
 
 
 def _runs(row: ExaminedModel) -> str:
-    counts = [_running(each) for each in row.backends.values() if each.scenarios]
-    return " ".join(map(str, counts)) or NONE
-
-
-def _running(row: BackendRow) -> int:
-    return sum(word == RUNS for word in row.scenarios.values())
+    tried = [list(each.scenarios.values()) for each in row.backends.values() if each.scenarios]
+    return " ".join(str(words.count(RUNS)) for words in tried) or NONE
 
 
 def _cost(row: ExaminedModel) -> str:
@@ -208,29 +193,24 @@ def _refused(rows: Sequence[ExaminedModel], other: str) -> list[Block]:
 
 def _one(survey: Survey, row: ExaminedModel) -> Page:
     """All that was found of one model."""
-    names = list(row.backends)
+    names, backends = list(row.backends), row.backends.values()
     blocks: list[Block] = []
     if row.nq is not None:
         sizes = f"nq {row.nq}, nv {row.nv}, nu {row.nu}, nbody {row.nbody}, ngeom {row.ngeom}"
         blocks.append(Text(f"{sizes}; examined in {row.took:g} s."))
     lines = [
-        ("loads", [_loads(row.backends[name]) for name in names]),
-        ("the bits of the engine without us", [_mark(_same(row.backends[n])[0]) for n in names]),
-        ("two futures of a State are one", [_mark(row.backends[n].restores) for n in names]),
-        ("gap without contacts", [_whole(row.backends[n].without_contacts) for n in names]),
-        ("gap with contacts", [_whole(row.backends[n].with_contacts) for n in names]),
+        ("loads", [_loads(each) for each in backends]),
+        ("the bits of the engine without us", [_mark(each.equals_engine) for each in backends]),
+        ("two futures of a State are one", [_mark(each.restores) for each in backends]),
+        ("gap without contacts", [_whole(each.without_contacts) for each in backends]),
+        ("gap with contacts", [_whole(each.with_contacts) for each in backends]),
     ]
     for name in TRIED:
-        cells = [row.backends[n].scenarios.get(name) for n in names]
+        cells = [each.scenarios.get(name) for each in backends]
         marks = [NONE if cell is None else "✓" if cell == RUNS else "no" for cell in cells]
         lines.append((f"scenario {name}", marks))
-    costs = [row.backends[n].cost for n in names]
-    lines.append(
-        (
-            "cost of a step, on this machine",
-            [NONE if cost is None else f"{cost:.3g} ×" for cost in costs],
-        )
-    )
+    costs = [NONE if each.cost is None else f"{each.cost:.3g} ×" for each in backends]
+    lines.append(("cost of a step, on this machine", costs))
     lines = [(what, cells) for what, cells in lines if set(cells) != {NONE}]
     table = Table(
         ("", *names), [(what, *cells) for what, cells in lines], words=frozenset(range(9))

@@ -15,7 +15,7 @@ from ..lessons import LESSONS
 from ..lessons.pictures import with_picture
 from ..lessons.session import page_of_lesson, take
 from ..measures.text import reading
-from ..page import Page, Picture, RobotPicture, Traces, Verdict
+from ..page import Page, Picture, RobotPicture, Traces
 from ..probes import phrasebook
 from ..probes.conventions import probe
 from ..runs.scenarios import scenario
@@ -23,7 +23,7 @@ from ..runs.whole import replace_bytes
 from . import compare as comparison
 from . import conventions, why
 from .cheat_sheet import cheat_sheet
-from .markdown import block_as_markdown, markdown
+from .markdown import markdown
 from .robot_pictures import drawn_picture
 
 
@@ -73,7 +73,7 @@ def make_reference(folder: Path, say: Callable[[str], None] = print) -> list[Pat
     table = phrasebook.run(installed)
     pages = {
         "conventions": markdown(asked, lambda _: ""),
-        "calls": _phrases(conventions.calls_page(table), table),
+        "calls": markdown(conventions.calls_page(table), lambda _: ""),
         "cheat-sheet": cheat_sheet(table),
     }
     for name, text in pages.items():
@@ -119,22 +119,6 @@ def _explain(folder: Path, name: str, backends: tuple[str, str]) -> Path:
     return _write(
         folder, f"{name}-why", page, "", f"statemachine compare {name} --why --defaults engine"
     )
-
-
-def _phrases(page: Page, table: phrasebook.Phrasebook) -> str:
-    """A heading for each concept, and what to type on each engine."""
-    parts = [f"# {page.title}", f"*{page.origin}*"]
-    parts += [block_as_markdown(b, lambda _: "") for b in page.blocks if isinstance(b, Verdict)]
-    for concept in phrasebook.CONCEPTS:
-        parts.append(f"## {concept[0].upper()}{concept[1:]}")
-        for engine, calls in table.engines.items():
-            call = next((each for each in calls if each.concept == concept), None)
-            if call is None:
-                parts.append(f"{engine}: not asked")
-                continue
-            mark = "✓" if call.works else "✗"
-            parts.append(f"{engine} {mark}\n\n```python\n{call.code}\n```")
-    return "\n\n".join(parts) + "\n"
 
 
 def _write(folder: Path, name: str, page: Page, question: str, typed: str) -> Path:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..measures.text import listed, reading, significant
+from ..measures.text import listed, reading, rounded
 from ..page import Bars, HeatMap, Traces
 from ..sweep.analysis import SweepReport
 from ..sweep.analysis_gaps import GapMap
@@ -29,7 +29,7 @@ def map_picture(found: SweepReport) -> HeatMap | Traces | None:
     framed = [[v is not None and v <= main.tolerance for v in row] for row in chart.gap]
     title += f"; median over {listed(chart.others)}" if chart.others else ""
     if any(map(any, framed)):
-        title += f"; framed: within {size_word(main.tolerance, main.unit)}"
+        title += f"; framed: within {rounded(main.tolerance, main.unit, 2)}"
     if any(map(any, chart.inside)):
         title += "; hatched: inside the chaos floor"
     return HeatMap(
@@ -129,8 +129,3 @@ def setting_word(found: SweepReport, label: str, value: object) -> str:
         return "on" if value else "off"
     times = "x" if label in found.scaled else ""
     return f"{value:.4g}{times}" if isinstance(value, float) else str(value)
-
-
-def size_word(value: float, unit: str) -> str:
-    scale, name = reading(unit)
-    return f"{significant(value * scale, 2)}{name}"

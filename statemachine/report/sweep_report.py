@@ -7,16 +7,18 @@ from ..measures.text import (
     capital,
     count,
     few,
+    fixed,
     listed,
     quantity,
     reading,
     rough,
+    rounded,
 )
 from ..page import Block, Headline, Page, Section, Table, TableCell, Text
 from ..sweep.analysis import SweepReport
 from ..sweep.analysis_gaps import VERDICTS, GapMap, SettingGap
 from .sweep_fit import line, together
-from .sweep_pictures import axis, bars, map_picture, setting_word, size_word
+from .sweep_pictures import axis, bars, map_picture, setting_word
 
 _SHOWN = 5  # settings of the largest gaps
 _COLUMNS = 7  # of a map that 80 characters have room for
@@ -64,7 +66,7 @@ def _headline(found: SweepReport) -> Headline:
     pair = listed(list(found.sides))
     lead = (
         f"In {found.agreed} of {count(len(found.settings), 'setting')} {pair} agree within "
-        f"{size_word(main.tolerance, main.unit)} ({main.says})"
+        f"{rounded(main.tolerance, main.unit, 2)} ({main.says})"
     )
     causes = []
     shares = found.sensitivity
@@ -73,7 +75,7 @@ def _headline(found: SweepReport) -> Headline:
     elif shares is not None and len(shares.indices) > 1:
         top = shares.indices[0]
         how = "goes most with" if shares.method == "rank" else "is most sensitive to"
-        share = "" if shares.method == "rank" else f" (total {_index(top.total)})"
+        share = "" if shares.method == "rank" else f" (total {fixed(top.total, 2)})"
         causes.append(f"The gap {how} {top.label}{share}.")
     causes += [line(found, each) for each in found.together if each.fit is not None]
     agree = found.agreed == len(found.settings)
@@ -97,7 +99,7 @@ def _quantities(found: SweepReport) -> Table:
         rows.append(
             (
                 each.says,
-                size_word(each.tolerance, each.unit),
+                rounded(each.tolerance, each.unit, 2),
                 *counts,
                 quantity(each.median, each.unit),
                 quantity(each.worst, each.unit),
@@ -249,9 +251,9 @@ def _sensitive(found: SweepReport) -> list[Block]:
         rows.append(
             (
                 each.label,
-                TableCell(_index(each.first), share=each.first),
+                TableCell(fixed(each.first, 2), share=each.first),
                 _interval(each.first_interval),
-                TableCell(_index(each.total), share=each.total),
+                TableCell(fixed(each.total, 2), share=each.total),
                 _interval(each.total_interval),
             )
         )
@@ -274,9 +276,5 @@ def _sensitive(found: SweepReport) -> list[Block]:
     return [*blocks, picture] if picture else blocks
 
 
-def _index(value: float) -> str:
-    return f"{value:.2f}".replace("-0.00", "0.00")
-
-
 def _interval(pair: tuple[float, float] | None) -> str:
-    return NONE if pair is None else f"{_index(pair[0])} to {_index(pair[1])}"
+    return NONE if pair is None else f"{fixed(pair[0], 2)} to {fixed(pair[1], 2)}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from .factors import UNITS, Value, Vary
 from .prepare import prepared
 from .request import REQUEST, PreparedSweep, Sweep
 from .rows import require_parquet, schema_of
-from .settings import options_at
+from .settings import own_value
 
 NUDGES = 2  # perturbed runs at a setting, for the chaos floor
 # A backend, the values of the factors and a seed; a value that is None is the model's own.
@@ -230,24 +230,6 @@ def _unit(vary: Vary, model: Model) -> str:
     if hinge == slide or kinds == {JointType.HINGE}:
         return hinge
     return slide if kinds == {JointType.SLIDE} else ""
-
-
-def own_value(vary: Vary, model: Model) -> float | None:
-    """The value of an option that a model has itself; None if its parts have several."""
-    if vary.kind != "option" or not vary.numeric:
-        return None
-    if vary.times:
-        return 1.0
-    try:
-        if vary.place:
-            marked = options_at(model, [(vary, float("nan"))])[vary.name]
-            once = options_at(model, [(replace(vary, place="", times=True), 1.0)])[vary.name]
-            values = np.atleast_1d(once)[np.isnan(np.atleast_1d(marked))]
-        else:
-            values = np.atleast_1d(options_at(model, [(replace(vary, times=True), 1.0)])[vary.name])
-    except (StateMachineError, KeyError, TypeError, ValueError):
-        return None
-    return float(values[0]) if len(values) and not np.ptp(values) else None
 
 
 def evenly(count: int, most: int) -> Ints:

@@ -29,15 +29,10 @@ class DesignPoint:
     Attributes:
         id: A digest of the values.
         values: One for each `Vary`, in their order.
-        block: "" of lists and grids, "sobol" of samples; of a design for indices "A", "B", or
-            the label of the factor that is taken from B and the others from A.
-        sample: Number of the sample within its block; 0 of lists and grids.
     """
 
     id: str
     values: tuple[Value, ...]
-    block: str = ""
-    sample: int = 0
 
 
 @dataclass(frozen=True)
@@ -96,31 +91,24 @@ class Design:
         """Every point; the samples change slowest."""
         names = [vary.label for vary in self.factors]
         order = {vary.label: k for k, vary in enumerate((*self.sampled, *self.listed))}
-        for block, sample, drawn in self._drawn():
+        for drawn in self._drawn():
             for chosen in itertools.product(*(vary.values for vary in self.listed)):
                 every = (*drawn, *chosen)
                 values = tuple(every[order[name]] for name in names)
-                yield DesignPoint(
-                    digest(dict(zip(names, values, strict=True))), values, block, sample
-                )
+                yield DesignPoint(digest(dict(zip(names, values, strict=True))), values)
 
-    def _drawn(self) -> Iterator[tuple[str, int, tuple[Value, ...]]]:
-        """Block, number and values of each sample; one without values where nothing is sampled."""
-        ranges = self.sampled
-        if not ranges:
-            yield "", 0, ()
-            return
-        width = len(ranges)
+    def _drawn(self) -> list[list[Value]]:
+        """The values of each sample, block by block; one without any where nothing is sampled."""
+        width = len(self.sampled)
+        if not width:
+            return [[]]
         unit = _sobol(width * (1 + self.indices), self.samples, self.seed)
-        low, high = np.array([vary.bounds for vary in ranges]).T
-        blocks = {"A" if self.indices else "sobol": unit[:, :width]}
+        low, high = np.array([vary.bounds for vary in self.sampled]).T
+        blocks = [unit[:, :width]]
         if self.indices:
-            blocks["B"] = unit[:, width:]
-            for k, vary in enumerate(ranges):
-                blocks[vary.label] = np.where(np.arange(width) == k, blocks["B"], blocks["A"])
-        for block, rows in blocks.items():
-            for sample, row in enumerate((low + (high - low) * rows).tolist()):
-                yield block, sample, tuple(row)
+            a, b = unit[:, :width], unit[:, width:]
+            blocks = [a, b, *(np.where(np.arange(width) == k, b, a) for k in range(width))]
+        return (low + (high - low) * np.concatenate(blocks)).tolist()
 
 
 def _sobol(width: int, count: int, seed: int) -> Array:

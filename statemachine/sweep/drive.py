@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from .. import __version__
 from ..errors import BadInputError
 from ..grading.unwinding import unwinding
 from ..installed import require_extra
@@ -25,7 +26,7 @@ from .folder import check_folder, locked, settle_manifest
 from .prepare import prepared
 from .request import PreparedSweep, Sweep
 from .rows import CELLS, RowWriter, counted, remove_failed
-from .worker import differing, probe, run_batch
+from .worker import differing, run_batch
 
 _BATCH, _MOST = 1.0, 500  # a task takes about so many seconds, and has at most so many cells
 _TASKS = 4  # at least so many for each job, so that none is idle at the end
@@ -220,13 +221,13 @@ def _connected(address: str, rules: CellRules) -> Iterator[Any]:
     try:
         with suppress(TimeoutError):
             client.wait_for_workers(1, timeout=_PATIENCE)
-        found = client.run(probe, rules, on_error="return")
+        found = client.run(differing, rules, __version__, on_error="return")
         if not found:
             raise BadInputError(f"the scheduler at {address} has no workers")
-        for worker, told in found.items():
-            if isinstance(told, BaseException):
-                raise BadInputError(f"the worker {worker} cannot run a sweep: {told}")
-            if wrong := differing(told, rules):
+        for worker, wrong in found.items():
+            if isinstance(wrong, BaseException):
+                raise BadInputError(f"the worker {worker} cannot run a sweep: {wrong}")
+            if wrong:
                 raise BadInputError(f"the worker {worker} has not the same {wrong} as this machine")
         yield client
     finally:

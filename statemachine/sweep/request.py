@@ -11,7 +11,7 @@ from typing import Any, Literal
 from ..measures.text import command
 from ..runs.controllers import is_function
 from .cell import CellRules, SweepCell
-from .design import Design, DesignPoint, digest
+from .design import Design, digest
 from .folder import SCHEMA
 from .rows import described
 
@@ -108,7 +108,8 @@ class PreparedSweep:
         """Every cell on a backend, seed by seed, point by point."""
         for point in self.design.points():
             for seed in range(self.sweep.seeds):
-                yield cell_of(point, seed, backend)
+                cell = digest([point.id, seed, backend])
+                yield SweepCell(cell, point.id, point.values, seed, backend)
 
     def provenance(self) -> dict[str, Any]:
         """What was asked for, for the metadata of each file: the design as it was typed."""
@@ -148,8 +149,3 @@ class PreparedSweep:
             "cells": len(self),
             "columns": described(self.design.factors),
         }
-
-
-def cell_of(point: DesignPoint, seed: int, backend: str) -> SweepCell:
-    """A cell; its id is a digest of what it is."""
-    return SweepCell(digest([point.id, seed, backend]), point.id, point.values, seed, backend)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..compare.perturbed import Uncertainty, direction, turn
-from ..errors import BadInputError, unknown_name
+from ..errors import BadInputError, StateMachineError, unknown_name
 from ..interface import Array, JointType, Model
 from ..interface.checks import index_of
 from ..runs.robot import scalar_joint
@@ -76,6 +76,22 @@ def _place(model: Model, vary: Vary, owner: str, length: int) -> int:
     if vary.place not in _AXES:
         raise unknown_name("axis", vary.place, _AXES)
     return _AXES.index(vary.place)
+
+
+def own_value(vary: Vary, model: Model) -> float | None:
+    """The value of an option that a model has itself; None if its parts have several."""
+    if vary.kind != "option" or not vary.numeric:
+        return None
+    if vary.times:
+        return 1.0
+    try:
+        own, owner = _own(model, vary)
+        values = np.atleast_1d(own)
+        if vary.place:
+            values = values[[_place(model, vary, owner, len(values))]]
+    except StateMachineError:
+        return None
+    return float(values[0]) if len(values) and not np.ptp(values) else None
 
 
 def start_at(model: Model, settings: Iterable[tuple[Vary, Value]]) -> tuple[dict[int, float], ...]:

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 from .. import __version__
 from ..backends import load
-from ..errors import BadInputError
+from ..errors import BadInputError, StateMachineError
 from ..interface import Model
 from ..measures.text import listed
 from ..models import resolve
@@ -209,25 +209,25 @@ def _settle() -> None:
         threading.Thread(target=watch, daemon=True).start()
 
 
-def probe(rules: CellRules) -> dict[str, str]:
-    """What a worker on another machine has: versions, and the digests of files."""
-    found = {"statemachine": __version__}
-    for name in rules.files:
-        try:
-            found[name] = model_digest(resolve(rules.places[name], rules.menagerie))
-        except Exception as error:
-            found[name] = str(error)
-    if rules.function:
-        try:
-            found[rules.what] = digest_of(rules.what)
-        except OSError:
-            found[rules.what] = f"no file {function_file(rules.what)}"
-    return found
+def differing(rules: CellRules, version: str) -> str:
+    """What this machine has otherwise than the driver of a sweep; "" if nothing.
+
+    Args:
+        rules: Of the sweep.
+        version: Of the driver's library.
+    """
+    wrong = [] if version == __version__ else ["statemachine"]
+    wrong += [name for name in rules.files if not _is_here(rules, name)]
+    if rules.function and not (
+        function_file(rules.what).is_file() and digest_of(rules.what) == rules.function
+    ):
+        wrong.append(rules.what)
+    return listed(wrong)
 
 
-def differing(found: dict[str, str], rules: CellRules) -> str:
-    """What a worker has otherwise than the driver; "" if nothing."""
-    wanted = {"statemachine": __version__, **rules.files}
-    if rules.function:
-        wanted[rules.what] = rules.function
-    return listed([name for name, value in wanted.items() if found.get(name) != value])
+def _is_here(rules: CellRules, name: str) -> bool:
+    """Whether the file of a model is that of the sweep."""
+    try:
+        return model_digest(resolve(rules.places[name], rules.menagerie)) == rules.files[name]
+    except (StateMachineError, OSError):
+        return False

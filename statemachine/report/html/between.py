@@ -11,25 +11,27 @@ from ...compare.series import NORMAL
 from ...interface import Array, Ints, JointType
 from ...measures import same_pairs
 from ...runs import Trace
-from .scene import slerp
 from .timeline import Frames
 
 
-def shown_series(
-    one: Trace, two: Trace, frames: Frames, tip: str | None, curves: list[Series]
-) -> list[Series]:
-    """The curves at the moments shown; where two has no row then, between two of its rows."""
-    if len(frames) < 2:
-        return curves
-    sides = (
+def shown_traces(one: Trace, two: Trace, frames: Frames) -> tuple[Trace, Trace]:
+    """Both runs at the moments shown; where two has no row then, between two of its rows."""
+    return (
         resampled(one, frames.time, frames.one, np.zeros(len(frames))),
         resampled(two, frames.time, frames.two, frames.share),
     )
-    by_name = {curve.name: curve for curve in series(*sides, tip)}
-    none = np.zeros(len(frames))
+
+
+def shown_series(shown: tuple[Trace, Trace], tip: str | None, curves: list[Series]) -> list[Series]:
+    """The curves at the moments shown."""
+    time = shown[0].time
+    if len(time) < 2:
+        return curves
+    by_name = {curve.name: curve for curve in series(*shown, tip)}
+    none = np.zeros(len(time))
+    # A force that is at none of these moments has no curve among them.
     return [
-        # A force that is at none of these moments has no curve among them.
-        by_name.get(curve.name, Series(curve.name, curve.kind, frames.time, none, none, none))
+        by_name.get(curve.name, Series(curve.name, curve.kind, time, none, none, none))
         for curve in curves
     ]
 
@@ -44,7 +46,7 @@ def resampled(trace: Trace, time: Array, rows: Ints, share: Array) -> Trace:
         share: (n,) how far to go from there to the next, 0 to 1.
 
     Returns:
-        Positions, poses of sites and energies in between; contacts of the row before.
+        Positions, poses of bodies and sites and energies in between; contacts of the row before.
     """
     after = np.minimum(rows + 1, len(trace) - 1)
 
@@ -54,7 +56,7 @@ def resampled(trace: Trace, time: Array, rows: Ints, share: Array) -> Trace:
 
     columns: dict[str, Any] = {
         name: between(trace.columns[name])
-        for name in ("qpos", "qvel", "site_xpos", "energy")
+        for name in ("qpos", "qvel", "xpos", "site_xpos", "energy")
         if name in trace
     }
     columns |= {"time": time + 0.0, "ctrl": trace.ctrl[rows]}
@@ -66,6 +68,9 @@ def resampled(trace: Trace, time: Array, rows: Ints, share: Array) -> Trace:
             columns["qpos"][:, first : first + 4] = slerp(
                 turned[rows], turned[after], share[:, None]
             )
+    if "xquat" in trace:
+        turned = _unit(trace["xquat"])
+        columns["xquat"] = slerp(turned[rows], turned[after], share[:, None, None])
     if "site_xmat" in trace:
         matrices = between(trace["site_xmat"]).reshape(len(rows), -1, 3, 3)
         some = share > 0
@@ -83,6 +88,25 @@ def resampled(trace: Trace, time: Array, rows: Ints, share: Array) -> Trace:
             if name.startswith("contact_") and name != "contact_row":
                 columns[name] = trace.columns[name][picked]
     return Trace(header, columns)
+
+
+def _unit(quat: Array) -> Array:
+    quat = np.nan_to_num(quat)
+    length = np.linalg.norm(quat, axis=-1, keepdims=True)
+    return np.where(length > 0, quat / np.where(length > 0, length, 1.0), [1.0, 0.0, 0.0, 0.0])
+
+
+def slerp(one: Array, two: Array, share: Array) -> Array:
+    """Rotations between two, along the shorter way (Shoemake 1985)."""
+    cosine = (one * two).sum(axis=-1, keepdims=True)
+    two, cosine = np.where(cosine < 0, -two, two), np.abs(cosine)
+    angle = np.arccos(np.clip(cosine, 0.0, 1.0))
+    sine = np.sin(angle)
+    flat = sine < 1e-6
+    safe = np.where(flat, 1.0, sine)
+    a = np.where(flat, 1 - share, np.sin((1 - share) * angle) / safe)
+    b = np.where(flat, share, np.sin(share * angle) / safe)
+    return _unit(a * one + b * two)
 
 
 def own_series(one: Trace, two: Trace, tip: str | None) -> dict[str, tuple[Series, Series]]:

@@ -23,6 +23,7 @@ from ...page import (
     Traces,
     Verdict,
 )
+from ..quiz import answer_of, lettered
 from ..robot_pictures import inline
 from .markup import Html, joined, kept, tag
 
@@ -99,11 +100,11 @@ def _question(block: Question) -> Html:
     return joined(
         (
             tag("p", block.text),
-            tag("ul", *(tag("li", choice) for choice in block.lettered)),
+            tag("ul", *(tag("li", choice) for choice in lettered(block))),
             tag(
                 "details",
                 tag("summary", "What the run says"),
-                tag("p", f"{block.answer}. {block.because}"),
+                tag("p", f"{answer_of(block)}. {block.because}"),
             ),
         )
     )

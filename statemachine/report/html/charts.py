@@ -95,20 +95,17 @@ def difference_chart(chart: QuantityChart, points: int = 600) -> Html:
     top = _top(chart)
     band = found.tolerance * scale
     values = curve.difference * scale
-    floor = None
+    floor, axis, span = None, None, (0.0, top)
     if chart.floor is not None and _floor_shows(chart):
         floor = np.minimum(chart.floor * scale, top)
     if logarithmic(found):
         axis = LogAxis(
             math.log10(_DECADES * band), math.log10(top) + 0.1, bool((values == 0).any())
         )
-        return _plot(
-            curve.time, [Curve(axis.places(values), "apart")], (axis.bottom, axis.high),
-            said, band=math.log10(band), points=points, log=axis,
-            floor=None if floor is None else axis.area(floor),
-        )  # fmt: skip
+        values, band, span = axis.places(values), math.log10(band), (axis.bottom, axis.high)
+        floor = None if floor is None else axis.area(floor)
     return _plot(
-        curve.time, [Curve(values, "apart")], (0.0, top), said, band=band, points=points,
+        curve.time, [Curve(values, "apart")], span, said, band=band, points=points, log=axis,
         floor=floor,
     )  # fmt: skip
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -63,6 +64,7 @@ class Scene:
 def scene_of(
     one: Trace,
     two: Trace,
+    shown: tuple[Trace, Trace],
     frames: Frames,
     looks: Sequence[SideDrawing],
     tip: str,
@@ -74,7 +76,8 @@ def scene_of(
     Args:
         one: A trace.
         two: The other.
-        frames: The moments.
+        shown: Both at the moments that are shown.
+        frames: These moments.
         looks: What each side is drawn as; the same object twice if both are of one model.
         tip: The site whose way is drawn; "" for none.
         budget: How much detail there may be.
@@ -100,30 +103,28 @@ def scene_of(
     if frames.left_out:
         notes.append(f"{frames.left_out} of the compared moments are not shown, for their number.")
     extent = max(drawing.extent for drawing in drawings)
-    poses = [_poses(trace, rows, share) for trace, rows, share in (
-        (one, frames.one, None), (two, frames.two, frames.share))]  # fmt: skip
-    finite = np.concatenate([pos[np.isfinite(pos).all(axis=2)] for pos, _ in poses])
+    poses = shown[0]["xpos"], shown[1]["xpos"]
+    finite = np.concatenate([pos[np.isfinite(pos).all(axis=2)] for pos in poses])
     if not len(finite):
         return Scene(None, ("No pose of a body is a finite number: there is nothing to draw.",))
     middle = np.asarray(drawings[0].center)
     low = np.maximum(finite.min(axis=0), middle - _FAR * extent)
     high = np.minimum(finite.max(axis=0), middle + _FAR * extent)
     span = np.maximum(high - low, 1e-6)
-    tips = _tips(one, two, frames, tip)
-    camera = _camera([pos for pos, _ in poses], tips, extent)
+    tips = _tips(shown, tip)
+    camera = _camera(poses, tips, extent)
     sides = []
     strongest = 0.0
     few = max(2, budget.contacts // len(frames))
-    for k, (trace, (pos, quat)) in enumerate(zip(traces, poses, strict=True)):
-        rows = frames.one if k == 0 else frames.two
-        contacts, most_of_side = _contacts(trace, rows, few)
+    for k, (trace, moments) in enumerate(zip(traces, shown, strict=True)):
+        contacts, most_of_side = _contacts(moments, few)
         strongest = max(strongest, most_of_side)
         sides.append(
             {
                 "mesh": 0 if shared else k,
                 "bodies": len(trace.header.bodies),
-                "pos": packed(quantised(_held(pos), low, span), "u2"),
-                "quat": packed(np.round(np.clip(quat, -1, 1) * 32767), "i2"),
+                "pos": packed(quantised(_held(moments["xpos"]), low, span), "u2"),
+                "quat": packed(np.round(np.clip(moments["xquat"], -1, 1) * 32767), "i2"),
                 "tip": packed(tips[k], "f4") if tips else "",
                 "contacts": contacts,
                 **_way(trace, tip, float(frames.time[-1]), frames.time),
@@ -148,7 +149,7 @@ def scene_of(
         "meshes": [mesh_as_data(mesh) for mesh in meshes],
         "sides": sides,
     }
-    return Scene(data, tuple(notes), (poses[0][0], poses[1][0]), tips, camera, strongest)
+    return Scene(data, tuple(notes), poses, tips, camera, strongest)
 
 
 def _nearness(tips: tuple[Array, Array] | None, start: int, extent: float) -> dict[str, Any]:
@@ -188,35 +189,6 @@ def _drawings(
     return notes, found
 
 
-def _poses(trace: Trace, rows: Any, share: Array | None) -> tuple[Array, Array]:
-    pos, quat = trace["xpos"][rows].copy(), _unit(trace["xquat"][rows])
-    if share is not None and (share > 0).any():
-        after = np.minimum(rows + 1, len(trace) - 1)
-        part = share[:, None, None]
-        pos += part * (trace["xpos"][after] - pos)
-        quat = slerp(quat, _unit(trace["xquat"][after]), part)
-    return pos, quat
-
-
-def _unit(quat: Array) -> Array:
-    quat = np.nan_to_num(quat)
-    length = np.linalg.norm(quat, axis=-1, keepdims=True)
-    return np.where(length > 0, quat / np.where(length > 0, length, 1.0), [1.0, 0.0, 0.0, 0.0])
-
-
-def slerp(one: Array, two: Array, share: Array) -> Array:
-    """Rotations between two, along the shorter way (Shoemake 1985)."""
-    cosine = (one * two).sum(axis=-1, keepdims=True)
-    two, cosine = np.where(cosine < 0, -two, two), np.abs(cosine)
-    angle = np.arccos(np.clip(cosine, 0.0, 1.0))
-    sine = np.sin(angle)
-    flat = sine < 1e-6
-    safe = np.where(flat, 1.0, sine)
-    a = np.where(flat, 1 - share, np.sin((1 - share) * angle) / safe)
-    b = np.where(flat, share, np.sin(share * angle) / safe)
-    return _unit(a * one + b * two)
-
-
 def _held(pos: Array) -> Array:
     """Positions that are not finite are those of the last moment that were."""
     pos = pos.copy()
@@ -226,13 +198,11 @@ def _held(pos: Array) -> Array:
     return pos
 
 
-def _tips(one: Trace, two: Trace, frames: Frames, tip: str) -> tuple[Array, Array] | None:
-    if not tip or any("site_xpos" not in t or tip not in t.header.sites for t in (one, two)):
+def _tips(shown: Sequence[Trace], tip: str) -> tuple[Array, Array] | None:
+    if not tip or any("site_xpos" not in t or tip not in t.header.sites for t in shown):
         return None
-    ways = one.site(tip)[0][frames.one], two.site(tip)[0][frames.two].copy()
-    after = two.site(tip)[0][np.minimum(frames.two + 1, len(two) - 1)]
-    ways[1][:] += frames.share[:, None] * (after - ways[1])
-    return ways if all(np.isfinite(way).all() for way in ways) else None
+    one, two = (trace.site(tip)[0] for trace in shown)
+    return (one, two) if np.isfinite([one, two]).all() else None
 
 
 def _way(trace: Trace, tip: str, until: float, shown: Array) -> dict[str, str]:
@@ -255,7 +225,7 @@ def _way(trace: Trace, tip: str, until: float, shown: Array) -> dict[str, str]:
     return {"way": packed(way, "f4"), "behind": packed(behind, "u2")}
 
 
-def _contacts(trace: Trace, rows: Any, most: int) -> tuple[dict[str, str], float]:
+def _contacts(trace: Trace, most: int) -> tuple[dict[str, str], float]:
     """Where contacts are at each moment, the strongest first, and the force on the second [N].
 
     Returns:
@@ -263,11 +233,10 @@ def _contacts(trace: Trace, rows: Any, most: int) -> tuple[dict[str, str], float
     """
     if "contact_row" not in trace:
         return {"count": "", "at": ""}, 0.0
-    start = np.searchsorted(trace["contact_row"], rows)
-    end = np.searchsorted(trace["contact_row"], rows, side="right")
+    ends = np.searchsorted(trace["contact_row"], np.arange(len(trace) + 1))
     strength = np.linalg.norm(np.nan_to_num(trace["contact_force"]), axis=1)
     picked, counts = [np.empty(0, np.int64)], []
-    for a, b in zip(start.tolist(), end.tolist(), strict=True):
+    for a, b in itertools.pairwise(ends.tolist()):
         strongest = a + np.argsort(-strength[a:b], kind="stable")[: min(most, 255)]
         picked.append(strongest)
         counts.append(len(strongest))

@@ -13,7 +13,7 @@ import numpy as np
 from ...compare import Series
 from ...measures.text import figure, on, reading, short_time
 from ..over_time import BothRuns, QuantityChart
-from .between import own_series, shown_series
+from .between import own_series, shown_series, shown_traces
 from .budget import Budget
 from .charts import time_axis
 from .geometry import packed
@@ -58,8 +58,9 @@ def staged(runs: BothRuns, looks: Sequence[SideDrawing], budget: Budget) -> Stag
     one, two, tip = runs.one, runs.two, runs.site
     frames = frames_of(one, two, runs.moments, budget.frames(one, two))
     start = int(np.argmin(np.abs(frames.time - runs.start)))
-    scene = scene_of(one, two, frames, looks, tip, budget, start)
-    at_frames = shown_series(one, two, frames, tip, [chart.curve for chart in runs.charts])
+    shown = shown_traces(one, two, frames)
+    scene = scene_of(one, two, shown, frames, looks, tip, budget, start)
+    at_frames = shown_series(shown, tip, [chart.curve for chart in runs.charts])
     data = {
         "time": packed(frames.time, "f8"),
         "between": packed(frames.share > 0, "u1"),
@@ -147,7 +148,12 @@ def _stage(runs: BothRuns, frames: Frames, start: int, still: Html, strongest: f
         tag("div", *checks, class_="checks", id="checks", hidden=True),
         tag(
             "p",
-            kept(_arrows(strongest)) if strongest else "",
+            kept(
+                "Arrows: contact forces, each as long as the root of its force; the longest of "
+                f"the run is {figure(strongest)} N."
+            )
+            if strongest
+            else "",
             class_="foot",
             id="arrows",
             hidden=True,
@@ -184,13 +190,6 @@ def _stage(runs: BothRuns, frames: Frames, start: int, still: Html, strongest: f
 def tip_name(tip: str) -> str:
     """The site that is followed, as it is called in the model."""
     return "gripperframe (tool frame)" if tip == "gripperframe" else tip or "a site"
-
-
-def _arrows(strongest: float) -> str:
-    return (
-        "Arrows: contact forces, each as long as the root of its force; the longest of the run is "
-        f"{figure(strongest)} N."
-    )
 
 
 def _readout(runs: BothRuns) -> Html:

@@ -21,7 +21,6 @@ class Frames:
         time: (n,) since the start [s].
         one, two: (n,) rows of the traces, the last at or before that moment.
         share: (n,) how far two has to be taken from its row towards the next, 0 to 1.
-        compared: (n,) number of the last compared moment at or before it.
         between: Whether any row of two had to be interpolated.
         left_out: How many rows of one are not shown.
     """
@@ -30,7 +29,6 @@ class Frames:
     one: Ints
     two: Ints
     share: Array
-    compared: Ints
     between: bool
     left_out: int
 
@@ -68,13 +66,11 @@ def frames_of(one: Trace, two: Trace, must: tuple[float, ...] = (), most: int = 
     width = np.where(following > row, other[following] - other[row], 1.0)
     share = np.clip((time - other[row]) / width, 0.0, 1.0)
     share[(share < 1e-6) | (following == row)] = 0.0
-    compared = np.clip(np.searchsorted(common.time, time + 1e-9, side="right") - 1, 0, n - 1)
     return Frames(
         time=time,
         one=rows,
         two=row,
         share=share,
-        compared=compared,
         between=bool((share > 0).any()),
         left_out=n - len(time) if rows is not common.one and len(time) < n else 0,
     )
