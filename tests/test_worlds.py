@@ -115,6 +115,11 @@ def follow(model: sm.Model, worlds: many.Worlds, rounds: int = 12) -> None:
     for each in data[0:3:2]:
         sm.forward(model, each)
     equal(worlds, data)
+    # A write reaches one world, with the next step that is for it.
+    worlds.qpos[1, 0] = data[1].qpos[0] = 0.25
+    worlds.qvel[2, 0] = data[2].qvel[0] = -0.0
+    worlds.time[0] = data[0].time = 2.0
+    equal(worlds, data)
     many.step(worlds, 2)
     for each in data:
         sm.step(model, each, 2)
