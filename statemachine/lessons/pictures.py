@@ -174,7 +174,7 @@ PICTURES: Mapping[str, RobotPicture] = {
         "One arm, stretched out. No violet is to be seen: while nobody called step, nothing moved.",
         "statemachine view --model so101/scene --paused",
         _ARM,
-        lambda: (_poses(_ARM, 2, every=100)[1:],) * 2,
+        lambda: (_poses(_ARM, 2, every=100)[1:], _poses(_ARM, 2, every=100)[1:]),
     ),
     "speed": RobotPicture(
         "What is advanced here: six joints, a box, and the contacts between them.",
