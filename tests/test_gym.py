@@ -95,17 +95,6 @@ def test_gymnasium_finds_no_fault_in_pictures(task: str, backend: str) -> None:
 
 
 @pytest.mark.slow
-def test_each_world_has_its_picture() -> None:
-    renderer_here()
-    with closing(_make_vec(REACH, "mujoco", 2, render_mode="rgb_array")) as envs:
-        envs.reset(seed=0)
-        envs.step(np.array([[1.0] * 6, [-1.0] * 6], dtype=np.float32))
-        one, two = envs.render()
-        assert one.shape == two.shape == (360, 480, 3)
-        assert not np.array_equal(one, two)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("task", IDS)
 def test_the_target_is_in_the_picture(task: str) -> None:
     """A violet ball where the target is, and nowhere else; in each world its own."""
