@@ -328,16 +328,16 @@ def test_assignment_copies_a_row_or_all(worlds: many.Worlds) -> None:
     worlds.time = 3
     many.step(worlds)
     assert worlds.time == pytest.approx([3 + model.timestep] * N)
-    for bad in (np.zeros((N, model.nu + 1)), np.zeros((N + 1, model.nu)), "x", [[1], [1, 2]]):
-        with pytest.raises(BadInputError):
-            worlds.ctrl = bad
-    with pytest.raises(BadInputError):
-        worlds.qvel = np.full((N, model.nv), np.inf)
-    with pytest.raises(BadInputError, match=r"world 0: .* is zero"):
-        worlds.qpos = np.zeros((N, model.nq))
-    for name in ("xpos", "n", "anything"):
-        with pytest.raises(ReadOnlyError):
-            setattr(worlds, name, 1)
+    refused: list[tuple[type[Exception], str, Any]] = [
+        *((BadInputError, "ctrl", np.zeros(shape)) for shape in ((N, model.nu + 1), (N + 1, 6))),
+        *((BadInputError, "ctrl", bad) for bad in ("x", [[1], [1, 2]])),
+        (BadInputError, "qvel", np.full((N, model.nv), np.inf)),
+        (BadInputError, "qpos", np.zeros((N, model.nq))),  # with a quaternion of zeros
+        *((ReadOnlyError, name, 1) for name in ("xpos", "n", "anything")),
+    ]
+    for error, name, value in refused:
+        with pytest.raises(error):
+            setattr(worlds, name, value)
     with pytest.raises(ValueError, match="read-only"):
         worlds.xpos[0] = 1
     assert np.array_equal(kept, 2 * commands(model, N))
@@ -411,13 +411,17 @@ def test_closed_worlds_keep_their_inputs_and_refuse(box: sm.Model) -> None:
     worlds.close()
     assert np.array_equal(worlds.qpos, qpos)
     assert worlds.time == pytest.approx([3 * box.timestep] * N)
-    for use in (many.step, many.forward, many.reset, lambda w: many.get_state(w, 0)):
+    uses: list[Callable[[many.Worlds], object]] = [
+        many.step,
+        many.forward,
+        many.reset,
+        lambda worlds: many.get_state(worlds, 0),
+        lambda worlds: worlds.xpos,
+        lambda worlds: setattr(worlds, "ctrl", np.zeros(box.nu)),
+    ]
+    for use in uses:
         with pytest.raises(ClosedDataError):
             use(worlds)
-    with pytest.raises(ClosedDataError):
-        _ = worlds.xpos
-    with pytest.raises(ClosedDataError):
-        worlds.ctrl = np.zeros(box.nu)
     with pytest.raises(ValueError, match="read-only"):
         view[0] = 1
 
