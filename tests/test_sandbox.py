@@ -12,6 +12,8 @@ import pytest
 
 from statemachine.grading import sandbox
 
+from .conftest import lives
+
 POSIX = pytest.mark.skipif(os.name != "posix", reason="limits and sessions are POSIX")
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
 
@@ -20,13 +22,6 @@ def _python(
     code: str, cpu: float = 20.0, wall: float = 120.0, **more: object
 ) -> sandbox.ProcessOutcome:
     return sandbox.run([sys.executable, "-c", code], cpu=cpu, wall=wall, **more)  # type: ignore[arg-type]
-
-
-def _lives(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
-    except OSError:
-        return False
 
 
 def test_what_a_command_says_and_how_it_ends(tmp_path: Path) -> None:
@@ -131,7 +126,7 @@ def test_what_is_left_in_the_session_is_ended() -> None:
     )
     assert done.returncode == 0
     assert done.wall < 15  # although it holds our pipes open
-    assert not _lives(int(done.stdout))
+    assert not lives(int(done.stdout))
 
 
 @LINUX
@@ -146,14 +141,14 @@ def test_what_left_the_session_is_found_and_ended() -> None:
         "    print(pid, flush=True)\n"
         "    while os.getsid(pid) == os.getsid(0): time.sleep(0.01)\n"
     )
-    assert not _lives(int(done.stdout))
+    assert not lives(int(done.stdout))
 
 
 @LINUX
 def test_no_other_process_is_touched() -> None:
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as other:
         _python("pass")
-        assert _lives(other.pid)
+        assert lives(other.pid)
 
 
 @POSIX

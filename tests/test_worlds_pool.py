@@ -43,7 +43,7 @@ from statemachine.worlds import (
 )
 
 from . import faulty_world as faulty
-from .conftest import ROOT, need_engine, registered
+from .conftest import ROOT, lives, need_engine, registered
 from .test_worlds import follow
 
 linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks at /proc")
@@ -70,15 +70,7 @@ def pids(worlds: Any) -> list[int]:
 
 def running(numbers: Iterable[int]) -> list[int]:
     """Those of some processes that have not ended; zombies have."""
-    found = []
-    for pid in numbers:
-        try:
-            state = Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()[0]
-        except OSError:
-            continue
-        if state not in b"ZX":
-            found.append(pid)
-    return found
+    return [pid for pid in numbers if lives(pid)]
 
 
 def all_end(numbers: Iterable[int], seconds: float = 10.0) -> bool:
