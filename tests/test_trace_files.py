@@ -40,7 +40,7 @@ def npz(path: Path, trace: Trace, changes: Any = None, **entries: Any) -> Path:
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, value in (arrays | entries).items():
             if value is not None:
-                array = value(arrays[name]) if callable(value) else value
+                array: Any = value(arrays[name]) if callable(value) else value
                 with archive.open(f"{name}.npy", "w") as out:
                     out.write(value) if isinstance(value, bytes) else np.save(out, array)
     return path
