@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import codecs
-import difflib
 import importlib
 import io
 import os
@@ -17,7 +16,7 @@ from typing import Any, NoReturn
 from . import __version__
 from .commands import COMMANDS
 from .commands._common import BAD_INPUT, MISSING, NO_OUTPUT, PROGRAM, complain
-from .errors import EngineWarning, MissingEngineError, StateMachineError
+from .errors import EngineWarning, MissingEngineError, StateMachineError, did_you_mean
 from .installed import raise_if_interrupted
 from .report.terminal import spelled
 
@@ -44,8 +43,7 @@ class _Parser(argparse.ArgumentParser):
         if rest:
             given, _, choices = rest.partition(" (choose from ")
             known = [choice.strip() for choice in choices.rstrip(")").split(",")]
-            close = difflib.get_close_matches(given, known, n=1, cutoff=0.5)
-            hint = f". Did you mean {close[0]}?" if close else ""
+            hint = did_you_mean(given, known)
             from .lessons import LESSONS
 
             if given in LESSONS:
@@ -64,8 +62,7 @@ class _Parser(argparse.ArgumentParser):
         if message.startswith("unrecognized arguments: -"):
             given = message.split()[2].partition("=")[0]
             known = _flags(_parser(COMMANDS), sys.argv[1:])
-            close = difflib.get_close_matches(given, known, n=1, cutoff=0.6)
-            message += f". Did you mean {close[0]}?" if close else ""
+            message += did_you_mean(given, known, 0.6)
         print(f"{self.prog}: {message}", file=sys.stderr)
         raise SystemExit(BAD_INPUT)
 

@@ -8,7 +8,7 @@ survive a pickle, so that they can cross a process boundary.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 _LONGEST = 2000  # characters of a message
@@ -162,18 +162,18 @@ def shown(value: object) -> str:
     return text if len(text) <= 200 else f"{text[:197]}..."
 
 
-def did_you_mean(name: str, known: Iterable[str], cutoff: float = 0.5) -> str:
+def did_you_mean(
+    name: object, known: Iterable[str], cutoff: float = 0.5, show: Callable[[str], str] = str
+) -> str:
     """The end of a message about a mistyped name: the nearest that is known, or nothing."""
-    close = difflib.get_close_matches(name, tuple(known), 1, cutoff)
-    return f". Did you mean {close[0]}?" if close else ""
+    close = difflib.get_close_matches(name if isinstance(name, str) else "", known, 1, cutoff)
+    return f". Did you mean {show(close[0])}?" if close else ""
 
 
 def unknown_name(kind: str, name: object, known: Iterable[str]) -> UnknownNameError:
     """The error for a mistyped name: what is known, and the nearest spelling."""
     names = tuple(known)
     listed = ", ".join(names) if names else "none"
-    message = f"no {kind} named {shown(name)}; known: {listed}"
-    close = difflib.get_close_matches(name if isinstance(name, str) else "", names, 1, 0.5)
-    if close:
-        message += f". Did you mean {close[0]!r}?"
+    hint = did_you_mean(name, names, show=repr)
+    message = f"no {kind} named {shown(name)}; known: {listed}{hint}"
     return UnknownNameError(message, kind=kind, name=name, known=names)

@@ -16,7 +16,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .errors import BadInputError, ModelError, unknown_name
+from .errors import BadInputError, ModelError, check_name
 from .installed import require
 from .interface import Array, Model
 from .interface.checks import as_vector, check_entries
@@ -205,11 +205,9 @@ class Kinematics:
         )
 
     def _frame(self, name: str, kind: Kind) -> int:
-        if kind not in tuple(self._frames):
-            raise unknown_name("kind of frame", kind, self._frames)
+        check_name("kind of frame", kind, self._frames)
         known = self._frames[kind]
-        if not isinstance(name, str) or name not in known:
-            raise unknown_name(f"{kind} in {self.path.name}", name, known)
+        check_name(f"{kind} in {self.path.name}", name, known)
         return known[name]
 
     def _configurations(self, qpos: ArrayLike) -> Array:

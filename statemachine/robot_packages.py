@@ -17,7 +17,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from .errors import MissingEngineError, ModelFileError, unknown_name
+from .errors import MissingEngineError, ModelFileError, check_name
 
 _MENAGERIE, _DESCRIPTIONS = "menagerie:", "robot_descriptions:"
 _ANSWERS_WITHIN = 5.0  # s; a network that takes longer is none
@@ -56,11 +56,10 @@ def file_of(text: str) -> Path:
 def _of_menagerie(text: str) -> Path:
     package = _package("mujoco_menagerie", "menagerie", text)
     name, _, entry = text.partition("/")
-    if name not in package.names():
-        raise unknown_name("robot in mujoco-menagerie", name, package.names())
+    check_name("robot in mujoco-menagerie", name, package.names())
     robot = package.get(name)
-    if entry and entry not in robot.entry_names:
-        raise unknown_name(f"model of {name} in mujoco-menagerie", entry, robot.entry_names)
+    if entry:
+        check_name(f"model of {name} in mujoco-menagerie", entry, robot.entry_names)
     cache = package.Cache()
     if not cache.root and not cache.is_cached(robot):
         _need_network(name, cache.base_url)
@@ -72,8 +71,7 @@ def _of_menagerie(text: str) -> Path:
 
 def _of_descriptions(name: str) -> Path:
     package = _package("robot_descriptions", "robots", name)
-    if name not in package.DESCRIPTIONS:
-        raise unknown_name("robot in robot_descriptions", name, package.DESCRIPTIONS)
+    check_name("robot in robot_descriptions", name, package.DESCRIPTIONS)
     if f"robot_descriptions.{name}" not in sys.modules and not _is_cloned(package, name):
         _need_network(name, _GITHUB)
     before = {key: os.environ.get(key) for key in _GIT}

@@ -40,6 +40,14 @@ def in_its_own_python(code: str, folder: Path) -> subprocess.CompletedProcess[st
     )
 
 
+def lives(pid: int) -> bool:
+    """Whether a process has not ended; zombies have."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except OSError:
+        return False
+
+
 def need_engine(name: str) -> None:
     """Skip without an engine, or fail where STATEMACHINE_REQUIRE names it."""
     try:

@@ -135,23 +135,20 @@ def test_a_force_is_never_read_as_a_place(model: Any) -> None:
 
 
 def test_what_makes_no_sense_is_refused_with_what_does(model: Any) -> None:
-    passive = model(PASSIVE, "passive.xml")
-    assert fitting(passive) == ("gravity", "fall")
-    for name in ("hold", "droop", "waves"):
-        with pytest.raises(
-            errors.BadInputError, match=r"no actuators.*makes sense.*: gravity, fall"
-        ):
-            record_scenario(SCENARIOS[name], passive)
-    with pytest.raises(errors.BadInputError, match="no SO-101 that holds a box"):
-        record_scenario(SCENARIOS["box"], passive)
-    still = model(STILL, "still.xml")
-    assert fitting(still) == ()
-    with pytest.raises(errors.BadInputError, match=r"no joints: nothing in it can move$"):
-        record_scenario(SCENARIOS["gravity"], still)
-    with pytest.raises(errors.BadInputError, match="no joints"):
-        lesson("gravity", still)
-    with pytest.raises(errors.BadInputError, match="no actuators"):
-        lesson("hold", passive)
+    passive, still = model(PASSIVE, "passive.xml"), model(STILL, "still.xml")
+    assert (fitting(passive), fitting(still)) == (("gravity", "fall"), ())
+    without = r"no actuators.*makes sense.*: gravity, fall"
+    refused: list[tuple[Any, Any, sm.Model, str]] = [
+        *((record_scenario, SCENARIOS[name], passive, without) for name in ("hold", "droop")),
+        (record_scenario, SCENARIOS["waves"], passive, without),
+        (record_scenario, SCENARIOS["box"], passive, "no SO-101 that holds a box"),
+        (record_scenario, SCENARIOS["gravity"], still, r"no joints: nothing in it can move$"),
+        (lesson, "gravity", still, "no joints"),
+        (lesson, "hold", passive, "no actuators"),
+    ]
+    for ask, name, robot, says in refused:
+        with pytest.raises(errors.BadInputError, match=says):
+            ask(name, robot)
 
 
 def test_the_command_says_it_in_a_line(model: Any, capsys: pytest.CaptureFixture[str]) -> None:

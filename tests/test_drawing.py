@@ -170,8 +170,6 @@ def test_every_kind_of_geom_is_drawn_and_the_hidden_are_not(everything) -> None:
     assert drawing.left_out == ()
     assert all(part.geom == model.geom_id(part.name) for part in drawing.parts)
     assert {part.body for part in drawing.parts} == set(drawing.bodies) == {0, 1}
-    assert drawing.vertices == sum(len(part.vertices) for part in drawing.parts)
-    assert drawing.triangles == sum(len(part.faces) for part in drawing.parts)
 
 
 def test_parts_are_where_the_engine_has_them(everything) -> None:
@@ -208,7 +206,7 @@ def test_the_whole_arm_is_there(name: str) -> None:
     # Closed, outward: its parts overlap, so the sum is above the solid's volume.
     assert all(_volume(part) > 0 and _is_closed(part) for part in drawing.parts if part.body)
     assert {part.rgba for part in drawing.parts} >= {(1, 0.77, 0.12, 1), (0.08, 0.08, 0.09, 1)}
-    assert drawing.triangles < 10_000  # a page carries it
+    assert sum(len(part.faces) for part in drawing.parts) < 10_000  # a page carries it
 
 
 def test_a_model_of_another_engine_has_the_same_drawing() -> None:

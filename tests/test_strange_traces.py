@@ -28,6 +28,7 @@ from statemachine.runs.scenarios import SCENARIOS
 from statemachine.runs.whole import check_place, replace_file
 
 from .conftest import Cli, need_engine
+from .test_trace_files import npz
 
 
 @pytest.fixture(scope="module")
@@ -168,64 +169,30 @@ def test_joints_of_other_kinds_and_written_states_are_said(box: Trace) -> None:
     assert any("in 7 rows the state was written" in note for note in notes)
 
 
-def _with_header(trace: Trace, path: Path, change: Any) -> Path:
-    facts = json.loads(trace.header.as_json())
-    change(facts)
-    columns = {name: np.array(array) for name, array in trace.columns.items()}
-    text = np.frombuffer(json.dumps(facts).encode(), dtype=np.uint8)
-    np.savez_compressed(path, header=text, **columns)  # type: ignore[arg-type]
-    return path
-
-
 _VALUES: tuple[Any, ...] = (None, 3.5, "x", [], {}, [None] * 7, ["x"] * 7, [[1]], [10**6] * 7)
 
 
 def test_a_header_is_refused_or_can_be_shown(box: Trace, tmp_path: Path) -> None:
     """Whatever stands in it: what opens can be compared with itself, and shown."""
-    short, path = cut(box, 25), tmp_path / "edited.npz"
+    short = cut(box, 25)
     facts = json.loads(box.header.as_json())
-    places = [(facts, name) for name in facts]
-    places += [(facts["provenance"], name) for name in facts["provenance"]]
+    by = facts["provenance"]
+    changes = [{name: value} for name in facts for value in _VALUES]
+    changes += [{"provenance": {**by, name: value}} for name in by for value in _VALUES]
     refused = 0
-    for owner, name in places:
-        for value in _VALUES:
-
-            def change(made: Any, owner: Any = owner, name: str = name, value: Any = value) -> None:
-                (made if owner is facts else made["provenance"])[name] = value
-
-            _with_header(short, path, change)
-            try:
-                trace = read(path)
-            except TraceError:
-                refused += 1
-                continue
-            terminal.show(report.page(compare(trace, trace), trace, trace))
-            trace.touches()
-    assert refused > len(places) * len(_VALUES) / 2
+    for change in changes:
+        path = npz(tmp_path / "edited.npz", short, change)
+        try:
+            trace = read(path)
+        except TraceError:
+            refused += 1
+            continue
+        terminal.show(report.page(compare(trace, trace), trace, trace))
+        trace.touches()
+    assert refused > len(changes) / 2
 
 
-def test_names_that_stand_twice_and_places_that_are_not_there(box: Trace, tmp_path: Path) -> None:
-    path = tmp_path / "edited.npz"
-
-    def change(name: str, value: Any) -> Any:
-        return lambda facts: facts[name].__setitem__(0, value)
-
-    for name, value, says in (
-        ("joints", "gripper", "two joints of the trace are called 'gripper'"),
-        ("jnt_qposadr", 99, "no place in qpos"),
-        ("jnt_type", 9, "no known kind"),
-        ("geom_bodyid", 99, "names one that is not there"),
-    ):
-        with pytest.raises(TraceError, match=says):
-            read(_with_header(box, path, change(name, value)))
-
-
-def test_time_goes_on(box: Trace, tmp_path: Path) -> None:
-    time = np.array(box.time)
-    time[7] = time[6]
-    with pytest.raises(TraceError, match="time does not go on after row 6"):
-        changed(box, time=time)
-
+def test_time_goes_on() -> None:
     def back(_time: float, data: sm.Data) -> None:
         data.time = 0.0
 

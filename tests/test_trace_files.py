@@ -21,6 +21,7 @@ from statemachine.errors import TraceError
 from statemachine.runs import Trace, export_csv, read, record, whole, write
 
 from .conftest import Cli
+from .test_traces import same
 
 
 @pytest.fixture(scope="module")
@@ -28,26 +29,31 @@ def box() -> Trace:
     return record(sm.load("so101/scene_box"), seconds=0.1, keyframe="held", experiment="box")
 
 
-def same(one: Trace, two: Trace) -> bool:
-    return set(one.columns) == set(two.columns) and all(
-        np.array_equal(one[name], two[name], equal_nan=True) for name in one.columns
-    )
+def npz(path: Path, trace: Trace, changes: Any = None, **entries: Any) -> Path:
+    """A trace's file with another header and other entries.
 
-
-def npz(path: Path, trace: Trace, changes: Any = None, **entries: bytes | np.ndarray) -> Path:
-    """A trace's file with other entries, as they are or as arrays, and another header."""
+    These are bytes as they are, arrays, what makes another array of one, or None for none.
+    """
     facts = json.loads(trace.header.as_json()) | (changes or {})
     arrays: dict[str, Any] = {name: np.array(array) for name, array in trace.columns.items()}
     arrays["header"] = np.frombuffer(json.dumps(facts).encode(), dtype=np.uint8)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, value in (arrays | entries).items():
-            out = io.BytesIO()
-            if isinstance(value, bytes):
-                out.write(value)
-            else:
-                np.save(out, value)
-            archive.writestr(f"{name}.npy", out.getvalue())
+            if value is not None:
+                array: Any = value(arrays[name]) if callable(value) else value
+                with archive.open(f"{name}.npy", "w") as out:
+                    out.write(value) if isinstance(value, bytes) else np.save(out, array)
     return path
+
+
+def put(value: Any, place: int = -1) -> Any:
+    """What puts a number into an array."""
+
+    def change(array: np.ndarray) -> np.ndarray:
+        array.flat[place] = value
+        return array
+
+    return change
 
 
 def claim(*shape: int) -> bytes:
@@ -127,54 +133,80 @@ def test_a_small_file_does_not_take_much_memory(box: Trace, tmp_path: Path) -> N
         tracemalloc.stop()
 
 
+HEADERS: list[tuple[Any, str]] = [
+    ({"schema": 99}, "this version reads 1"),
+    ({"joints": ["a"]}, "entries"),
+    ({"provenance": {}}, "no header"),
+    ({"joints": ["gripper"] * 7}, "two joints of the trace are called 'gripper'"),
+    ({"jnt_qposadr": [99] * 7}, "no place in qpos"),
+    ({"jnt_type": [9] * 7}, "no known kind"),
+    ({"body_parentid": [99] * 10}, "names one that is not there"),
+    # What no run writes.
+    *(
+        (change, "of the trace is")
+        for change in (
+            {"nq": -1},
+            {"nq": "7"},
+            {"timestep": 0},
+            {"options": {"self": 1}},
+            {"options": {"damping": [[1, 2], [3]]}},
+            {"options": {"damping": {"a": 1}}},
+            {"options": {"timestep": float("nan")}},
+            {"options": {"gravity": [1e308, 0, 0]}},
+            {"gravity": [10**400, 0, 0]},
+            {"gravity": [float("nan")] * 3},
+            {"rewritten": 10**4000},
+            {"experiment": "\ud800"},
+            {"experiment": "x" * 10**6},
+        )
+    ),
+]
+ENTRIES: list[tuple[Any, str]] = [
+    ({"header": None}, "no header"),
+    ({"header": np.frombuffer(b"{}", dtype=np.uint8)}, "schema None"),
+    ({"header": np.frombuffer(b"\xff\xfe", dtype=np.uint8)}, "is no trace"),
+    ({"qpos": np.zeros((3, 3))}, "shape"),
+    ({"qpos": np.array(["a"])}, "not numbers"),
+    ({"qpos": np.array([{}], dtype=object)}, "not numbers"),
+    ({"qpos": None}, "needs the column 'qpos'"),
+    ({"time": None}, "a column 'time'"),
+    ({"qvel": put(np.nan)}, "not a finite number"),
+    ({"contact_row": put(0)}, "ascending"),
+    ({"contact_geom": put(999)}, "geom that is not there"),
+    ({"contact_dist": None}, "contacts only"),
+    ({"speed": np.zeros(3)}, "no column 'speed'"),
+    ({"qpos": b"hello"}, "is no trace"),  # what is no array
+    ({"qpos": claim(10**12)}, "shape"),
+    ({"qpos": claim(0, 10**18)}, "shape"),
+    ({"qpos": claim(21, 13)}, "is no trace"),  # and nothing after it
+    ({"qpos": b"\x93NUMPY\x01\x00\x10\x00__import__('os')"}, "is no trace"),
+    ({"qpos": b"\x93NUMPY\x09\x00\x10\x00"}, "npy version"),
+    ({"time": put(0.005, 2)}, "time does not go on after row 1"),
+    # Numbers that no run gives.
+    *(
+        ({name: put(value, 3)}, f"column '{name}' has an entry beyond")
+        for name, value in (("qpos", 1e308), ("ctrl", 1e300), ("xpos", 1e308), ("xpos", np.inf))
+    ),
+]
+
+
 @pytest.mark.parametrize(
-    ("entry", "says"),
+    ("header", "entries", "says"),
     [
-        (b"hello", "is no trace"),  # what is no array
-        (claim(10**12), "shape"),
-        (claim(0, 10**18), "shape"),
-        (claim(21, 13), "is no trace"),  # and nothing after it
-        (b"\x93NUMPY\x01\x00\x10\x00__import__('os')", "is no trace"),
-        (b"\x93NUMPY\x09\x00\x10\x00", "npy version"),
+        *((header, {}, says) for header, says in HEADERS),
+        *(({}, entries, says) for entries, says in ENTRIES),
     ],
 )
-def test_an_entry_that_is_no_array_is_one_line(
-    entry: bytes, says: str, box: Trace, tmp_path: Path
+def test_a_broken_file_is_one_line(
+    header: Any, entries: Any, says: str, box: Trace, tmp_path: Path
 ) -> None:
+    path = npz(tmp_path / "bad.npz", box, header, **entries)
     with pytest.raises(TraceError, match=says) as caught:
-        read(npz(tmp_path / "bad.npz", box, qpos=entry))
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"options": {"self": 1}},
-        {"options": {"damping": [[1, 2], [3]]}},
-        {"options": {"damping": {"a": 1}}},
-        {"options": {"timestep": float("nan")}},
-        {"options": {"gravity": [1e308, 0, 0]}},
-        {"gravity": [10**400, 0, 0]},
-        {"gravity": [float("nan")] * 3},
-        {"rewritten": 10**4000},
-        {"experiment": "\ud800"},
-        {"experiment": "x" * 10**6},
-    ],
-)
-def test_a_header_that_no_run_writes_is_refused(
-    change: dict[str, Any], box: Trace, tmp_path: Path
-) -> None:
-    with pytest.raises(TraceError, match="of the trace is") as caught:
-        read(npz(tmp_path / "bad.npz", box, change))
-    assert len(str(caught.value)) < 200
-
-
-def test_numbers_that_no_run_gives_are_refused(box: Trace, tmp_path: Path) -> None:
-    for name, value in (("qpos", 1e308), ("ctrl", 1e300), ("xpos", 1e308), ("xpos", np.inf)):
-        array = np.array(box[name])
-        array.flat[3] = value
-        with pytest.raises(TraceError, match=f"column '{name}' has an entry beyond"):
-            read(npz(tmp_path / "bad.npz", box, **{name: array}))
+        read(path)
+    told = str(caught.value)
+    assert "bad.npz" in told
+    assert "\n" not in told
+    assert len(told) < 250
 
 
 def test_a_run_that_would_take_days_is_not_begun(box: Trace, tmp_path: Path, cli: Cli) -> None:

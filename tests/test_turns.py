@@ -218,30 +218,6 @@ def test_two_data_in_two_threads_equal_serial() -> None:
     assert threaded == serial
 
 
-@pytest.mark.parametrize("use", ["reset", "contacts", "forward", "get_state", "xpos", "close"])
-def test_threads_that_share_a_data_crash_nothing(use: str) -> None:
-    """In a process of its own: before Data were guarded, this ended with a signal."""
-    code = f"""
-import collections, threading, time, statemachine as sm
-from tests.test_turns import USES
-model = sm.load("so101/scene_box")
-data, end, ended = sm.make_data(model), time.time() + 1, collections.Counter()
-def loop(use):
-    while time.time() < end:
-        try:
-            use(model, data)
-        except sm.errors.StateMachineError as error:
-            ended[type(error).__name__] += 1
-threads = [threading.Thread(target=loop, args=(USES[n],)) for n in ("bulk", {use!r})]
-[thread.start() for thread in threads]
-[thread.join() for thread in threads]
-print(set(ended) <= {{"BusyDataError", "ClosedDataError"}}, ended)
-"""
-    done = in_its_own_python(code, ROOT)
-    assert done.returncode == 0, done.stderr[-300:]
-    assert done.stdout.startswith("True"), done.stdout
-
-
 def _interrupted(call: Callable[[], object], at: int) -> bool:
     """Whether `call` was interrupted at its n-th line within the library."""
     left = at

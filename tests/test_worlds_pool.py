@@ -43,7 +43,8 @@ from statemachine.worlds import (
 )
 
 from . import faulty_world as faulty
-from .conftest import ROOT, need_engine, registered
+from .conftest import ROOT, lives, need_engine, registered
+from .test_worlds import follow
 
 linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks at /proc")
 N = 5
@@ -69,15 +70,7 @@ def pids(worlds: Any) -> list[int]:
 
 def running(numbers: Iterable[int]) -> list[int]:
     """Those of some processes that have not ended; zombies have."""
-    found = []
-    for pid in numbers:
-        try:
-            state = Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()[0]
-        except OSError:
-            continue
-        if state not in b"ZX":
-            found.append(pid)
-    return found
+    return [pid for pid in numbers if lives(pid)]
 
 
 def all_end(numbers: Iterable[int], seconds: float = 10.0) -> bool:
@@ -93,71 +86,13 @@ def bits(array: Any) -> bytes:
     return np.ascontiguousarray(array).tobytes()
 
 
-def assert_same(worlds: Worlds, singles: list[sm.Data]) -> None:
-    for name in ("qpos", "qvel", "ctrl", "time", *worlds.derived):
-        rows = getattr(worlds, name)
-        for world, data in enumerate(singles):
-            assert bits(rows[world]) == bits(np.float64(getattr(data, name))), (name, world)
-
-
-def run_both(model: sm.Model, workers: int) -> None:
-    """Everything that can be done to worlds, and to as many Data one after the other."""
-    rng = np.random.default_rng(3)
-    singles = [sm.make_data(model) for _ in range(N)]
-    with make_worlds(model, N, workers=workers) as worlds:
-        assert worlds.workers == min(workers, N)
-        assert_same(worlds, singles)
-        if model.keyframes:
-            reset(worlds, keyframe=0)
-            for data in singles:
-                sm.reset(model, data, keyframe=0)
-            assert_same(worlds, singles)
-        worlds.ctrl[:] = rng.uniform(-0.1, 0.1, worlds.ctrl.shape)
-        for data, row in zip(singles, worlds.ctrl, strict=True):
-            data.ctrl[:] = row
-        step(worlds, 7)
-        for data in singles:
-            sm.step(model, data, 7)
-        assert_same(worlds, singles)
-        # A write reaches one world, with the next step that is for it.
-        worlds.qpos[3, 0] = singles[3].qpos[0] = 0.25
-        worlds.qvel[1, 1] = singles[1].qvel[1] = -0.0
-        worlds.time[0] = 2.0
-        singles[0].time = 2.0
-        assert_same(worlds, singles)
-        for ids in ([0, 3], [1, 2, 4], [3]):
-            step(worlds, 4, ids=ids)
-            for world in ids:
-                sm.step(model, singles[world], 4)
-        assert_same(worlds, singles)
-        state = get_state(worlds, 3)
-        assert state == sm.get_state(model, singles[3])
-        set_state(worlds, 0, state)
-        sm.set_state(model, singles[0], state)
-        forward(worlds, ids=[0, 1])
-        for data in singles[:2]:
-            sm.forward(model, data)
-        reset(worlds, ids=[2])
-        sm.reset(model, singles[2])
-        assert_same(worlds, singles)
-        commands = rng.uniform(-0.1, 0.1, (N, 6, model.nu))
-        rows = record(worlds, 12, ("time", "qpos", "site_xpos"), every=2, ctrl=commands)
-        for world, data in enumerate(singles):
-            for row in range(6):
-                data.ctrl[:] = commands[world, row]
-                sm.step(model, data, 2)
-                for name, array in rows.items():
-                    assert bits(array[world, row]) == bits(np.float64(getattr(data, name)))
-        assert_same(worlds, singles)
-    for data in singles:
-        data.close()
-
-
 @pytest.mark.parametrize(
     "workers", [2, *(pytest.param(workers, marks=pytest.mark.slow) for workers in (1, 3, 64))]
 )
 def test_the_bits_are_those_of_single_data(model: sm.Model, workers: int) -> None:
-    run_both(model, workers)
+    with make_worlds(model, N, workers=workers) as worlds:
+        assert worlds.workers == min(workers, N)
+        follow(model, worlds)
 
 
 def test_what_is_not_written_keeps_what_the_engine_remembers() -> None:

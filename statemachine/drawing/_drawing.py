@@ -72,16 +72,6 @@ class Drawing:
         return x, y, z
 
     @property
-    def vertices(self) -> int:
-        """How many there are, in all parts."""
-        return sum(len(part.vertices) for part in self.parts)
-
-    @property
-    def triangles(self) -> int:
-        """How many there are, in all parts."""
-        return sum(len(part.faces) for part in self.parts)
-
-    @property
     def bodies(self) -> tuple[int, ...]:
         """Ids of the bodies that have a part."""
         return tuple(sorted({part.body for part in self.parts}))

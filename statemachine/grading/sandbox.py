@@ -53,10 +53,8 @@ class ProcessOutcome:
         flooded: Whether it was ended since it wrote without end.
         out_of_memory: Whether what it wrote last speaks of memory that it did not get.
         stdout, stderr: What it wrote, each up to `output_most` bytes.
-        truncated: Whether it wrote more than that.
         wall: How long it ran on the clock [s].
         cpu: How long it computed [s]; 0 where the system does not tell.
-        left_behind: Processes of its own that were still there at its end, and were ended.
         asleep: How long it neither computed nor waited for a processor or a disk [s]; 0 where
             the system does not tell.
     """
@@ -70,10 +68,8 @@ class ProcessOutcome:
     out_of_memory: bool
     stdout: str
     stderr: str
-    truncated: bool
     wall: float
     cpu: float
-    left_behind: int
     asleep: float
 
 
@@ -140,7 +136,7 @@ def run(
         if timed_out and ready:
             waiting.ask_where()
     finally:  # an interrupt too
-        left = _end_all(process, token)
+        _end_all(process, token)
         used = _reap(process)
     out, err = (reader.finish() for reader in readers)
     code = None if timed_out or not waiting.ended else process.returncode
@@ -156,10 +152,8 @@ def run(
         out_of_memory=waiting.ended and code != 0 and _speaks_of_memory(err),
         stdout=out,
         stderr=err,
-        truncated=any(reader.dropped for reader in readers),
         wall=took,
         cpu=used,
-        left_behind=left,
         asleep=waiting.asleep,
     )
 
@@ -294,17 +288,15 @@ def _reap(process: subprocess.Popen[bytes]) -> float:
     return usage.ru_utime + usage.ru_stime
 
 
-def _end_all(process: subprocess.Popen[bytes], token: str) -> int:
-    """Kill the command and all that it started; how many others there were."""
+def _end_all(process: subprocess.Popen[bytes], token: str) -> None:
+    """Kill the command and all that it started."""
     if sys.platform == "win32":
         process.kill()
-        return 0
+        return
     deadline = time.monotonic() + _PATIENCE
-    seen: set[Path] = set()
     first = True
     while True:
         found = {each for each in _relatives(process.pid, token) if int(each.name) != process.pid}
-        seen |= found
         if process.returncode is None:
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(process.pid, signal.SIGKILL)
@@ -312,7 +304,7 @@ def _end_all(process: subprocess.Popen[bytes], token: str) -> int:
             with suppress(ProcessLookupError, PermissionError):
                 os.kill(int(entry.name), signal.SIGKILL)
         if time.monotonic() > deadline or not (found or first):
-            return len(seen)
+            return
         first = False  # what was being forked meanwhile shows in the next round
         time.sleep(0.002)
 
@@ -352,7 +344,6 @@ class _Reader:
         self._pipe: Any = pipe
         self._most = most
         self._kept = bytearray()
-        self.dropped = False
         self.total = 0
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
@@ -361,9 +352,7 @@ class _Reader:
         with suppress(OSError, ValueError):
             while chunk := os.read(self._pipe.fileno(), _CHUNK):
                 self.total += len(chunk)
-                room = self._most - len(self._kept)
-                self._kept += chunk[:room]
-                self.dropped |= len(chunk) > room
+                self._kept += chunk[: self._most - len(self._kept)]
 
     def finish(self) -> str:
         """What was read. Someone whom we could not end may hold the pipe open: not waited for."""

@@ -44,7 +44,7 @@ def forces_on(data: Data, dof: int) -> Forces:
     return summed(forces)
 
 
-def summed(forces: Forces) -> Forces:
+def summed(forces: Mapping[str, float | None]) -> Forces:
     """The parts, and their "total"."""
     known = [part for name in _PARTS if (part := forces[name]) is not None]
     bias = forces["bias"]

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInputError
-from ..interface import Array, Data, JointType, Model, make_data
+from ..interface import INPUTS, Array, Contacts, Data, JointType, Model, make_data
+from ..measures.readings import readings
 from ..runs.commands import load_at_start, start_keyframe
 from ..runs.robot import ARM, carried_by, scalar_joint
 
@@ -189,3 +190,18 @@ def is_of_the_arm(results: Mapping[str, Any]) -> bool:
 def robot_word(joint: str) -> str:
     """What the robot of a joint is called."""
     return "arm" if joint in ARM else "robot"
+
+
+def read_stored(data: Data) -> dict[str, bytes]:
+    """The bytes of every input, and of the time."""
+    return {name: np.array(getattr(data, name)).tobytes() for name in (*INPUTS, "time")}
+
+
+def read_derived(data: Data) -> dict[str, bytes]:
+    """The bytes of every derived array that this engine gives, contacts among them."""
+    return {
+        name: b"".join(getattr(held, part).tobytes() for part in ("geom", "dist", "pos", "force"))
+        if isinstance(held, Contacts)
+        else held.tobytes()
+        for name, held in readings(data).items()
+    }

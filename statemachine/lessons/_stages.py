@@ -16,8 +16,7 @@ from ..probes import conventions
 from ..runs.commands import hold_ctrl
 from ..runs.drive import Progress
 from ..runs.provenance import Provenance, provenance
-from ._bytes import read_derived, read_stored
-from ._robot import ReadPlace, is_of_the_arm, the_tip
+from ._robot import ReadPlace, is_of_the_arm, read_derived, read_stored, the_tip
 from ._words import alike, sentence, where
 
 _STORED = (*INPUTS, "time")

@@ -58,16 +58,14 @@ def _poses(
     return found
 
 
-def _still(name: str, keyframe: int | None = None, steps: int = 0, **qpos: float) -> Array:
-    """One row of qpos (1, nq): a keyframe, some steps later, with joints put elsewhere."""
-    model = load(name)
-    with make_data(model) as data:
-        reset(model, data, keyframe=keyframe)
-        for _ in range(steps):
-            step(model, data)
+def _still(name: str, keyframe: int | None = None, **qpos: float) -> Array:
+    """One row of qpos (1, nq): a keyframe, with joints put elsewhere."""
+
+    def put(model: Model, data: Data) -> None:
         for joint, value in qpos.items():
             data.qpos[model.jnt_qposadr[model.joint_id(joint)]] = value
-        return data.qpos[None].copy()
+
+    return _poses(name, 1, keyframe=keyframe, change=put)
 
 
 def _two_data() -> tuple[Array, Array]:
@@ -176,7 +174,7 @@ PICTURES: Mapping[str, RobotPicture] = {
         "One arm, stretched out. No violet is to be seen: while nobody called step, nothing moved.",
         "statemachine view --model so101/scene --paused",
         _ARM,
-        lambda: (_still(_ARM, steps=100), _still(_ARM, steps=100)),
+        lambda: (_poses(_ARM, 2, every=100)[1:], _poses(_ARM, 2, every=100)[1:]),
     ),
     "speed": RobotPicture(
         "What is advanced here: six joints, a box, and the contacts between them.",

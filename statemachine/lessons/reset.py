@@ -16,7 +16,7 @@ from ..page import Page, Question, Table, Text, Verdict
 from ..runs.drive import Progress
 from ..runs.provenance import Provenance, provenance
 from ..runs.robot import body_pairs, carried_by, moved_by_actuators
-from ._bytes import read_derived, read_stored
+from ._robot import read_derived, read_stored
 from ._words import differences, emulation, page_of, sentence, typed, where
 from .records import Session
 from .session import CodeRun

@@ -26,8 +26,7 @@ from ..measures.text import count, position
 from ..page import Page, Question, Table, Text, Verdict
 from ..runs.drive import Progress
 from ..runs.provenance import Provenance, provenance
-from ._bytes import read_derived
-from ._robot import coordinate, with_joint
+from ._robot import coordinate, read_derived, with_joint
 from ._words import emulation, page_of, sentence, typed, where
 from .records import Session
 from .session import CodeRun

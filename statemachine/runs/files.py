@@ -21,7 +21,7 @@ from ..errors import (
 from ..models import resolve
 from .header import Header
 from .npz_files import read_npz, write_npz
-from .parquet_files import read_parquet, require_pyarrow, write_parquet
+from .parquet_files import read_parquet, write_parquet
 from .provenance import model_digest
 from .trace import Trace
 from .whole import replace_file
@@ -48,10 +48,8 @@ def write(trace: Trace, path: str | os.PathLike[str]) -> Path:
     """
     target = _known(path)
     Header.from_json(trace.header.as_json())
-    parquet = target.suffix.lower() == ".parquet"
-    if parquet:
-        require_pyarrow()
-    replace_file(target, partial(write_parquet if parquet else write_npz, trace))
+    fill = write_parquet if target.suffix.lower() == ".parquet" else write_npz
+    replace_file(target, partial(fill, trace))
     return target
 
 

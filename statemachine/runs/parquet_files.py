@@ -26,9 +26,8 @@ def write_parquet(trace: Trace, out: BinaryIO) -> None:
     Raises:
         MissingEngineError: pyarrow is not installed.
     """
-    table = _table(trace, require_pyarrow())
-    parquet = importlib.import_module("pyarrow.parquet")
-    parquet.write_table(table, out, compression="zstd")
+    arrow, parquet = _pyarrow()
+    parquet.write_table(_table(trace, arrow), out, compression="zstd")
 
 
 def read_parquet(path: Path) -> tuple[Header, dict[str, Any]]:
@@ -37,8 +36,7 @@ def read_parquet(path: Path) -> tuple[Header, dict[str, Any]]:
     Raises:
         MissingEngineError: pyarrow is not installed.
     """
-    require_pyarrow()
-    parquet = importlib.import_module("pyarrow.parquet")
+    _, parquet = _pyarrow()
     with parquet.ParquetFile(path) as file:
         known = (file.metadata.metadata or {}).get(_KEY)
         if known is None:
@@ -52,14 +50,14 @@ def read_parquet(path: Path) -> tuple[Header, dict[str, Any]]:
     return header, columns
 
 
-def require_pyarrow() -> Any:
-    """The package pyarrow.
+def _pyarrow() -> tuple[Any, Any]:
+    """The package pyarrow, and its part for parquet.
 
     Raises:
         MissingEngineError: It is not installed; the message names the extra.
     """
     require_extra("pyarrow.parquet", "parquet", "pyarrow", "parquet", "npz needs nothing more")
-    return importlib.import_module("pyarrow")
+    return importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
 
 
 def _digest(text: str, columns: dict[str, Any]) -> str:

@@ -275,27 +275,24 @@ def _run(
     error = drive(model, data, controller, total, before=keep, once_more=True)
     # Without its advice, which is of no use here.
     ended = "" if error is None else str(error).partition(". This Data")[0]
-    while len(times) > 1 and not all(_stands(rows[-1]) for rows in kept[:2]):
-        ended = ended or f"a coordinate left every bound at {times[-1]:g} s"
-        for rows in (times, *kept):  # numbers that no trace holds
-            rows.pop()
     found = {"time": np.array(times)}
     for name, rows, width in zip(
         ("qpos", "qvel", "ctrl"), kept, (model.nq, model.nv, model.nu), strict=True
     ):
-        array = np.frombuffer(b"".join(rows), dtype=np.float64).reshape(len(times), width)
-        found[name] = array
+        found[name] = np.frombuffer(b"".join(rows)).reshape(len(times), width)
+    # The last rows may have finite numbers that no trace holds.
+    state = np.hstack([found["qpos"], found["qvel"]])
+    stands = np.flatnonzero(~((np.abs(state) > HUGE) & np.isfinite(state)).any(axis=1))
+    rows_left = int(np.append(0, stands)[-1]) + 1  # the first is what it started from
+    if rows_left < len(times):
+        ended = ended or f"a coordinate left every bound at {times[-1]:g} s"
+        found = {name: array[:rows_left] for name, array in found.items()}
+    for name, array in found.items():
         # A step finds what is not finite itself, but the last row has no step.
         if not np.isfinite(array[-1]).all():
             raise BadInputError(f"the controller left {name} with an entry that is no number")
     progress(1.0)
     return found, ended
-
-
-def _stands(row: bytes) -> bool:
-    """Whether no finite number of a row is beyond what a trace holds."""
-    numbers = np.abs(np.frombuffer(row))
-    return not bool(((numbers > HUGE) & np.isfinite(numbers)).any())
 
 
 def _plain(value: Any) -> Any:

@@ -77,11 +77,6 @@ def same_bits(one: Array, two: Array) -> bool:
     return one.shape == two.shape and bool((one == two).all())
 
 
-def count(number: int, thing: str) -> str:
-    """'1 step', '2 steps'."""
-    return f"{number} {thing}" + "s" * (number != 1)
-
-
 def owner(model: Model, place: int) -> str:
     """The joint that a place in qpos belongs to."""
     starts = model.jnt_qposadr.tolist()

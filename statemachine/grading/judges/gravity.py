@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...interface import Array, Ints, Model, make_data, step
+from ...measures.text import count
 from ..answers import Answer
 from ..calls import reason
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from ._values import (
     LIFT,
     address,
-    count,
     grain,
     listed,
     near,

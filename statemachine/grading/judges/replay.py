@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...interface import Array, Model, make_data, reset
+from ...measures.text import count
 from ..answers import Answer, kind
 from ..calls import reason
 from ..watch import EngineRun, Nudge
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
 from ._values import (
     address,
-    count,
     grain,
     listed,
     near,

@@ -9,10 +9,11 @@ from numbers import Real
 from typing import Any
 
 from ...interface import JointType, Model, make_data, reset
+from ...measures.text import count
 from ..answers import Answer, kind
 from ..calls import FaultError, reason
 from ..worlds import ELSEWHERE, ExerciseWorld, Scenes
-from ._values import count, parts
+from ._values import parts
 
 SCENE = "so101/scene_box"
 
