@@ -15,6 +15,7 @@ import pytest
 
 from statemachine import backends
 from statemachine.backends import backend_engine, backend_names
+from statemachine.cli import main
 from statemachine.errors import MissingEngineError
 from statemachine.installed import ENGINES, require
 from statemachine.interface import Model
@@ -118,6 +119,25 @@ def golden() -> Callable[[str], np.ndarray]:
 
 
 Cli = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+def one_line(done: subprocess.CompletedProcess[str], says: str, code: int = 2) -> None:
+    """A command was refused, in one line that says why."""
+    assert (done.returncode, done.stdout) == (code, ""), done.stderr
+    (line,) = done.stderr.splitlines()
+    assert says in line
+
+
+@pytest.fixture
+def here(capsys: pytest.CaptureFixture[str]) -> Cli:
+    """Run the command line in this process."""
+
+    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+        words = [str(word) for word in arguments]
+        code = main(words)
+        return subprocess.CompletedProcess(words, code, *capsys.readouterr())
+
+    return run
 
 
 @pytest.fixture

@@ -34,7 +34,7 @@ from statemachine.report import terminal
 from statemachine.runs import Trace, record, record_scenario, write
 from statemachine.runs.scenarios import SCENARIOS
 
-from .conftest import ROOT, Cli, need_engine
+from .conftest import ROOT, Cli, need_engine, one_line
 
 
 def traced(name: str, **options: Any) -> Trace:
@@ -505,16 +505,13 @@ def test_it_compares_an_engine_with_itself(cli: Cli) -> None:
         (("hold", "--backends", "mujoco", "bullet"), "no backend named 'bullet'"),
         (("hold", "--tolerance", "joint=1mm"), "joint is measured in deg, rad"),
         (("hold", "--timestep", "-1"), "timestep must be above 0"),
+        (("hold", "--timestep", "10"), "a timestep of 10 s is longer than the run of 2 s"),
         (("hold", "--seconds", "0"), "seconds must be above 0"),
         (("hold", "--model", "so101/scene_box", "--defaults", "both"), "both"),
     ],
 )
-def test_mistakes_are_one_line(words: tuple[str, ...], says: str, cli: Cli) -> None:
-    done = cli("compare", *words)
-    assert done.returncode == 2
-    (line,) = done.stderr.splitlines()
-    assert says in line
-    assert not done.stdout
+def test_mistakes_are_one_line(words: tuple[str, ...], says: str, here: Cli) -> None:
+    one_line(here("compare", *words), says)
 
 
 # What does not move at all, and names that a plot could take for formulas.
@@ -555,23 +552,14 @@ def test_poses_that_are_no_numbers_cost_the_picture_and_no_more(
 # Mistakes that were met.
 
 
-def test_a_timestep_in_milliseconds_is_refused(cli: Cli) -> None:
-    done = cli("compare", "hold", "--timestep", "10")
-    assert done.returncode == 2
-    assert "a timestep of 10 s is longer than the run of 2 s" in done.stderr
-
-
-def test_a_file_that_is_no_trace_is_taken_for_no_experiment(cli: Cli, tmp_path: Path) -> None:
+def test_a_file_that_is_no_trace_is_taken_for_no_experiment(here: Cli, tmp_path: Path) -> None:
     (tmp_path / "waves.csv").write_text("time\n")
-    done = cli("compare", tmp_path / "waves.csv")
-    assert done.returncode == 2
-    assert "a trace ends in .npz or .parquet" in done.stderr
+    one_line(here("compare", tmp_path / "waves.csv"), "a trace ends in .npz or .parquet")
 
 
-def test_a_model_without_actuators_holds_nothing(cli: Cli) -> None:
-    done = cli("lesson", "hold", "--model", ROOT / "models/so101/so101.urdf")
-    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
-    assert "so101.urdf has no actuators" in done.stderr
+def test_a_model_without_actuators_holds_nothing(here: Cli) -> None:
+    urdf = ROOT / "models/so101/so101.urdf"
+    one_line(here("lesson", "hold", "--model", urdf), "so101.urdf has no actuators")
 
 
 @pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="no /proc")

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.cli import main
 from statemachine.compare import (
     Request,
     Side,
@@ -26,7 +25,7 @@ from statemachine.report import terminal
 from statemachine.runs import record, write
 from statemachine.runs.controllers import command_function, controller_from
 
-from .conftest import Cli, need_engine
+from .conftest import Cli, need_engine, one_line
 
 # Two hinges one after the other, each with a servo, and a tip; one link may be heavier.
 _ARM = """<mujoco><option timestep="0.002"/><worldbody>
@@ -359,14 +358,11 @@ def test_robots_that_share_nothing_are_refused(files: Path) -> None:
     ],
 )
 def test_what_is_mistyped_is_one_line(
-    files: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any, typed: str, says: str
+    files: Path, monkeypatch: pytest.MonkeyPatch, here: Cli, typed: str, says: str
 ) -> None:
     monkeypatch.chdir(files)
     (files / "ball.xml").write_text((files / "arm.xml").read_text())
-    assert main(["compare", *typed.split()]) == 2
-    out, err = capsys.readouterr()
-    assert says in err
-    assert (out, err.count("\n")) == ("", 1)
+    one_line(here("compare", *typed.split()), says)
 
 
 # What is run.
@@ -525,13 +521,14 @@ def test_words_are_sorted_into_what_and_sides() -> None:
     ],
 )
 def test_mistakes_say_what_to_type(
-    words: tuple[str, ...], says: str, files: Path, cli: Cli
+    words: tuple[str, ...],
+    says: str,
+    files: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    here: Cli,
 ) -> None:
-    done = cli("compare", *words)
-    assert done.returncode == 2
-    (line,) = done.stderr.splitlines()
-    assert says in line
-    assert not done.stdout
+    monkeypatch.chdir(files)
+    one_line(here("compare", *words), says)
 
 
 def test_the_command_shows_both_loops(files: Path, cli: Cli) -> None:

@@ -11,9 +11,9 @@ import statemachine as sm
 from statemachine.compare import TimestepConvergence, convergence
 from statemachine.errors import EndedEarlyError
 from statemachine.report.convergence import page
-from statemachine.runs import Trace, record
+from statemachine.runs import Trace, record, write
 
-from .conftest import Cli, need_engine
+from .conftest import Cli, need_engine, one_line
 
 FALL = """<mujoco><option timestep="0.01" integrator="{integrator}">{flag}</option>
   <worldbody><body pos="0 0 {height}"><joint name="swing" axis="0 1 0" damping="0.02"/>
@@ -131,17 +131,14 @@ def test_the_command_line_answers_both_questions(cli: Cli) -> None:
     assert [stage["stage"] for stage in told["stages"]][:2] == ["kinematics", "mass matrix"]
 
 
-def test_options_that_do_not_go_together_are_refused(cli: Cli, tmp_path: Path) -> None:
-    for words in (
-        ("--one-step", "--converge"),
-        ("--converge", "--why"),
-        ("--one-step", "--floor", "1mm"),
-    ):
-        done = cli("compare", "hold", *words)
-        assert done.returncode == 2
-        assert "goes without" in done.stderr
-    file = str(tmp_path / "a.npz")
-    cli("trace", "record", "droop", "--seconds", "0.1", "-o", file)
-    done = cli("compare", file, file, "--one-step")
-    assert done.returncode == 2
-    assert "runs both sides" in done.stderr
+@pytest.mark.parametrize(
+    "words", [("--one-step", "--converge"), ("--converge", "--why"), ("--one-step", "--floor=1mm")]
+)
+def test_options_that_do_not_go_together_are_refused(words: tuple[str, ...], here: Cli) -> None:
+    one_line(here("compare", "hold", *words), "goes without")
+
+
+def test_recorded_runs_have_no_step_to_take_again(here: Cli, tmp_path: Path) -> None:
+    file = write(record(sm.load("so101"), seconds=0.1), tmp_path / "a.npz")
+    one_line(here("compare", file, file, "--one-step"), "runs both sides")
+    one_line(here("compare", file, file, "--floor", "1mm"), "recorded run")

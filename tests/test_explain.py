@@ -39,6 +39,11 @@ def shares(found: Explanation) -> dict[str, float]:
     return {e.name: float("nan") if e.share is None else e.share for e in found.shares}
 
 
+def is_brought(found: Explanation) -> bool:
+    """Whether nothing is left where all causes are brought to the same."""
+    return found.brought is not None and found.brought <= 1e-9 * found.gap + 1e-12
+
+
 @pytest.mark.parametrize("name", ALONE)
 def test_one_cause_is_found_and_explains_all(name, tmp_path):
     case = ALONE[name]
@@ -54,8 +59,7 @@ def test_one_cause_is_found_and_explains_all(name, tmp_path):
     assert told[case.cause] >= 0.95, told
     assert all(abs(share) <= 0.02 for cause, share in told.items() if cause != case.cause), told
     assert set(told) <= {case.cause, idle.cause, "extra actuator of more"}
-    assert found.brought is not None
-    assert found.brought <= 1e-9 * found.gap + 1e-12
+    assert is_brought(found)
     assert found.is_explained
     assert found.located == 0
 
@@ -243,8 +247,7 @@ def test_a_mesh_a_height_field_and_a_swapped_weld_are_brought_over(left, right, 
     told = shares(found)
     assert found.gap > 100 * found.negligible
     assert told[cause] >= 0.95, told
-    assert found.brought is not None
-    assert found.brought <= 1e-9 * found.gap + 1e-12
+    assert is_brought(found)
 
 
 def test_another_size_of_a_mesh_or_of_a_height_field_is_refused_with_its_reason(tmp_path):
@@ -564,8 +567,7 @@ def test_what_is_easily_missed(name, tmp_path):
     )
     assert found.gap > 100 * found.negligible
     assert list(shares(found)) == [cause]
-    assert found.brought is not None
-    assert found.brought <= 1e-9 * found.gap
+    assert is_brought(found)
 
 
 @pytest.mark.parametrize(
@@ -589,8 +591,7 @@ def test_another_zero_of_several_joints_or_of_one_that_an_equality_holds(held, t
     right = with_changes(left, [('name="elbow" axis', 'name="elbow" ref="0.2" axis')])
     found = explained(tmp_path, left, right, scenario=STAY)
     assert set(shares(found)) == {"zero of lower", "start"}
-    assert found.brought is not None
-    assert found.brought <= 1e-9 * found.gap
+    assert is_brought(found)
 
 
 @pytest.mark.parametrize(("old", "new"), [('stiffness="40"', 'stiffness="50"'), BALL_SPRING])
@@ -684,8 +685,7 @@ def test_a_finer_list_goes_down_to_single_entries(tmp_path):
         *("gains (kp) of shoulder", "gains (biasprm[2]) of shoulder"),
         *("gravity (x)", "gravity (z)"),
     }
-    assert found.brought is not None
-    assert found.brought <= 1e-9 * found.gap + 1e-12
+    assert is_brought(found)
     values = {each.name: each.values for each in found.shares}
     assert values["range (upper end) of shoulder"] == (("upper end", 2.0, 0.4),)
     assert values["gravity (z)"] == (("z", -9.81, -9.0),)

@@ -18,6 +18,7 @@ from statemachine.page import Text
 from statemachine.report import compare as report
 
 from .conftest import Cli, need_engine
+from .explained import write
 
 PENDULUM = """<mujoco><option timestep="0.005"/><worldbody><body><joint name="swing" axis="0 1 0"
   damping="0.05"/><geom type="capsule" size="0.02" fromto="0 0 0 0 0 -0.5" contype="0"/></body>
@@ -33,9 +34,7 @@ BOX = """<mujoco><option timestep="0.002"/><worldbody><geom name="floor" type="p
 
 
 def model_of(tmp_path: Path, text: str, name: str = "model") -> sm.Model:
-    file = tmp_path / f"{name}.xml"
-    file.write_text(text)
-    return sm.load(file)
+    return sm.load(write(tmp_path, f"{name}.xml", text))
 
 
 def rerun(model: sm.Model, seconds: float, **start: Any) -> Rerun:
@@ -190,18 +189,10 @@ def test_the_command_line_shows_the_floor(cli: Cli) -> None:
     assert "chaos" not in cli(*asked, "--no-floor").stdout
 
 
-def test_a_trace_of_a_file_has_no_left_side_to_run_again(cli: Cli, tmp_path: Path) -> None:
-    file = str(tmp_path / "a.npz")
-    cli("trace", "record", "droop", "--seconds", "0.2", "-o", file)
-    assert "chaos" not in cli("compare", file, file).stdout
-    refused = cli("compare", file, file, "--floor", "1mm")
-    assert refused.returncode == 2
-    assert "recorded run" in refused.stderr
-
-
-def test_a_trace_that_is_played_on_two_sides_has_a_floor(cli: Cli, tmp_path: Path) -> None:
-    file = str(tmp_path / "a.npz")
-    cli("trace", "record", "droop", "--seconds", "0.2", "-o", file)
-    done = cli("compare", file, "so101/scene", "so101/scene", "damping=0.7")
+def test_a_trace_has_a_floor_where_it_is_played_on_two_sides(here: Cli, tmp_path: Path) -> None:
+    file = tmp_path / "a.npz"
+    here("trace", "record", "droop", "--seconds", "0.2", "-o", file)
+    assert "chaos" not in here("compare", file, file).stdout
+    done = here("compare", file, "so101/scene", "so101/scene", "damping=0.7")
     assert "The chaos floor" in done.stdout
     assert "1e-12" in done.stdout

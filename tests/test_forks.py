@@ -15,7 +15,6 @@ from pathlib import Path
 import pytest
 
 import statemachine as sm
-from statemachine.cli import main
 from statemachine.compare.forks import forks_for, in_forks
 from statemachine.compare.why import Explanation
 from statemachine.errors import BadInputError
@@ -185,17 +184,6 @@ def test_how_many_forks() -> None:
     assert forks_for(10, 0.001, None) == 1  # short work
     with pytest.raises(BadInputError, match="jobs must be at least 1"):
         forks_for(10, 1.0, 0)
-
-
-def test_jobs_on_the_command(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    left = str(write(tmp_path, "left.xml", ARM))
-    right = str(write(tmp_path, "right.xml", _apart(ARM)))
-    assert main(["compare", "fall", left, right, "--jobs", "2"]) == 2
-    assert "--jobs belongs to --why" in capsys.readouterr().err
-    assert main(["compare", "hold", "--why", "--jobs", "2"]) == 2
-    assert "--jobs is of two sides" in capsys.readouterr().err
-    assert main(["compare", "fall", left, right, "--why", "--jobs", "0"]) == 2
-    assert "jobs must be at least 1; got 0" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ from statemachine.errors import BadInputError
 from statemachine.runs.scenarios import scenario
 
 from .conftest import need_engine
+from .explained import write
 
 # Two links on a stand, driven, damped, with a ball that falls beside them.
 ROBOT = """<mujoco><option timestep="0.005" integrator="implicitfast"/><worldbody>
@@ -44,9 +45,7 @@ CHANGES = {
 
 
 def model_of(folder: Path, text: str, name: str) -> sm.Model:
-    file = folder / f"{name}.xml"
-    file.write_text(text)
-    return sm.load(file)
+    return sm.load(write(folder, f"{name}.xml", text))
 
 
 def rerun(model: sm.Model, seconds: float = 0.5) -> Rerun:

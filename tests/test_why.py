@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import statemachine as sm
+from statemachine import backends
 from statemachine.compare.why import FACTORS, Attribution, attribute
 from statemachine.errors import BadInputError, DivergedError, EngineWarning, UnknownNameError
 from statemachine.interface import Model
@@ -25,7 +26,7 @@ from statemachine.report.as_json import dumps
 from statemachine.runs import record_scenario
 from statemachine.runs.scenarios import Scenario, scenario
 
-from .conftest import ROOT, Cli, need_engine, registered
+from .conftest import ROOT, Cli, need_engine, one_line, registered
 
 HOLD = replace(scenario("hold"), seconds=0.6)  # long enough to touch the floor
 FALL = replace(scenario("fall"), seconds=5.0)  # and to meet a limit
@@ -731,14 +732,13 @@ def test_the_command(cli: Cli) -> None:
 
 
 def test_the_command_says_no_where_the_cause_is_not_found(
-    arm: Model, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    arm: Model, monkeypatch: pytest.MonkeyPatch, here: Cli
 ) -> None:
-    from statemachine import backends, cli
-
     models = [arm, edited(arm, body_mass=1.3 * arm.raw.body_mass)]
     monkeypatch.setattr(backends, "load", lambda *_a, **_k: models.pop(0))
-    assert cli.main(["compare", "hold", "--why", "--seconds", "0.5"]) == 1
-    assert "100.0 % is unexplained" in capsys.readouterr().out
+    done = here("compare", "hold", "--why", "--seconds", "0.5")
+    assert done.returncode == 1
+    assert "100.0 % is unexplained" in done.stdout
 
 
 @pytest.mark.parametrize(
@@ -753,24 +753,13 @@ def test_the_command_says_no_where_the_cause_is_not_found(
         (("--seconds", "0.1", "--timestep", "-1"), "timestep"),
     ],
 )
-def test_a_mistake_is_one_line(
-    arguments: tuple[str, ...], said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    from statemachine import cli
-
-    words = ["compare", "hold", *arguments, "--why"]
-    if "--backends" not in arguments:
-        words += ["--backends", "mujoco", "mujoco"]
-    assert cli.main(words) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert said in line
+def test_a_mistake_is_one_line(arguments: tuple[str, ...], said: str, here: Cli) -> None:
+    engines = () if "--backends" in arguments else ("--backends", "mujoco", "mujoco")
+    one_line(here("compare", "hold", *arguments, "--why", *engines), said)
 
 
-def test_quantity_without_why_is_a_mistake(capsys: pytest.CaptureFixture[str]) -> None:
-    from statemachine import cli
-
-    assert cli.main(["compare", "hold", "--quantity", "joints"]) == 2
-    assert "--why" in capsys.readouterr().err
+def test_quantity_without_why_is_a_mistake(here: Cli) -> None:
+    one_line(here("compare", "hold", "--quantity", "joints"), "--why")
 
 
 def test_without_pybullet_one_line_says_so(cli: Cli, tmp_path: Path) -> None:
@@ -783,7 +772,4 @@ def test_without_pybullet_one_line_says_so(cli: Cli, tmp_path: Path) -> None:
         "sys.meta_path.insert(0, Hide())\n"
     )
     done = cli("compare", "hold", "--why", PYTHONPATH=f"{tmp_path}{os.pathsep}{ROOT}")
-    assert done.returncode == 3
-    assert not done.stdout
-    (line,) = done.stderr.splitlines()
-    assert "pip install pybullet" in line
+    one_line(done, "pip install pybullet", code=3)

@@ -150,7 +150,7 @@ def compare(
         allowed = tolerance_of(curve.kind, curve.one, curve.two, reach, longest, tolerances)
         found.append(_agreement(curve.name, curve.kind, curve.difference, curve.time,
                                 _settled(curve), allowed))  # fmt: skip
-    common = common_moments(one, two)
+    common = common_moments(one.time, two.time, (one.timestep, two.timestep))
     labels = labels_of(one.header, two.header)
     allowed = tolerance_of("contact", common.time, common.time, 0.0, longest, tolerances)
     found += _first_touches(one, two, float(common.time[-1]), allowed, labels.short)

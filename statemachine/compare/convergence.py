@@ -113,10 +113,10 @@ def convergence(
                 )
     one, two = runs[0]
     tip = default_tip(one.header, two.header) if tip is None else tip
-    common = common_moments(one, two)
+    common = common_moments(one.time, two.time, (one.timestep, two.timestep))
     time = common.time
     # Of the pairs of sides; then of each side's first runs and its finest.
-    between = [_gaps(*pair, tip) for pair in runs]
+    between = [_gaps(a, b, tip) for a, b in runs]
     own = [
         [_gaps(pair[side], runs[-1][side], tip, rows) for pair in runs[:-1]]
         for side, rows in ((0, common.one), (1, common.two))

@@ -108,7 +108,7 @@ def chaos_floor(
         BadInputError: As `perturbed_runs`.
     """
     tip = default_tip(one.header, two.header) if tip is None else tip
-    common, until = common_moments(one, two), comparison.until
+    common = common_moments(one.time, two.time, (one.timestep, two.timestep))
     gaps = {curve.name: curve.difference for curve in series(one, two, tip)}
     gaps |= {a.name: np.array([a.max]) for a in comparison.agreements if a.kind == "contact"}
     widths = {name: np.zeros(len(gap)) for name, gap in gaps.items()}
@@ -117,7 +117,7 @@ def chaos_floor(
         rerun, runs=runs, seed=seed, uncertain=uncertain, progress=progress
     ):
         ended += bool(trace.header.ended)
-        for name, far in _distances(one, trace, tip, until, common.one).items():
+        for name, far in _distances(one, trace, tip, comparison.until, common.one).items():
             if name in widths:
                 widths[name] = np.maximum(widths[name], far)
     reach = round(_WINDOW * (len(common.time) - 1))
@@ -142,16 +142,16 @@ def _distances(
     """
     found: dict[str, Array] = {}
     try:
-        curves, own = series(one, perturbed, tip), common_moments(one, perturbed).one
+        curves, count = series(one, perturbed, tip), len(perturbed)
         for touch in touches(one, perturbed):
             first, other = touch.one.first, touch.two.first
             gap = until if first is None or other is None else abs(first - other)
             found[f"{touch.pair}, first touch"] = np.array([gap])
     except TraceError:  # it ended at once
-        curves, own = series(one, one, tip), np.empty(0, dtype=np.int64)
+        curves, count = series(one, one, tip), 0
     for curve in curves:
         far = np.full(len(one), np.inf)
-        far[own] = np.nan_to_num(curve.difference[: len(own)], nan=np.inf)
+        far[:count] = np.nan_to_num(curve.difference[:count], nan=np.inf)
         found[curve.name] = far[rows]
     return found
 

@@ -42,9 +42,11 @@ def labels_of(one: Header, two: Header) -> Labels:
     """The names of two runs."""
     engines = one.label, two.label
     others = list(_apart(one, two))
-    ways = tuple(h.backend + ", engine defaults" * (h.defaults == "engine") for h in (one, two))
+    backends = one.backend, two.backend
+    own = [", engine defaults" * (header.defaults == "engine") for header in (one, two)]
+    ways = backends[0] + own[0], backends[1] + own[1]
     if one.backend != two.backend:
-        short = one.backend, two.backend
+        short = backends
     elif ways[0] != ways[1]:
         short = ways
     else:

@@ -5,12 +5,11 @@ By name, then by structure: `description.match` says how, and `names` overrules 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..description.match import Matching, Pair, match, renamed
 from ..description.records import HERE, Robot
@@ -91,26 +90,24 @@ class Matched:
             values: (nq,) or (n, nq) of the first.
             start: (nq,) of the second, for the joints that have no counterpart.
         """
-        return self._moved(values, start, ("jnt_qposadr", "nq"))
+        return _moved(values, start, *self._spans("jnt_qposadr", "nq"))
 
     def qvel(self, values: Array, start: Array) -> Array:
         """Velocities of the second Model (nv,) or (n, nv), as `qpos`."""
-        return self._moved(values, start, ("jnt_dofadr", "nv"))
+        return _moved(values, start, *self._spans("jnt_dofadr", "nv"))
 
     def ctrl(self, values: Array, start: Array) -> Array:
         """Commands to the second Model (nu,) or (n, nu), as `qpos`."""
-        found = _rows(values, start)
-        for a, b in self.actuators:
-            found[..., b] = values[..., a]
-        return found
+        return _moved(values, start, *([pair[k] for pair in self.actuators] for k in (0, 1)))
 
-    def _moved(self, values: Array, start: Array, which: tuple[str, str]) -> Array:
-        found = _rows(values, start)
-        for a, b in self.joints:
-            here = _span(self.one, a, *which)
-            there = _span(self.two, b, *which)
-            found[..., there] = values[..., here]
-        return found
+    def _spans(self, start: str, end: str) -> list[list[int]]:
+        """The places of the joints of both, in qpos or qvel."""
+        places: list[list[int]] = [[], []]
+        for side, model in enumerate((self.one, self.two)):
+            starts = [*getattr(model, start).tolist(), getattr(model, end)]
+            for pair in self.joints:
+                places[side] += range(starts[pair[side]], starts[pair[side] + 1])
+        return places
 
 
 def match_models(one: Model, two: Model, names: Mapping[str, str] | None = None) -> Matched:
@@ -209,13 +206,10 @@ def _solid(pair: Pair, trees: Sequence[GroupTree], one: Model, two: Model) -> Bo
 
 def _body_of(link: str, tree: GroupTree, model: Model) -> int:
     """The body whose link this is; of the links of a body with several joints, the last."""
-    names = [each.name for each in tree.robot.links]
-    place, body = names.index(link), 0
+    place = [each.name for each in tree.robot.links].index(link)
     # A body with n joints is n links, one without is one.
     counts = np.maximum(np.bincount(model.jnt_bodyid, minlength=model.nbody), 1)
-    ends = np.cumsum(counts)
-    body = int(np.searchsorted(ends, place, side="right"))
-    return body
+    return int(np.searchsorted(np.cumsum(counts), place, side="right"))
 
 
 def _led(one: Model, two: Model, given: Mapping[str, str]) -> Iterator[BodyPair]:
@@ -248,7 +242,6 @@ def _sites(
     trees: Sequence[GroupTree],
 ) -> Pairs:
     """By name, then by place: of what is left, those in one place of the same solid."""
-    pairs = dict(_by_name(one.site_names, two.site_names, given))
     places = [
         [
             (number, at @ frame.place)
@@ -257,35 +250,40 @@ def _sites(
         ]
         for tree in trees
     ]
-    left = [k for k in range(two.nsite) if k not in pairs.values()]
-    for a in range(one.nsite):
-        number, place = places[0][a]
+
+    def in_one_place(a: int, b: int) -> bool:
+        (number, place), (there, other) = places[0][a], places[1][b]
         pair = found.of(number)
-        if a in pairs or pair is None:
-            continue
-        here = pair.align @ place
-        for b in left:
-            there, other = places[1][b]
-            if there == pair.two.number and here.distance(other) < _ONE_PLACE:
-                pairs[a] = b
-                left.remove(b)
-                break
-    return tuple(sorted(pairs.items()))
+        if pair is None or there != pair.two.number:
+            return False
+        return (pair.align @ place).distance(other) < _ONE_PLACE
+
+    return _by_name_then(one.site_names, two.site_names, given, in_one_place)
 
 
 def _actuators(one: Model, two: Model, joints: Pairs, given: Mapping[str, str]) -> Pairs:
     """By name, then by the joint: the n-th of a joint is the n-th of its counterpart."""
-    pairs = dict(_by_name(one.actuator_names, two.actuator_names, given))
-    left = [k for k in range(two.nu) if k not in pairs.values()]
-    counterpart = dict(joints)
-    for k in range(one.nu):
-        joint = counterpart.get(int(one.actuator_jntid[k]))
-        if k in pairs or joint is None:
-            continue
-        fits = [m for m in left if int(two.actuator_jntid[m]) == joint]
-        if fits:
-            pairs[k] = fits[0]
-            left.remove(fits[0])
+
+    def of_one_joint(a: int, b: int) -> bool:
+        return (int(one.actuator_jntid[a]), int(two.actuator_jntid[b])) in joints
+
+    return _by_name_then(one.actuator_names, two.actuator_names, given, of_one_joint)
+
+
+def _by_name_then(
+    ours: Sequence[str],
+    theirs: Sequence[str],
+    given: Mapping[str, str],
+    fits: Callable[[int, int], bool],
+) -> Pairs:
+    """By name; of what is left, each with the first that fits."""
+    pairs = dict(_by_name(ours, theirs, given))
+    left = [b for b in range(len(theirs)) if b not in pairs.values()]
+    for a in range(len(ours)):
+        fitting = [b for b in left if a not in pairs and fits(a, b)]
+        if fitting:
+            pairs[a] = fitting[0]
+            left.remove(fitting[0])
     return tuple(sorted(pairs.items()))
 
 
@@ -329,15 +327,8 @@ def _site_notes(one: Model, two: Model, sites: Pairs, given: Mapping[str, str]) 
             )
 
 
-def _rows(values: Array, start: Array) -> Array:
-    shape = (*np.shape(values)[:-1], len(start))
-    return np.array(np.broadcast_to(start, shape))
-
-
-def _span(model: Model, joint: int, start: str, end: str) -> NDArray[Any]:
-    """The places of a joint in qpos or qvel."""
-    starts = np.append(getattr(model, start), getattr(model, end))
-    return np.arange(starts[joint], starts[joint + 1])
-
-
-__all__ = ["Matched", "SideStart", "match_models", "start_of"]
+def _moved(values: Array, start: Array, here: Sequence[int], there: Sequence[int]) -> Array:
+    """Values (k,) or (n, k) at other places of a start (m,)."""
+    rows = np.array(np.broadcast_to(start, (*np.shape(values)[:-1], len(start))))
+    rows[..., there] = values[..., here]
+    return rows

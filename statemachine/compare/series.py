@@ -74,7 +74,7 @@ def series(one: Trace, two: Trace, tip: str | None = None) -> list[Series]:
         two: Another, of a model with the same names.
         tip: The site to compare; by default `default_tip`.
     """
-    common = common_moments(one, two)
+    common = common_moments(one.time, two.time, (one.timestep, two.timestep))
     time, sides = common.time, ((one, common.one), (two, common.two))
     found: list[Series] = []
     theirs = two.header.joint_labels
@@ -227,7 +227,7 @@ def touches(one: Trace, two: Trace) -> tuple[Touch, ...]:
     """Every pair of bodies that touches on either side; none if a trace does not tell."""
     if "contact_row" not in one or "contact_row" not in two:
         return ()
-    until = float(common_moments(one, two).time[-1])
+    until = float(common_moments(one.time, two.time, (one.timestep, two.timestep)).time[-1])
     sides = [_of(trace, until) for trace in (one, two)]
     sides[1] = same_pairs(*sides)
     never = Contact(None, None, 0.0, 0.0, False, 0.0, 0.0, 0.0)

@@ -59,7 +59,7 @@ class StageGroup:
             return np.ones(len(one))
         both = np.concatenate([one, two], axis=1).reshape(len(one), -1, self.size)
         if self.size == 3:
-            return np.array([np.linalg.norm(reach) for reach in np.ptp(both, axis=1)])
+            return np.array([float(np.linalg.norm(reach)) for reach in np.ptp(both, axis=1)])
         return np.nanmax(np.abs(both[:, :, 0]), axis=1, initial=0.0)
 
 

@@ -267,4 +267,4 @@ def _depths(touches: Array) -> Array:
 
 def _pushes(touches: Array) -> Array:
     """How long the forces are (n, p) [N], of depths and forces (n, p, 4)."""
-    return np.array([[np.linalg.norm(each[1:]) for each in moment] for moment in touches])
+    return np.array([[float(np.linalg.norm(t[1:])) for t in moment] for moment in touches])

@@ -17,7 +17,7 @@ from ..errors import (
     unknown_name,
 )
 from ..installed import DEFAULT
-from ..interface import Array, Model
+from ..interface import Model
 from ..measures import common_moments
 from ..measures.text import command, milliseconds
 from ..runs import Trace, model_file, play, read, record_scenario, shipped
@@ -37,14 +37,6 @@ from .perturbed import Rerun
 from .sides import Request, Side, is_trace
 
 Loop = Literal["the same", "its own", "recorded", "more than ctrl"]
-
-
-@dataclass(frozen=True, eq=False)
-class _Clock:
-    """When the rows of a run will be."""
-
-    time: Array
-    timestep: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,12 +171,9 @@ def _matched(one: Model, two: Model, left: Side, right: Side, request: Request) 
 def _check_moments(models: list[Model], seconds: float) -> None:
     """Raise TraceError, before anything runs, where the timesteps hardly ever meet."""
     steps = [model.timestep for model in models]
-    one, two = (
-        _Clock(np.arange(0.0, steps_in(model, seconds) + 1) * model.timestep, model.timestep)
-        for model in models
-    )
+    one, two = (np.arange(0.0, steps_in(m, seconds) + 1) * m.timestep for m in models)
     try:
-        common_moments(one, two)
+        common_moments(one, two, (steps[0], steps[1]))
     except TraceError as error:
         raise TraceError(
             f"{error}; of a side: timestep={steps[0]:.15g} behind the right, or "

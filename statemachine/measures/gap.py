@@ -128,7 +128,7 @@ def joint_gap(
         joints = np.flatnonzero(kinds == int(kind))
         if len(joints):
             apart = np.abs(one[places[joints]] - two[places[joints]])
-            return Gap.of(apart, unit, [names[joint] for joint in joints])
+            return Gap.of(apart, unit, [names[joint] for joint in joints.tolist()])
     return None
 
 

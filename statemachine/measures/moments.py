@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -12,20 +11,6 @@ from ..interface import Array, Ints
 
 SAME = 1e-6  # of a timestep: two moments nearer than this are one
 _FEW = 20  # common moments below which a comparison says nothing
-
-
-class Sampled(Protocol):
-    """A run as rows of one moment each, as a Trace."""
-
-    @property
-    def time(self) -> Array:
-        """(n,) ascending [s]."""
-        ...
-
-    @property
-    def timestep(self) -> float:
-        """Simulated time between two rows [s]."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,22 +27,27 @@ class Common:
     two: Ints
 
 
-def common_moments(one: Sampled, two: Sampled) -> Common:
+def common_moments(one: Array, two: Array, steps: tuple[float, float]) -> Common:
     """Rows of the same moment: nothing is interpolated.
 
     Timesteps of 1/200 and 1/240 s meet every 25 ms; what happens between is left out.
 
+    Args:
+        one: (n,) ascending, when the rows of a run are [s]; two: those of the other.
+        two: See one.
+        steps: The timesteps of both [s].
+
     Raises:
         TraceError: They share too few moments.
     """
-    times = [run.time - run.time[0] for run in (one, two)]
+    times = [time - time[0] for time in (one, two)]
     near = nearest(times[1], times[0])
     # A time is a sum of timesteps: its rounding grows with their number.
-    slack = SAME * min(one.timestep, two.timestep) + 1e-12 * np.arange(len(times[0]))
+    slack = SAME * min(steps) + 1e-12 * np.arange(len(times[0]))
     rows = np.flatnonzero(np.abs(times[1][near] - times[0]) <= slack)
     if len(rows) < min(_FEW, *map(len, times)):
         raise TraceError(
-            f"timesteps of {one.timestep:g} and {two.timestep:g} s have only {len(rows)} moments "
+            f"timesteps of {steps[0]:g} and {steps[1]:g} s have only {len(rows)} moments "
             "in common: record one of them with the other's timestep"
         )
     return Common(times[0][rows], rows, near[rows])

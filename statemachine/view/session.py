@@ -74,9 +74,8 @@ class LiveSession:
         self.tip = "" if self._site is None else first.site_names[self._site]
         start = None if keyframe is None else first.key_id(keyframe)
         self._arms: list[tuple[Model, Data]] = []
-        self._poses: tuple[EnginePose, ...] = ()
-        self._gap: Separation | None = None
-        self._time = 0.0
+        # The last moment that was good: its time, the poses, how far apart they are.
+        self._good: tuple[float, tuple[EnginePose, ...], Separation | None] = 0.0, (), None
         self._running, self._trouble, self._steps, self._resets = False, "", 0, 0
         try:
             for model in models:
@@ -136,14 +135,15 @@ class LiveSession:
         """
         if not self._trouble:
             self._look()
+        time, poses, gap = self._good
         return Snapshot(
-            time=self._time,
+            time=time,
             steps=self._steps,
             running=self._running,
             ctrl=np.array(self._arms[0][1].ctrl),
             resets=self._resets,
-            poses=self._poses,
-            gap=self._gap,
+            poses=poses,
+            gap=gap,
             trouble=self._trouble,
         )
 
@@ -157,14 +157,12 @@ class LiveSession:
                 return
             tip = None if self._site is None else np.array(data.site_xpos[self._site])
             poses.append(EnginePose(model.backend, np.array(data.xpos), np.array(data.xquat), tip))
-        self._poses = tuple(poses)
-        model, data = self._arms[0]
-        self._time = data.time
-        if len(self._arms) > 1:
-            both = data.qpos, self._arms[1][1].qpos
-            self._gap = separation(
-                model.joint_names, model.jnt_type, model.jnt_qposadr, both, poses
-            )
+        (model, first), *others = self._arms
+        gap = None
+        if others:
+            both = first.qpos, others[0][1].qpos
+            gap = separation(model.joint_names, model.jnt_type, model.jnt_qposadr, both, poses)
+        self._good = first.time, tuple(poses), gap
 
     def _reset(self, keyframe: int | None) -> None:
         if keyframe is not None and not 0 <= keyframe < len(self.places):

@@ -52,7 +52,8 @@ class Ruler:
         if matched is None and (model.nq, model.joint_names) != (two.header.nq, two.header.joints):
             raise BadInputError("the two models have other joints: there is nothing to attribute")
         try:
-            self.between, self.time = False, common_moments(one, two).time
+            self.between = False
+            self.time = common_moments(one.time, two.time, (one.timestep, two.timestep)).time
         except TraceError:  # too few: rows of the second are made up between its own
             time, end = one.time - one.time[0], two.time[-1] - two.time[0]
             slack = SAME * one.header.timestep

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 
@@ -37,49 +37,14 @@ class Change:
 Changes = Mapping[str, Change]
 
 
-class AdjustableSide(Protocol):
-    """A side that `attribute` can build with other settings.
+class ModelSide:
+    """Any Model: changed by `replace`, and by its compiled model where `raw` is one.
 
     Attributes:
         label: What it is, in words.
         makes: What makes its motion: two sides that say the same treat equal settings alike.
         fresh: Whether it has settings of its engine's own.
     """
-
-    label: str
-    makes: str
-    fresh: bool
-
-    def values(self, factor: Factor, changes: Changes) -> Values | None:
-        """What it has of a factor, as it comes; None if it has no such thing."""
-        ...
-
-    def words(self, factor: Factor) -> str:
-        """The same in a few words."""
-        ...
-
-    def refuses(self, factor: Factor, how: How, values: Values, changes: Changes) -> str:
-        """Why a change cannot be made on top of others; "" if it can."""
-        ...
-
-    def without(self, factor: Factor, changes: Changes) -> Changes:
-        """Changes without that of a factor, and without those that need it."""
-        ...
-
-    def build(self, changes: Changes) -> Model:
-        """The Model with these changes."""
-        ...
-
-
-def side_of(model: Model, options: Mapping[str, Any]) -> AdjustableSide:
-    """The side of a Model, in an experiment with some options."""
-    own: DialsPart | None = part(model.backend, "dials")
-    dials = own.dials(model, options) if own else None
-    return EngineSide(model, options, dials) if dials else ModelSide(model, options)
-
-
-class ModelSide:
-    """Any Model: changed by `replace`, and by its compiled model where `raw` is one."""
 
     fresh = False
 
@@ -89,6 +54,7 @@ class ModelSide:
         self.label = self.makes = f"{model.backend} {model.engine_version}"
 
     def values(self, factor: Factor, changes: Changes) -> Values | None:
+        """What it has of a factor, as it comes; None if it has no such thing."""
         model = self._as_it_comes
         found = {name: getattr(model, name) for name in factor.facts}
         for name in factor.raw:
@@ -99,11 +65,13 @@ class ModelSide:
         return found if on is None else {**found, "on": on}
 
     def words(self, factor: Factor) -> str:
+        """The same in a few words."""
         if self._options.get(factor.options[0] if factor.options else "", True) is False:
             return "off"
         return _in_words(factor, self.values(factor, {}) or {})
 
     def refuses(self, factor: Factor, how: How, values: Values, changes: Changes) -> str:
+        """Why a change cannot be made on top of others; "" if it can."""
         known = self._as_it_comes.capabilities.options
         missing = [name for name in factor.options if name not in known]
         if how == "off":
@@ -135,9 +103,11 @@ class ModelSide:
         return ""
 
     def without(self, factor: Factor, changes: Changes) -> Changes:
+        """Changes without that of a factor, and without those that need it."""
         return {name: change for name, change in changes.items() if name != factor.name}
 
     def build(self, changes: Changes) -> Model:
+        """The Model with these changes."""
         model, options = self._base, dict[str, Any]()
         for name, change in changes.items():
             factor = FACTORS[name]
@@ -240,12 +210,19 @@ class EngineSide:
         return self._dials.build(settings, values)
 
 
+AdjustableSide = ModelSide | EngineSide  # a side that `attribute` can build with other settings
+
+
+def side_of(model: Model, options: Mapping[str, Any]) -> AdjustableSide:
+    """The side of a Model, in an experiment with some options."""
+    own: DialsPart | None = part(model.backend, "dials")
+    dials = own.dials(model, options) if own else None
+    return EngineSide(model, options, dials) if dials else ModelSide(model, options)
+
+
 def same(one: Any, two: Any) -> bool:
     """Whether two values are equal, entry by entry; NaN is equal to NaN."""
-    one, two = np.asarray(one), np.asarray(two)
-    if one.shape != two.shape:
-        return False
-    return bool(np.array_equal(one, two, equal_nan=one.dtype.kind == "f"))
+    return bool(np.array_equal(one, two, equal_nan=np.asarray(one).dtype.kind == "f"))
 
 
 def _switched_on(model: Model, factor: Factor) -> bool | None:

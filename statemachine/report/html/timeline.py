@@ -47,7 +47,7 @@ def frames_of(one: Trace, two: Trace, must: tuple[float, ...] = (), most: int = 
         must: Moments that have to be among them [s].
         most: How many others there may be.
     """
-    common = common_moments(one, two)
+    common = common_moments(one.time, two.time, (one.timestep, two.timestep))
     n = len(common.time)
     spacing = float(common.time[-1]) / max(1, n - 1)
     steps = one.header.timestep, two.header.timestep
