@@ -26,7 +26,7 @@ from statemachine.report import model_diff
 from statemachine.report.as_json import dumps
 from statemachine.rotations import angle_between
 
-from .conftest import Cli, need_engine, one_line
+from .conftest import Cli, one_line
 from .two_arms import mjcf, urdf
 
 Pair = Callable[..., tuple[Path, Path]]
@@ -542,8 +542,8 @@ def test_deep_and_large_files_end_soon(tmp_path: Path) -> None:
         read(path)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_what_the_engines_make_of_a_urdf() -> None:
-    need_engine("pybullet")
     path = models_dir() / "so101" / "so101.urdf"
     found = _differ(compare(path, path, engines=("mujoco", "pybullet")))
     said = {(d.subject, d.figure): (d.one, d.two) for d in found}
@@ -713,8 +713,8 @@ def test_an_effort_of_a_servo_is_what_it_can_exert(tmp_path: Path) -> None:
     assert found["gear"].size == 1.0
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_floor_is_there_on_both_engines() -> None:
-    need_engine("pybullet")
     sides = [read("so101/scene", engine) for engine in ("mujoco", "pybullet")]
     for robot in sides:
         (world,) = (link for link in robot.links if not link.parent)

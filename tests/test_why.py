@@ -278,11 +278,6 @@ def test_a_run_that_diverges_is_said(arm: Model) -> None:
 # PyBullet
 
 
-@pytest.fixture
-def bullet() -> None:
-    need_engine("pybullet")
-
-
 def quietly(name: str, **options: Any) -> Model:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", EngineWarning)
@@ -304,6 +299,27 @@ def path_of(model: Model, experiment: Scenario) -> np.ndarray:
     return np.array(rows)
 
 
+def dialled(name: str = "so101/scene", options: Any = None) -> tuple[Any, Any]:
+    """PyBullet as it comes, and its dials."""
+    from statemachine.engines.pybullet.dials import dials
+
+    fresh = quietly(name, defaults="engine")
+    found = dials(fresh, options or {})
+    assert found
+    return fresh, found
+
+
+def motors_off(world: Any) -> None:
+    """PyBullet's own motors do nothing any more."""
+    import pybullet as pb
+
+    for tree in world.trees:
+        for joint in tree.joints:
+            pb.setJointMotorControl2(
+                tree.body, joint, pb.VELOCITY_CONTROL, force=0, physicsClientId=world.client
+            )
+
+
 SETTINGS = [name for name in FACTORS if name not in ("integrator", "contact")]
 
 
@@ -323,9 +339,7 @@ def test_the_ends_of_the_dials_are_the_two_models(name: str) -> None:
     from statemachine.engines.pybullet.dials import dials
 
     experiment = replace(scenario(name), seconds=0.7)
-    fresh = quietly(experiment.model, defaults="engine")
-    found = dials(fresh, experiment.options)
-    assert found
+    fresh, found = dialled(experiment.model, experiment.options)
     raw = fresh.replace(**experiment.options)
     np.testing.assert_array_equal(
         path_of(found.build({}, {}), experiment), path_of(raw, experiment)
@@ -341,12 +355,9 @@ def test_as_it_comes_is_what_a_user_of_pybullet_gets(tmp_path: Path) -> None:
     """Bit for bit the run of a script that knows nothing of this library but the URDF."""
     import pybullet as pb
 
-    from statemachine.engines.pybullet.dials import dials
     from statemachine.runs.scenarios import TARGET
 
-    fresh = quietly("so101/scene", defaults="engine")
-    found = dials(fresh, {})
-    assert found
+    fresh, found = dialled()
     ours = path_of(found.build({}, {}), HOLD)
     file = tmp_path / "arm.urdf"
     file.write_text(fresh.raw["base"])
@@ -378,10 +389,8 @@ def test_with_everything_dialled_off_the_engines_agree() -> None:
     """
     from statemachine.engines.pybullet import dials as module
 
-    fresh = quietly("so101/scene", defaults="engine")
     limp = {"actuation": False}
-    found = module.dials(fresh, limp)
-    assert found
+    _, found = dialled(options=limp)
     bare = {**limp, "timestep": 1e-3, "armature": 0, "frictionloss": 0, "damping": 0}
     one = sm.load("so101/scene").replace(**bare, contacts=False, limits=False)
     values = {**values_of(one), "damping": np.zeros(one.nv)}
@@ -399,25 +408,12 @@ def test_with_everything_dialled_off_the_engines_agree() -> None:
 
     def apart(names: dict[str, Any]) -> float:
         model = found.build(names, values).replace(timestep=one.timestep)
-        model = module._dialled(model, [*model_acts(found.build(names, values)), motors_off])
+        acts = getattr(found.build(names, values), "_acts", ())
+        model = module._dialled(model, [*acts, motors_off])
         try:
             return float(np.abs(path_of(model, experiment) - wanted).max())
         except DivergedError:
             return np.inf
-
-    def model_acts(model: Any) -> tuple[Any, ...]:
-        return getattr(model, "_acts", ())
-
-    def motors_off(world: Any) -> None:
-        for tree in world.trees:
-            for joint in tree.joints:
-                module.pb.setJointMotorControl2(
-                    tree.body,
-                    joint,
-                    module.pb.VELOCITY_CONTROL,
-                    force=0,
-                    physicsClientId=world.client,
-                )
 
     assert apart(every) < 1e-9
     for name in ("gravity", "inertia", "damping", "limits", "contact"):
@@ -435,16 +431,10 @@ def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
     raw = fresh._shared.raw  # pyright: ignore[reportAttributeAccessIssue]
 
     def limp(world: Any) -> None:
+        motors_off(world)
         for tree in world.trees:
             for joint in tree.joints:
                 module._change(world, tree.body, joint, jointDamping=0.05)
-                module.pb.setJointMotorControl2(
-                    tree.body,
-                    joint,
-                    module.pb.VELOCITY_CONTROL,
-                    force=0,
-                    physicsClientId=world.client,
-                )
 
     own = {
         "damping": lambda w: module._set_damping(w, module.BODY_DAMPING, np.full(raw.nv, 0.05)),
@@ -480,7 +470,6 @@ def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
 @pytest.mark.usefixtures("bullet")
 def test_links_of_one_robot_meet_where_the_setting_says_so(arm: Model) -> None:
     """In a pose in which the arm is in its own way, by MuJoCo."""
-    from statemachine.engines.pybullet.dials import dials
 
     def own_ways(model: Model, qpos: np.ndarray, run: Any) -> int:
         with sm.make_data(model) as data:
@@ -492,9 +481,7 @@ def test_links_of_one_robot_meet_where_the_setting_says_so(arm: Model) -> None:
     random = np.random.default_rng(3)
     poses = (random.uniform(*arm.jnt_range.T) for _ in range(200))
     pose = next(pose for pose in poses if own_ways(arm, pose, sm.forward) > 2)
-    fresh = quietly("so101/scene", defaults="engine")
-    found = dials(fresh, {})
-    assert found
+    fresh, found = dialled()
     rest = {name: "model" for name in SETTINGS if name != "surfaces"}
     values = values_of(arm)
     own: Any = found.build(rest, values)  # pyright: ignore[reportArgumentType]
@@ -508,11 +495,7 @@ def test_as_it_comes_has_the_engines_figures_in_the_emulated_world() -> None:
     """Read back from the engine: friction, masses, inertias, timestep and gravity."""
     import pybullet as pb
 
-    from statemachine.engines.pybullet.dials import dials
-
-    fresh = quietly("so101/scene", defaults="engine")
-    found = dials(fresh, {})
-    assert found
+    fresh, found = dialled()
     model: Any = found.build({"servo": "model"}, {})
 
     def figures(world: Any) -> dict[int, tuple[Any, ...]]:
@@ -541,14 +524,10 @@ def test_as_it_comes_has_the_engines_figures_in_the_emulated_world() -> None:
 @pytest.mark.parametrize("name", SETTINGS)
 def test_each_dial_acts_on_the_emulated_side(name: str) -> None:
     """All settings the model's, one as the engine comes: the run is another one."""
-    from statemachine.engines.pybullet.dials import dials
-
     experiment = {"limits": FALL, "surfaces": replace(scenario("gravity"), seconds=0.8)}.get(
         name, HOLD
     )
-    fresh = quietly("so101/scene", defaults="engine")
-    found = dials(fresh, experiment.options)
-    assert found
+    fresh, found = dialled(options=experiment.options)
     emulated = quietly("so101/scene").replace(**experiment.options)
     rest = {each: "model" for each in SETTINGS if each != name}
     if name == "servo":
@@ -563,11 +542,7 @@ def test_each_dial_acts_on_the_emulated_side(name: str) -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_dials_outlive_a_reset() -> None:
-    from statemachine.engines.pybullet.dials import dials
-
-    fresh = quietly("so101/scene", defaults="engine")
-    found = dials(fresh, {})
-    assert found
+    fresh, found = dialled()
     model = found.build({"inertia": "model"}, {})
     first = path_of(model, HOLD)
     assert (first != path_of(fresh, HOLD)).any()
@@ -587,9 +562,7 @@ def test_a_dial_that_does_not_act_is_noticed(monkeypatch: pytest.MonkeyPatch) ->
     from statemachine.engines.pybullet import dials as module
     from statemachine.errors import EngineError
 
-    fresh = quietly("so101/scene", defaults="engine")
-    found = module.dials(fresh, {})
-    assert found
+    _, found = dialled()
     monkeypatch.setattr(module, "_change", lambda *_a, **_k: None)
     for name in ("inertia", "surfaces"):
         with pytest.raises(EngineError, match="did not take"):
@@ -718,9 +691,9 @@ def test_two_engines_as_they_come_differ_by_what_was_set() -> None:
 # The command
 
 
+@pytest.mark.usefixtures("bullet")
 @pytest.mark.slow
 def test_the_command(cli: Cli) -> None:
-    need_engine("pybullet")
     done = cli("compare", "hold", "--why", "--seconds", "0.5")
     assert done.returncode == 0, done.stderr
     assert not done.stderr

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..measures import SAME, Common
-from ..measures.text import milliseconds, numbers, significant
+from ..measures.text import few, milliseconds, numbers, significant
 from ..runs import Header, Trace
 from .series import joint_columns, tell
 
@@ -54,6 +54,20 @@ def labels_of(one: Header, two: Header) -> Labels:
     parts = [*([engines] if engines[0] != engines[1] or not others else []), *others]
     long = ", ".join(part[0] for part in parts), ", ".join(part[1] for part in parts)
     return Labels(_numbered(long), _numbered(short))
+
+
+def lacking(only: Sequence[Mapping[str, Sequence[str]]], labels: Two) -> Iterator[str]:
+    """A line for a side that has what the other has not: names by kind, as in `Matched.only`."""
+    for own, label in zip(only, labels, strict=True):
+        parts = [
+            # Where the other side has some over, too, they may be the same.
+            f"{kind}{'s' * (len(names) > 1)} {few(names, 6)}"
+            + " (--map LEFT=RIGHT)" * all(each.get(kind) for each in only)
+            for kind, names in own.items()
+            if names
+        ]
+        if parts:
+            yield f"only {label} has {'; '.join(parts)}: not compared"
 
 
 def files_apart(one: Sequence[str], two: Sequence[str]) -> Two:

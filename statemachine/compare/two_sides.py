@@ -31,7 +31,7 @@ from .alike import (
     same_commands,
     told_alike,
 )
-from .labels import files_apart, labels_of
+from .labels import files_apart, labels_of, lacking
 from .matching import Matched, match_models, start_of
 from .perturbed import Rerun
 from .sides import Request, Side, is_trace
@@ -77,15 +77,7 @@ class SidesRun:
         if self.matched is None:
             return ()
         labels = labels_of(self.left.header, self.right.header).long
-        lines = []
-        for only, label in zip(self.matched.only, labels, strict=True):
-            told = [
-                f"{kind}{'s' * (len(names) > 1)} {', '.join(names)}"
-                for kind, names in only.items()
-                if names
-            ]
-            if told:
-                lines.append(f"only {label} has {'; '.join(told)}: not compared")
+        lines = [*lacking(self.matched.only, labels)]
         if any(only.get("joint") for only in self.matched.only):
             lines.append("the energy is not compared, for it is of all that can move")
         return (*lines, *self.matched.notes)
