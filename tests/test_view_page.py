@@ -182,7 +182,7 @@ def test_run_pause_step_and_reset(stage: Stage) -> None:
     speed = stage.tab.locator("input[inputmode=decimal]").nth(1)
     for factor in ("0.5", "1"):
         speed.fill(factor)
-        stage.until(lambda wanted=float(factor): stage.live.speed == wanted)
+        stage.until(lambda wanted=float(factor): stage.live._pacer.speed == wanted)
     stage.press("Reset")
     stage.until(lambda: session.frame().steps == 0)
     stage.tab.nothing_wrong(*KNOWN)
