@@ -141,8 +141,7 @@ def test_a_side_is_read_as_it_is_typed(files: Path) -> None:
         {"gravity": [0.0, 0.0, -1.0]},
     ]
     assert sides[1].label == "arm.xml@mujoco timestep=0.001 contacts=off"
-    model = sides[1].load()
-    assert model.timestep == 0.001
+    assert sides[1].load().timestep == 0.001
     assert parse_sides(["so101 substeps=2 integrator=euler"])[0].load().substeps == 2
 
 
@@ -476,8 +475,7 @@ def test_a_recorded_run_is_played_on_both(files: Path) -> None:
     run = run_sides(Request((str(path),), sides=sides))
     assert run.commands == "recorded"
     for trace in (run.left, run.right):
-        joints = trace.header.joints
-        assert trace.qpos[0, joints.index("shoulder")] == 0.1
+        assert trace.qpos[0, trace.header.joints.index("shoulder")] == 0.1
         told = dict(zip(trace.header.actuators, trace.ctrl[0], strict=True))
         assert told == {"shoulder": 0.3, "elbow": -0.2}
     same = run_sides(Request((str(path),), sides=(Side(str(files / "arm.xml")),) * 2))

@@ -222,8 +222,7 @@ def test_rounded_figures_are_equal_and_the_largest_is_stated(tmp_path: Path, dig
     (tmp_path / "rounded.urdf").write_text(rounded)
     result = compare(tmp_path / "rounded.urdf", models_dir() / "so101" / "so101.urdf")
     assert result.equal, _differ(result)
-    worst = min(each.digits for each in result.found.agreements)
-    assert digits - 2 <= worst <= digits + 1
+    assert digits - 2 <= min(each.digits for each in result.found.agreements) <= digits + 1
     assert max(each.worst for each in result.found.agreements) > 0
     strict = compare(
         tmp_path / "rounded.urdf", models_dir() / "so101" / "so101.urdf", digits=digits + 3
@@ -586,8 +585,7 @@ def test_the_command(cli: Cli, tmp_path: Path) -> None:
     assert same.returncode == 0, same.stderr
     assert "nothing differs that matters, to 6 digits" in same.stdout
     assert max(map(cell_len, same.stdout.splitlines())) <= 80
-    everything = cli("compare", "--models", "so101", "so101/scene_box", "--all")
-    assert everything.returncode == 1
+    assert cli("compare", "--models", "so101", "so101/scene_box", "--all").returncode == 1
     (tmp_path / "bad.urdf").write_text("<robot")
     for arguments, text in (
         (("--models", "so101", "bad.urdf"), "bad.urdf: it is no XML"),

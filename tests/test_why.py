@@ -99,8 +99,7 @@ def test_a_seeded_cause_is_found_and_no_other(arm: Model, name: str) -> None:
             assert (trial.way, trial.explains) == ("alike", 0.0), factor
     assert [trial.factor for trial in found.ladder] == [cause]
     assert found.left == found.unexplained == 0.0
-    page = report.page(found)
-    assert page.holds
+    assert report.page(found).holds
     assert FACTORS[cause].title in " ".join(report.conclusion(found))
 
 
@@ -132,8 +131,7 @@ def test_what_is_not_in_the_table_stays_unexplained(arm: Model) -> None:
     assert found.ladder == ()
     assert found.left == found.gap
     assert found.unexplained == 1.0
-    page = report.page(found)
-    assert not page.holds
+    assert not report.page(found).holds
     assert "none of" in " ".join(report.conclusion(found))
 
 
@@ -250,8 +248,7 @@ def test_what_is_held_is_what_it_is_about() -> None:
     assert found.first["box in the hand"].rms == pytest.approx(np.sqrt((apart**2).mean()))
     assert found.first["box in the hand"].at == traces[0].time[apart.argmax()] - traces[0].time[0]
     # The same box from the default pose lies on the floor, out of reach.
-    arm = attribute(one, two, replace(BOX, keyframe=None))
-    assert arm.quantity == "joints"
+    assert attribute(one, two, replace(BOX, keyframe=None)).quantity == "joints"
 
 
 def test_other_joints_are_refused(arm: Model) -> None:
@@ -628,7 +625,7 @@ def test_the_parts_are_said_to_be_of_one_order(attributions: Any) -> None:
     # The timestep put back, by hand: it acts on the engine's motors, not on the model's law.
     one = sm.load("so101/scene")
     two = sm.load("so101/scene", backend="pybullet").replace(timestep=1 / 240)
-    runs = [angles(model, 2.0, every) for model, every in ((one, 5), (two, 6))]
+    runs = [path_of(m, scenario("hold"))[::every] for m, every in ((one, 5), (two, 6))]
     by_hand = np.abs(runs[0] - runs[1]).max()
     assert alone["timestep"].put_back == pytest.approx(by_hand, rel=1e-6)
     assert ladder["timestep"].explains > 0.05
@@ -646,18 +643,6 @@ def test_the_parts_are_said_to_be_of_one_order(attributions: Any) -> None:
     (from_the_start,) = [line for line in emulated if "act from the start" in line]
     assert "surfaces" not in from_the_start
     assert "dry friction" in from_the_start
-
-
-def angles(model: Model, seconds: float, every: int) -> np.ndarray:
-    """The hold's joints, at every so many steps."""
-    control, rows = scenario("hold").controller(model, 0), []
-    with sm.make_data(model) as data:
-        for k in range(round(seconds / model.timestep) + 1):
-            if k % every == 0:
-                rows.append(np.array(data.qpos))
-            data.ctrl = control(data.time, data)
-            sm.step(model, data)
-    return np.array(rows)
 
 
 @pytest.mark.slow
