@@ -205,14 +205,13 @@ def _of_trace(
     progress: Progress,
 ) -> tuple[tuple[Trace, Trace], tuple[str, ...]]:
     """A recorded run's start and commands, on both sides."""
-    name = request.what[0]
     _refuse_of_run(request)
     theirs = for_left(trace, models[0], request)
     left, right = request.sides
     one = _played(theirs, models[0], options[0], left, part_of(progress, 0.0, 0.5))
     told = theirs if matched is None else in_terms_of_right(theirs, None, matched)
     two = _played(told, models[1], options[1], right, part_of(progress, 0.5, 0.5))
-    said = f"the ctrl of {name} was played on both sides, from the state it starts in"
+    said = f"the ctrl of {request.what[0]} was played on both sides, from the state it starts in"
     return (one, two), (said,)
 
 
@@ -348,7 +347,5 @@ def _of_traces(request: Request, progress: Progress) -> tuple[tuple[Trace, Trace
         options=options,
         progress=progress,
     )
-    said = (
-        f"the ctrl of {request.what[0]} was played on {others[0]}, from the state it starts in",
-    )
-    return (trace, played), said
+    said = f"the ctrl of {request.what[0]} was played on {others[0]}, from the state it starts in"
+    return (trace, played), (said,)
