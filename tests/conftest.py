@@ -136,6 +136,12 @@ def backend(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture
+def bullet() -> None:
+    """Only where PyBullet is."""
+    need_engine("pybullet")
+
+
+@pytest.fixture
 def pinocchio() -> None:
     """Only where the witness is."""
     need_engine("pinocchio")
@@ -174,7 +180,10 @@ def here(capsys: pytest.CaptureFixture[str]) -> Cli:
 
     def run(*arguments: object) -> subprocess.CompletedProcess[str]:
         words = [str(word) for word in arguments]
-        code = main(words)
+        try:
+            code = main(words)
+        except SystemExit as end:  # of argparse
+            code = int(end.code or 0)
         return subprocess.CompletedProcess(words, code, *capsys.readouterr())
 
     return run

@@ -223,8 +223,8 @@ def test_the_whole_force_of_a_contact_is_the_engines(box: Trace) -> None:
     assert touches(box, box)[0].one.total == pytest.approx(one[-len(box) // 10 :].mean(), rel=0.01)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_force_is_named_and_both_figures_are_given() -> None:
-    need_engine("pybullet")
     (one, two), _ = sides_of("hold")
     (touch,) = touches(one, two)
     found = report.page(compare(one, two), one, two)
@@ -237,8 +237,8 @@ def test_a_force_is_named_and_both_figures_are_given() -> None:
     assert total_forces(one)["gripper on floor"].max() == pytest.approx(383, abs=1)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_hold_ends_pressed_on_one_engine_and_free_on_the_other() -> None:
-    need_engine("pybullet")
     (one, two), _ = sides_of("hold")
     (touch,) = touches(one, two)
     assert touch.one.ends
@@ -352,8 +352,8 @@ def test_what_is_no_tolerance(word: str) -> None:
 # The engines, by what is known of them.
 
 
+@pytest.mark.usefixtures("bullet")
 def test_free_of_contact_the_engines_agree() -> None:
-    need_engine("pybullet")
     for name in ("droop", "fall", "waves"):
         (one, two), said = sides_of(name)
         found = compare(one, two)
@@ -364,8 +364,8 @@ def test_free_of_contact_the_engines_agree() -> None:
         assert max(joints) < np.radians(1e-6)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_hold_parts_when_the_finger_meets_the_floor() -> None:
-    need_engine("pybullet")
     (one, two), _ = sides_of("hold")
     found = by_name(compare(one, two))
     assert found["gripper on floor, first touch"].verdict == "agrees"
@@ -378,8 +378,8 @@ def test_the_hold_parts_when_the_finger_meets_the_floor() -> None:
     assert max(c.difference[c.time < touch].max() for c in before) < np.radians(1e-6)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_engine_as_its_users_meet_it_is_far_off() -> None:
-    need_engine("pybullet")
     (one, two), _ = sides_of(Request(("hold",), defaults="engine"))
     found = compare(one, two)
     # FINDINGS: POSITION_CONTROL is 13 to 41 degrees off in the transient, at 5 ms.
@@ -389,8 +389,8 @@ def test_the_engine_as_its_users_meet_it_is_far_off() -> None:
     assert "timesteps differ" in notes
 
 
+@pytest.mark.usefixtures("bullet")
 def test_one_trace_is_played_on_the_other_engine(tmp_path: Any) -> None:
-    need_engine("pybullet")
     path = write(traced("waves", seed=2), tmp_path / "waves.npz")
     (one, two), said = sides_of(Request((str(path),)))
     assert (one.header.backend, two.header.backend) == ("mujoco", "pybullet")
@@ -464,8 +464,8 @@ def test_the_help_knows_the_experiments() -> None:
     assert tuple(SCENARIOS) == tuple(EXPERIMENTS)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_command(cli: Cli) -> None:
-    need_engine("pybullet")
     done = cli("compare", "hold")
     assert (done.returncode, done.stderr) == (1, "")
     assert max(map(len, done.stdout.splitlines())) <= 80
@@ -521,9 +521,9 @@ size="1 1 .1"/><body name="$\\frac{" pos="0 0 1"><joint name="$x^$_$" type="slid
 axis="0 0 1"/><geom size=".1"/><site name="a$b$c"/></body></worldbody></mujoco>"""
 
 
+@pytest.mark.usefixtures("bullet")
 @pytest.mark.parametrize("form", ["html", "plot"])
 def test_a_robot_that_stands_still_agrees_with_itself(form: str, cli: Cli, tmp_path: Path) -> None:
-    need_engine("pybullet")
     (tmp_path / "still.xml").write_text(_STILL)
     out = tmp_path / ("a.html" if form == "html" else "a.svg")
     done = cli("compare", "fall", "--model", tmp_path / "still.xml", f"--{form}", out)

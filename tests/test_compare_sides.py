@@ -11,8 +11,10 @@ import pytest
 
 import statemachine as sm
 from statemachine.compare import (
+    Comparison,
     Request,
     Side,
+    SidesRun,
     compare,
     labels_of,
     parse_sides,
@@ -113,6 +115,12 @@ def asked(what: str, left: Side, right: Side, **others: Any) -> Request:
     return Request((what,), sides=(left, right), seconds=others.pop("seconds", 0.4), **others)
 
 
+def ran(what: str, left: Side, right: Side, **others: Any) -> tuple[SidesRun, Comparison]:
+    """Two sides, run and compared."""
+    run = run_sides(asked(what, left, right, **others))
+    return run, compare(run.left, run.right)
+
+
 def largest(found: Any) -> float:
     return max(each.max for each in found.agreements)
 
@@ -133,8 +141,7 @@ def test_a_side_is_read_as_it_is_typed(files: Path) -> None:
         {"gravity": [0.0, 0.0, -1.0]},
     ]
     assert sides[1].label == "arm.xml@mujoco timestep=0.001 contacts=off"
-    model = sides[1].load()
-    assert model.timestep == 0.001
+    assert sides[1].load().timestep == 0.001
     assert parse_sides(["so101 substeps=2 integrator=euler"])[0].load().substeps == 2
 
 
@@ -176,16 +183,14 @@ def test_identical_sides_differ_by_nothing_at_all(files: Path) -> None:
     for engine in ("mujoco", "pybullet"):
         need_engine(engine)
         side = Side(str(files / "arm.xml"), engine)
-        run = run_sides(asked("hold", side, side))
-        found = compare(run.left, run.right)
+        run, found = ran("hold", side, side)
         assert largest(found) == 0
         assert (run.commands, run.is_apart, run.unmatched) == ("the same", False, ())
         assert (found.one.short, found.two.short) == (f"{engine} (first)", f"{engine} (second)")
 
 
 def test_two_files_on_one_engine(files: Path) -> None:
-    run = run_sides(asked("hold", Side(str(files / "arm.xml")), Side(str(files / "heavy.xml"))))
-    found = compare(run.left, run.right)
+    run, found = ran("hold", Side(str(files / "arm.xml")), Side(str(files / "heavy.xml")))
     assert (found.one.label, found.two.label) == ("arm.xml", "heavy.xml")
     assert largest(found) > 0.01
     assert run.commands == "the same"  # the left's, told to both
@@ -194,8 +199,7 @@ def test_two_files_on_one_engine(files: Path) -> None:
 def test_one_file_with_two_sets_of_options(files: Path) -> None:
     arm = str(files / "arm.xml")
     sides = Side(arm, options={"damping": 0.3}), Side(arm, options={"damping": 0.1})
-    run = run_sides(asked("hold", *sides))
-    found = compare(run.left, run.right)
+    run, found = ran("hold", *sides)
     assert (found.one.label, found.two.label) == ("damping=0.3", "damping=0.1")
     assert largest(found) > 0.01
     # What only one says is told of the other, too, where that is known.
@@ -206,18 +210,16 @@ def test_one_file_with_two_sets_of_options(files: Path) -> None:
     )
 
 
+@pytest.mark.usefixtures("bullet")
 def test_one_file_on_two_engines(files: Path) -> None:
-    need_engine("pybullet")
     arm = str(files / "arm.xml")
-    run = run_sides(asked("hold", Side(arm), Side(arm, "pybullet")))
-    found = compare(run.left, run.right)
+    _, found = ran("hold", Side(arm), Side(arm, "pybullet"))
     assert found.agrees
     assert (found.one.short, found.two.short) == ("mujoco", "pybullet")
-    as_it_comes = run_sides(
-        asked("hold", Side(arm, options={"timestep": 1 / 240}), Side(arm, "pybullet", "engine"))
-    )
-    assert not compare(as_it_comes.left, as_it_comes.right).agrees
-    assert as_it_comes.right.header.label.endswith("engine defaults")
+    as_it_comes = Side(arm, "pybullet", "engine")
+    run, found = ran("hold", Side(arm, options={"timestep": 1 / 240}), as_it_comes)
+    assert not found.agrees
+    assert run.right.header.label.endswith("engine defaults")
 
 
 def test_timesteps_that_hardly_meet_are_refused_before_anything_runs(files: Path) -> None:
@@ -227,16 +229,14 @@ def test_timesteps_that_hardly_meet_are_refused_before_anything_runs(files: Path
         run_sides(asked("hold", *sides, seconds=0.1))
 
 
+@pytest.mark.usefixtures("bullet")
 def test_two_files_on_two_engines(files: Path) -> None:
-    need_engine("pybullet")
     sides = Side(str(files / "arm.xml")), Side(str(files / "heavy.xml"), "pybullet")
-    run = run_sides(asked("hold", *sides))
-    found = compare(run.left, run.right)
+    _, found = ran("hold", *sides)
     assert found.one.label.startswith("mujoco ")
     assert found.one.label.endswith(", arm.xml")
     assert found.two.label.endswith(", heavy.xml")
-    same = run_sides(asked("hold", Side(str(files / "heavy.xml")), sides[1]))
-    assert compare(same.left, same.right).agrees
+    assert ran("hold", Side(str(files / "heavy.xml")), sides[1])[1].agrees
     assert not found.agrees
 
 
@@ -265,21 +265,19 @@ def test_the_shortest_path_that_tells_two_files_apart(files: Path) -> None:
 
 
 def test_permuted_joints_and_actuators_are_the_same_robot(files: Path) -> None:
-    run = run_sides(asked("waves", Side(str(files / "arm.xml")), Side(str(files / "turned.xml"))))
+    arm, turned = Side(str(files / "arm.xml")), Side(str(files / "turned.xml"))
+    run, found = ran("waves", arm, turned)
     assert run.right.header.actuators == ("shoulder", "elbow")
-    found = compare(run.left, run.right)
     assert largest(found) < 1e-12
     assert not [note for note in found.notes if "actuators" in note or "commands" in note]
-    back = run_sides(asked("waves", Side(str(files / "turned.xml")), Side(str(files / "arm.xml"))))
-    assert largest(compare(back.left, back.right)) < 1e-12
+    assert largest(ran("waves", turned, arm)[1]) < 1e-12
 
 
 def test_renamed_joints_are_matched_by_place_and_by_a_map(files: Path) -> None:
     sides = Side(str(files / "arm.xml")), Side(str(files / "renamed.xml"))
     names = {"shoulder": "Gelenk_1", "elbow": "Gelenk_2"}
     for given in ({}, names):
-        run = run_sides(asked("hold", *sides, names=given))
-        found = compare(run.left, run.right)
+        run, found = ran("hold", *sides, names=given)
         assert largest(found) == 0
         assert {"shoulder", "elbow"} <= {each.name for each in found.agreements}
         assert bool(run.unmatched) == (not given)  # a guess is said
@@ -288,8 +286,8 @@ def test_renamed_joints_are_matched_by_place_and_by_a_map(files: Path) -> None:
         run_sides(asked("hold", *sides, names={"elbow": "Gelenk_3"}))
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_tool_frame_that_the_right_calls_otherwise(files: Path, cli: Cli) -> None:
-    need_engine("pybullet")
     renamed = (files / "renamed.xml").read_text().replace("gripperframe", "tcp")
     (files / "renamed.xml").write_text(renamed)
     words = ("compare", "hold", "arm.xml", "renamed.xml@pybullet", "--seconds", "0.2", "--json")
@@ -313,11 +311,9 @@ def test_what_cannot_be_matched_is_said_first(
         "</worldbody>",
     ).replace('qpos=".2 -.3"', 'qpos=".2 -.3 1 0 1 1 0 0 0"')
     (files / "more.xml").write_text(extra)
-    run = run_sides(asked("hold", Side(str(files / "arm.xml")), Side(str(files / "more.xml"))))
+    run, found = ran("hold", Side(str(files / "arm.xml")), Side(str(files / "more.xml")))
     assert run.unmatched[0] == "only more.xml has joint ball: not compared"
-    found = compare(run.left, run.right)
-    page = report.page(found, run.left, run.right, run=run)
-    terminal.show(page)
+    terminal.show(report.page(found, run.left, run.right, run=run))
     out = " ".join(capsys.readouterr().out.split())
     assert out.index("Only more.xml has joint ball") < out.index("position servo")
     names = {each.name for each in found.agreements}
@@ -370,9 +366,9 @@ def test_what_is_mistyped_is_one_line(
 
 def test_a_function_sees_its_own_side(files: Path) -> None:
     what = f"{files / 'own.py'}:hold"
-    run = run_sides(asked(what, Side(str(files / "arm.xml")), Side(str(files / "turned.xml"))))
+    run, found = ran(what, Side(str(files / "arm.xml")), Side(str(files / "turned.xml")))
     assert run.left.ctrl[0].tolist() == [0.4, 0.0]
-    assert largest(compare(run.left, run.right)) < 1e-12
+    assert largest(found) < 1e-12
     assert run.left.header.experiment == "own.py:hold"
     assert run.commands == "the same"
 
@@ -479,8 +475,7 @@ def test_a_recorded_run_is_played_on_both(files: Path) -> None:
     run = run_sides(Request((str(path),), sides=sides))
     assert run.commands == "recorded"
     for trace in (run.left, run.right):
-        joints = trace.header.joints
-        assert trace.qpos[0, joints.index("shoulder")] == 0.1
+        assert trace.qpos[0, trace.header.joints.index("shoulder")] == 0.1
         told = dict(zip(trace.header.actuators, trace.ctrl[0], strict=True))
         assert told == {"shoulder": 0.3, "elbow": -0.2}
     same = run_sides(Request((str(path),), sides=(Side(str(files / "arm.xml")),) * 2))

@@ -13,7 +13,7 @@ from statemachine.errors import EndedEarlyError
 from statemachine.report.convergence import page
 from statemachine.runs import Trace, record, write
 
-from .conftest import Cli, need_engine, one_line
+from .conftest import Cli, one_line
 
 FALL = """<mujoco><option timestep="0.01" integrator="{integrator}">{flag}</option>
   <worldbody><body pos="0 0 {height}"><joint name="swing" axis="0 1 0" damping="0.02"/>
@@ -66,8 +66,7 @@ def test_a_changed_mass_stays(tmp_path: Path) -> None:
     found = found_of(tmp_path, {}, {"mass": "0.11"})
     assert {each.verdict for each in found.whole if each.kind == "joint"} == {"stays"}
     assert not found.vanishes
-    shown = page(found, "fall")
-    assert not shown.holds
+    assert not page(found, "fall").holds
     assert "does not vanish with the timestep" in headline(found)
 
 
@@ -109,9 +108,9 @@ def test_a_run_that_ends_early_is_no_limit(tmp_path: Path) -> None:
         convergence(run)
 
 
+@pytest.mark.usefixtures("bullet")
 @pytest.mark.slow
 def test_the_command_line_answers_both_questions(cli: Cli) -> None:
-    need_engine("pybullet")
     asked = ("compare", "fall", "--seconds", "0.3")
     done = cli(*asked, "--converge")
     assert done.returncode == 0

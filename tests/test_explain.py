@@ -12,7 +12,7 @@ from statemachine.compare.why import Explanation, explain
 from statemachine.compare.why.shapley import shapley
 from statemachine.runs.scenarios import scenario
 
-from .conftest import ROOT, need_engine
+from .conftest import ROOT
 from .explained import (
     ALONE,
     ARM,
@@ -336,9 +336,9 @@ ACROSS = ("mass", "gains", "damping", "gear", "place", "armature")
 FLOOR = '<geom name="floor" type="plane" size="2 2 0.1"/>'
 
 
+@pytest.mark.usefixtures("bullet")
 @pytest.mark.parametrize("name", ACROSS)
 def test_across_engines_the_file_is_told_from_the_engine(name, tmp_path):
-    need_engine("pybullet")
     bare = ARM.replace(FLOOR, "")
     case = ALONE[name]
     found = explained(
@@ -732,9 +732,9 @@ def test_no_command_leaves_ctrl_as_it_is_on_both_sides(tmp_path):
     assert explained(tmp_path, left, nothing, scenario=silent).is_rounding
 
 
+@pytest.mark.usefixtures("bullet")
 def test_detection_is_told_from_contact_at_equal_states():
     """As `--one-step` has it: which pairs each engine finds at the left's states, and how deep."""
-    need_engine("pybullet")
     from statemachine.compare import one_step
     from statemachine.compare.perturbed import rerun_of
     from statemachine.compare.why import attribute

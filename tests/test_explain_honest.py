@@ -10,8 +10,6 @@ import pytest
 
 from statemachine.cli import main
 
-from .conftest import need_engine
-
 ARM = """
 <mujoco model="arm"><option integrator="implicitfast"/><worldbody>
 <body name="a" pos="0 0 1"><joint name="j1" axis="0 1 0" damping="{damping}"/>
@@ -85,6 +83,7 @@ def asked(capsys: Any, *words: str) -> tuple[int, dict[str, Any]]:
     return code, json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.usefixtures("bullet")
 @pytest.mark.slow
 @pytest.mark.parametrize("sides", [("l.xml", "r.xml"), ("r.xml", "l.xml")])
 @pytest.mark.parametrize("of_the_engine", [0, 1])
@@ -92,7 +91,6 @@ def test_engine_settings_do_not_pay_for_another_file(
     folder: Path, capsys: Any, sides: tuple[str, str], of_the_engine: int
 ) -> None:
     """A load that swings is on one side only; PyBullet's own motors hold both files still."""
-    need_engine("pybullet")
     file(folder, "l.xml")
     file(folder, "r.xml", load=LOAD, qpos=".8 0")
     typed = [
@@ -104,6 +102,7 @@ def test_engine_settings_do_not_pay_for_another_file(
     assert found["unexplained"] > 0.9
 
 
+@pytest.mark.usefixtures("bullet")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("option", "name", "word"),
@@ -112,7 +111,6 @@ def test_engine_settings_do_not_pay_for_another_file(
 def test_an_option_of_an_engine_as_it_comes_counts(
     folder: Path, capsys: Any, option: str, name: str, word: str
 ) -> None:
-    need_engine("pybullet")
     file(folder, "n.xml", actuator="")
     sides = ("n.xml", "n.xml@pybullet:engine", option)
     _, found = asked(capsys, "f.py:none", *sides, "--why", "--seconds", "0.3", "--no-floor")

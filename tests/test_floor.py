@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 
 import statemachine as sm
-from statemachine.compare import ChaosFloor, Uncertainty, chaos_floor, compare, perturbed_runs
+from statemachine.compare import FloorBand, Uncertainty, chaos_floor, compare, perturbed_runs
 from statemachine.compare.perturbed import ROUNDING, Rerun, parse_uncertainty
 from statemachine.compare.why.gap import Ruler
 from statemachine.errors import BadInputError
 from statemachine.page import Text
 from statemachine.report import compare as report
+from statemachine.runs import Trace
 
-from .conftest import Cli, need_engine
+from .conftest import Cli
 from .explained import write
 
 PENDULUM = """<mujoco><option timestep="0.005"/><worldbody><body><joint name="swing" axis="0 1 0"
@@ -41,23 +42,28 @@ def rerun(model: sm.Model, seconds: float, **start: Any) -> Rerun:
     return Rerun(model, lambda _: None, seconds, **start)
 
 
-def floor_against_itself(run: Rerun, **how: Any) -> ChaosFloor:
-    trace = run.record()
-    return chaos_floor(compare(trace, trace), trace, trace, run, **how)
+def band_of(run: Rerun, name: str, two: Trace | None = None, **how: Any) -> FloorBand:
+    """The floor of one quantity of a run, against itself or another."""
+    one = run.record()
+    two = one if two is None else two
+    (band,) = [
+        band
+        for band in chaos_floor(compare(one, two), one, two, run, **how).bands
+        if band.name == name
+    ]
+    return band
 
 
 def test_a_damped_pendulum_that_hangs_has_a_floor_at_rounding(tmp_path: Path) -> None:
     run = rerun(model_of(tmp_path, PENDULUM), 5.0, qpos=np.array([0.3]))
-    band = floor_against_itself(run).of("swing")
-    assert band is not None
+    band = band_of(run, "swing")
     assert 0 < band.most < 5 * ROUNDING
     assert band.end < band.most
 
 
 def test_the_floor_of_a_double_pendulum_grows(tmp_path: Path) -> None:
     run = rerun(model_of(tmp_path, DOUBLE), 20.0, qpos=np.array([2.5, 1.0]))
-    band = floor_against_itself(run).of("lower")
-    assert band is not None
+    band = band_of(run, "lower")
     assert band.width[0] < 1e-9
     assert band.end > 1e4 * band.width[0]
 
@@ -65,10 +71,8 @@ def test_the_floor_of_a_double_pendulum_grows(tmp_path: Path) -> None:
 def test_the_floor_of_a_box_that_lands_on_an_edge_grows_with_the_impact(tmp_path: Path) -> None:
     tilt = np.array([0.0, 0.0, 0.4, np.cos(0.6), np.sin(0.6) * 0.8, np.sin(0.6) * 0.6, 0.0])
     run = rerun(model_of(tmp_path, BOX), 1.0, qpos=tilt)
-    floor = floor_against_itself(run)
-    band = floor.of("box, rotation")
-    assert band is not None
-    before = band.width[floor.time < 0.15]
+    band = band_of(run, "box, rotation")
+    before = band.width[:75]  # 0.15 s
     assert band.most > 20 * before.max()
 
 
@@ -95,33 +99,24 @@ def flat_texts(page: Any) -> list[str]:
 
 def test_a_gap_of_chaos_alone_is_told_from_one_that_was_made(tmp_path: Path) -> None:
     run = rerun(model_of(tmp_path, DOUBLE), 20.0, qpos=np.array([2.5, 1.0]))
-    one = run.record()
     # Two that differ by rounding end up apart; one that is heavier is apart before.
     chance = rerun(run.model, 20.0, qpos=np.array([2.5 + 1e-13, 1.0])).record()
     heavier = model_of(tmp_path, DOUBLE.replace('size="0.02"', 'size="0.025"', 1), "heavier")
     made = rerun(heavier, 20.0, qpos=np.array([2.5, 1.0])).record()
-    bands = []
-    for two in (chance, made):
-        comparison = compare(one, two)
-        bands.append(chaos_floor(comparison, one, two, run).of("lower"))
-    assert bands[0] is not None
-    assert bands[0].inside_from is not None
-    assert not bands[0].beyond
-    assert bands[1] is not None
-    assert bands[1].beyond
+    by_chance, by_weight = (band_of(run, "lower", two) for two in (chance, made))
+    assert by_chance.inside_from is not None
+    assert not by_chance.beyond
+    assert by_weight.beyond
 
 
 def test_the_band_is_wide_about_a_moment_and_forgets_it_later(tmp_path: Path) -> None:
     """A running maximum would not fall, and one moment alone would dip at each crossing."""
     run = rerun(model_of(tmp_path, PENDULUM), 5.0, qpos=np.array([1.0]))
-    trace = run.record()
-    floor = chaos_floor(compare(trace, trace), trace, trace, run, uncertain=Uncertainty(0.0, 0.01))
-    band = floor.of("swing")
-    assert band is not None
+    band = band_of(run, "swing", uncertain=Uncertainty(0.0, 0.01))
     assert band.width.min() > 0
     assert band.end < 0.2 * band.most
     # The difference oscillates: at a moment alone it is next to zero again and again.
-    assert band.width[floor.time < 1].min() > 0.2 * band.most
+    assert band.width[:200].min() > 0.2 * band.most
 
 
 def test_quaternions_of_perturbed_starts_stay_unit(tmp_path: Path) -> None:
@@ -176,8 +171,8 @@ def test_uncertainties_are_read_in_their_units() -> None:
         parse_uncertainty(["1mm", "2cm"])
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_command_line_shows_the_floor(cli: Cli) -> None:
-    need_engine("pybullet")
     asked = ("compare", "hold", "--seconds", "0.4")
     words = " ".join(cli(*asked, "--floor", "0.1deg").stdout.split())
     assert "The chaos floor: mujoco was run 4 times more" in words

@@ -20,7 +20,7 @@ from statemachine.compare.why import Explanation
 from statemachine.errors import BadInputError
 from statemachine.report.as_json import dumps
 
-from .conftest import ROOT, need_engine
+from .conftest import ROOT
 from .explained import ALONE, ARM, SWING, changed, explained, write
 
 forks = pytest.mark.skipif(forks_for(2, 1.0, 2) == 1, reason="no forks here")
@@ -63,10 +63,10 @@ def test_forks_give_the_figures_of_one_process(tmp_path: Path, jobs: int) -> Non
         assert _figures(run(scenario=scenario, jobs=jobs)) == _figures(one)
 
 
+@pytest.mark.usefixtures("bullet")
 @pytest.mark.slow
 @forks
 def test_forks_give_the_figures_of_one_process_on_pybullet(tmp_path: Path) -> None:
-    need_engine("pybullet")
     engines = "mujoco", "pybullet"
     run = partial(explained, tmp_path, ARM, _apart(ARM), engines=engines, seconds=0.1)
     assert _figures(run(jobs=3)) == _figures(run(jobs=1))

@@ -26,7 +26,7 @@ from statemachine.report import model_diff
 from statemachine.report.as_json import dumps
 from statemachine.rotations import angle_between
 
-from .conftest import Cli, need_engine, one_line
+from .conftest import Cli, one_line
 from .two_arms import mjcf, urdf
 
 Pair = Callable[..., tuple[Path, Path]]
@@ -222,8 +222,7 @@ def test_rounded_figures_are_equal_and_the_largest_is_stated(tmp_path: Path, dig
     (tmp_path / "rounded.urdf").write_text(rounded)
     result = compare(tmp_path / "rounded.urdf", models_dir() / "so101" / "so101.urdf")
     assert result.equal, _differ(result)
-    worst = min(each.digits for each in result.found.agreements)
-    assert digits - 2 <= worst <= digits + 1
+    assert digits - 2 <= min(each.digits for each in result.found.agreements) <= digits + 1
     assert max(each.worst for each in result.found.agreements) > 0
     strict = compare(
         tmp_path / "rounded.urdf", models_dir() / "so101" / "so101.urdf", digits=digits + 3
@@ -542,8 +541,8 @@ def test_deep_and_large_files_end_soon(tmp_path: Path) -> None:
         read(path)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_what_the_engines_make_of_a_urdf() -> None:
-    need_engine("pybullet")
     path = models_dir() / "so101" / "so101.urdf"
     found = _differ(compare(path, path, engines=("mujoco", "pybullet")))
     said = {(d.subject, d.figure): (d.one, d.two) for d in found}
@@ -586,8 +585,7 @@ def test_the_command(cli: Cli, tmp_path: Path) -> None:
     assert same.returncode == 0, same.stderr
     assert "nothing differs that matters, to 6 digits" in same.stdout
     assert max(map(cell_len, same.stdout.splitlines())) <= 80
-    everything = cli("compare", "--models", "so101", "so101/scene_box", "--all")
-    assert everything.returncode == 1
+    assert cli("compare", "--models", "so101", "so101/scene_box", "--all").returncode == 1
     (tmp_path / "bad.urdf").write_text("<robot")
     for arguments, text in (
         (("--models", "so101", "bad.urdf"), "bad.urdf: it is no XML"),
@@ -713,8 +711,8 @@ def test_an_effort_of_a_servo_is_what_it_can_exert(tmp_path: Path) -> None:
     assert found["gear"].size == 1.0
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_floor_is_there_on_both_engines() -> None:
-    need_engine("pybullet")
     sides = [read("so101/scene", engine) for engine in ("mujoco", "pybullet")]
     for robot in sides:
         (world,) = (link for link in robot.links if not link.parent)

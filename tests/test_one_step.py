@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -14,7 +15,6 @@ from statemachine.compare.stages import STAGES
 from statemachine.errors import BadInputError
 from statemachine.runs.scenarios import scenario
 
-from .conftest import need_engine
 from .explained import write
 
 # Two links on a stand, driven, damped, with a ball that falls beside them.
@@ -52,13 +52,18 @@ def rerun(model: sm.Model, seconds: float = 0.5) -> Rerun:
     return Rerun(model, lambda _: lambda _time, _data: (0.6, -0.9), seconds)
 
 
+def stepped(folder: Path, text: str, **how: Any) -> StepComparison:
+    """The robot, and the same with another text."""
+    one, two = model_of(folder, ROBOT, "one"), model_of(folder, text, "two")
+    return one_step(rerun(one), two, **how)
+
+
 def first(found: StepComparison) -> str:
     return found.first.stage if found.first else ""
 
 
 def test_identical_sides_give_exactly_zero_in_every_stage(tmp_path: Path) -> None:
-    one, two = (model_of(tmp_path, ROBOT, name) for name in ("one", "two"))
-    found = one_step(rerun(one), two)
+    found = stepped(tmp_path, ROBOT)
     assert [gap.stage for gap in found.stages] == list(STAGES)
     assert {gap.worst for gap in found.stages} == {0.0}
     assert {gap.null for gap in found.stages} == {0.0}
@@ -71,9 +76,7 @@ def test_identical_sides_give_exactly_zero_in_every_stage(tmp_path: Path) -> Non
 def test_a_change_shows_at_its_own_stage_first(stage: str, tmp_path: Path) -> None:
     old, new, where = CHANGES[stage]
     assert ROBOT.count(old) >= 1
-    one = model_of(tmp_path, ROBOT, "one")
-    two = model_of(tmp_path, ROBOT.replace(old, new, 1), "two")
-    found = one_step(rerun(one), two)
+    found = stepped(tmp_path, ROBOT.replace(old, new, 1))
     assert first(found) == stage
     assert found.first is not None
     assert where in found.first.where
@@ -81,8 +84,7 @@ def test_a_change_shows_at_its_own_stage_first(stage: str, tmp_path: Path) -> No
 
 def test_a_contact_shows_from_the_moment_at_which_it_begins(tmp_path: Path) -> None:
     old, new, _ = CHANGES["contact force"]
-    one = model_of(tmp_path, ROBOT, "one")
-    found = one_step(rerun(one), model_of(tmp_path, ROBOT.replace(old, new), "two"))
+    found = stepped(tmp_path, ROBOT.replace(old, new))
     assert found.first is not None
     # The ball falls 0.15 m.
     assert found.first.first == pytest.approx((2 * 0.15 / 9.81) ** 0.5, abs=0.01)
@@ -94,37 +96,33 @@ def test_a_contact_shows_from_the_moment_at_which_it_begins(tmp_path: Path) -> N
 def test_joints_in_another_order_are_matched(tmp_path: Path) -> None:
     ball = ROBOT[ROBOT.index('  <body name="ball"') : ROBOT.index("</worldbody>")]
     other = ROBOT.replace(ball, "").replace('<body name="upper"', f'{ball}<body name="upper"', 1)
-    one, two = model_of(tmp_path, ROBOT, "one"), model_of(tmp_path, other, "two")
-    assert one.joint_names != two.joint_names
-    assert one_step(rerun(one), two).first is None
+    assert other != ROBOT
+    assert stepped(tmp_path, other).first is None
 
 
 def test_what_does_not_count_is_relative_to_the_scale(tmp_path: Path) -> None:
-    one = model_of(tmp_path, ROBOT, "one")
-    two = model_of(tmp_path, ROBOT.replace('kp="10"', 'kp="10.0001"'), "two")
-    assert first(one_step(rerun(one), two)) == "actuator"
-    assert first(one_step(rerun(one), two, relative=1e-3)) == ""
+    stiffer = ROBOT.replace('kp="10"', 'kp="10.0001"')
+    assert first(stepped(tmp_path, stiffer)) == "actuator"
+    assert first(stepped(tmp_path, stiffer, relative=1e-3)) == ""
     assert RELATIVE == 1e-6
 
 
 def test_moments_are_spread_over_the_run(tmp_path: Path) -> None:
-    one = model_of(tmp_path, ROBOT, "one")
-    found = one_step(rerun(one), one, moments=20)
+    found = stepped(tmp_path, ROBOT, moments=20)
     assert (found.moments, found.every) == (20, 5)
     assert found.until == pytest.approx(0.475)
     with pytest.raises(BadInputError, match="at least one moment"):
-        one_step(rerun(one), one, moments=0)
+        stepped(tmp_path, ROBOT, moments=0)
 
 
 def test_models_without_a_common_joint_are_refused(tmp_path: Path) -> None:
-    one = model_of(tmp_path, ROBOT, "one")
     with pytest.raises(BadInputError, match="no joint in common"):
-        one_step(rerun(one), model_of(tmp_path, "<mujoco/>", "none"))
+        stepped(tmp_path, "<mujoco/>")
 
 
+@pytest.mark.usefixtures("bullet")
 @pytest.mark.parametrize("order", [("mujoco", "pybullet"), ("pybullet", "mujoco")])
 def test_the_engines_are_alike_until_something_touches(order: tuple[str, str]) -> None:
-    need_engine("pybullet")
     hold = scenario("hold")
     one, two = (sm.load(hold.model, backend=name) for name in order)
     found = one_step(rerun_of(hold, one, seconds=0.5), two)
@@ -139,9 +137,9 @@ def test_the_engines_are_alike_until_something_touches(order: tuple[str, str]) -
     assert any("by construction" in note for note in found.notes)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_null_shows_what_a_restore_forgets() -> None:
     """PyBullet's memory of contacts cannot be read: put back, it does not go on as it did."""
-    need_engine("pybullet")
     box = scenario("box")
     side = rerun_of(box, sm.load(box.model, backend="pybullet"), seconds=0.3)
     found = {gap.stage: gap for gap in one_step(side, side.model, moments=20).stages}
@@ -150,8 +148,8 @@ def test_the_null_shows_what_a_restore_forgets() -> None:
     assert not any(gap.beyond for gap in found.values())
 
 
+@pytest.mark.usefixtures("bullet")
 def test_an_engine_that_does_not_tell_a_stage_is_not_guessed_at() -> None:
-    need_engine("pybullet")
     fall = scenario("fall")
     one = rerun_of(fall, sm.load(fall.model), seconds=0.2)
     fresh = sm.load(fall.model, backend="pybullet", defaults="engine")

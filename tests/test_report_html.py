@@ -54,7 +54,7 @@ from statemachine.runs import Trace, record_scenario, shipped, write
 from statemachine.runs.scenarios import SCENARIOS
 
 from .browser import Tab, browser
-from .conftest import ROOT, Cli, need_engine
+from .conftest import ROOT, Cli
 
 LIMIT = 2_000_000  # bytes
 Made = tuple[Comparison, Trace, Trace, SideDrawing]
@@ -1154,9 +1154,9 @@ def test_bones_reach_from_body_to_body(hold: Made) -> None:
 # The command.
 
 
+@pytest.mark.usefixtures("bullet")
 @pytest.mark.slow
 def test_the_command_writes_it(cli: Cli, tmp_path: Path) -> None:
-    need_engine("pybullet")
     done = cli("compare", "hold", "--no-why", "--html", "out.html")
     assert done.returncode == 1, done.stderr  # something differs
     assert "wrote out.html" in done.stderr
@@ -1208,9 +1208,9 @@ def test_traces_make_a_report_without_a_cause(cli: Cli, hold: Made, tmp_path: Pa
     assert "causes are found by running an experiment again" in (tmp_path / "out.html").read_text()
 
 
+@pytest.mark.usefixtures("bullet")
 @pytest.mark.slow
 def test_the_cause_is_on_the_page(cli: Cli, tmp_path: Path) -> None:
-    need_engine("pybullet")
     assert cli("compare", "hold", "--html", "out.html").returncode == 1
     with browser() as tab:
         open_page(tab, tmp_path / "out.html")
@@ -1228,9 +1228,9 @@ def test_the_cause_is_on_the_page(cli: Cli, tmp_path: Path) -> None:
         tab.nothing_wrong()
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_request_of_the_finding_is_not_needed() -> None:
     """An experiment's sides make a page with nothing but what `sides_of` gives."""
-    need_engine("pybullet")
     (one, two), said = sides_of(Request(("droop",), seconds=0.2))
     text = report(compared(compare(one, two), one, two, said=said))
     assert "no model was given" in text

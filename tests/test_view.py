@@ -40,9 +40,17 @@ from statemachine.view.pace import Pacer
 from statemachine.view.recording import TraceSession
 from statemachine.view.session import LiveSession
 
-from .conftest import ROOT, Cli, need_engine, one_line
+from .conftest import ROOT, Cli, one_line
 
 SCENE = "so101/scene_box"
+
+
+@pytest.fixture
+def viser() -> None:
+    """Only where viser is."""
+    pytest.importorskip("viser")
+
+
 # A hinge and a slide, motors and servos, one with no range anywhere.
 ODD = """
 <mujoco>
@@ -159,8 +167,8 @@ def test_what_cannot_be_done_is_refused_and_changes_nothing(command: Command) ->
         np.testing.assert_array_equal(after.ctrl, before.ctrl)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_ghost_gets_the_same_commands_at_the_same_steps() -> None:
-    need_engine("pybullet")
     models = [sm.load(SCENE, backend=name) for name in ("mujoco", "pybullet")]
     with LiveSession(models) as session:
         session.apply(SetCtrl(1, -0.6))
@@ -224,8 +232,8 @@ def test_a_divergence_pauses_and_a_reset_recovers(odd: sm.Model) -> None:
         np.testing.assert_array_equal(again.poses[0].xpos, good.poses[0].xpos)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_divergence_on_the_ghost_alone_stops_both() -> None:
-    need_engine("pybullet")
     models = [sm.load("so101/scene", backend=name) for name in ("mujoco", "pybullet")]
     with LiveSession(models) as session:
         session._arms[1][1].qvel[0] = math.nan
@@ -572,8 +580,8 @@ def _listening(pid: int) -> set[str]:
     return found
 
 
+@pytest.mark.usefixtures("viser")
 def test_it_listens_on_loopback_alone_and_ctrl_c_ends_it(tmp_path: Path) -> None:
-    pytest.importorskip("viser")
     port = _free_pair()
     with Viewer(tmp_path, "--port", str(port)) as viewer:
         address, _, token = viewer.line().strip().partition("/?token=")
@@ -596,9 +604,9 @@ def test_it_listens_on_loopback_alone_and_ctrl_c_ends_it(tmp_path: Path) -> None
         again.bind(("127.0.0.1", port))
 
 
+@pytest.mark.usefixtures("viser")
 def test_it_listens_elsewhere_when_asked_to(tmp_path: Path) -> None:
     """The other side of the test above: what it looks at does show where one listens."""
-    pytest.importorskip("viser")
     if sys.platform != "linux":
         pytest.skip("127.0.0.2 is this machine on Linux only")
     port = _free_pair()
@@ -609,8 +617,8 @@ def test_it_listens_elsewhere_when_asked_to(tmp_path: Path) -> None:
             pass
 
 
+@pytest.mark.usefixtures("viser")
 def test_a_taken_port_is_said_and_the_next_one_is_taken(tmp_path: Path) -> None:
-    pytest.importorskip("viser")
     port = _free_pair()
     with socket.socket() as holder:
         holder.bind(("127.0.0.1", port))
@@ -622,9 +630,9 @@ def test_a_taken_port_is_said_and_the_next_one_is_taken(tmp_path: Path) -> None:
             assert (code, said) == (0, "")
 
 
+@pytest.mark.usefixtures("viser")
 def test_it_says_nothing_but_its_own_lines(tmp_path: Path) -> None:
     """No banner of viser's, and viser's own variable for the port does not count."""
-    pytest.importorskip("viser")
     port = _free_pair()
     taken = {"_VISER_PORT_OVERRIDE": str(port + 1)}
     with Viewer(tmp_path, "--port", str(port), "--seconds", "0.2", "--paused", **taken) as viewer:
@@ -636,6 +644,7 @@ def test_it_says_nothing_but_its_own_lines(tmp_path: Path) -> None:
         assert f":{port} " in text
 
 
+@pytest.mark.usefixtures("viser")
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -658,12 +667,11 @@ def test_it_says_nothing_but_its_own_lines(tmp_path: Path) -> None:
     ],
 )
 def test_every_mistake_is_one_line(here: Cli, arguments: list[str], words: str) -> None:
-    pytest.importorskip("viser")
     one_line(here("view", "--seconds", "0.1", *arguments), words)
 
 
+@pytest.mark.usefixtures("viser")
 def test_a_trace_is_shown_and_no_engine_of_its_own_is_needed(tmp_path: Path) -> None:
-    pytest.importorskip("viser")
     model = sm.load("so101/scene_box")
     file = write(record(model, seconds=0.1, keyframe=0, experiment="box"), tmp_path / "box.npz")
     port = str(_free_pair())

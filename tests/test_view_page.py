@@ -25,7 +25,7 @@ from statemachine.view.session import LiveSession
 from statemachine.view.viser_front import ViserFront, _page, thinner
 
 from .browser import Tab, browser, tabs
-from .conftest import REQUIRED, need_engine
+from .conftest import REQUIRED
 from .test_view import Viewer, _free_pair
 
 pytestmark = pytest.mark.slow  # a browser or a renderer at work
@@ -182,7 +182,7 @@ def test_run_pause_step_and_reset(stage: Stage) -> None:
     speed = stage.tab.locator("input[inputmode=decimal]").nth(1)
     for factor in ("0.5", "1"):
         speed.fill(factor)
-        stage.until(lambda wanted=float(factor): stage.live.speed == wanted)
+        stage.until(lambda wanted=float(factor): stage.live._pacer.speed == wanted)
     stage.press("Reset")
     stage.until(lambda: session.frame().steps == 0)
     stage.tab.nothing_wrong(*KNOWN)
@@ -252,9 +252,9 @@ def test_a_divergence_is_a_line_on_the_page_and_reset_recovers(stage: Stage) -> 
     stage.tab.nothing_wrong(*KNOWN)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_command_shows_both_engines_to_a_browser(tmp_path: Path) -> None:
     """End to end: the process, the page, time that passes by itself, and Ctrl-C while watched."""
-    need_engine("pybullet")
     port = _free_pair()
     with (
         Viewer(tmp_path, "--ghost", "pybullet", "--port", str(port)) as viewer,
@@ -272,8 +272,8 @@ def test_the_command_shows_both_engines_to_a_browser(tmp_path: Path) -> None:
         assert (code, said) == (0, "")
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_page_is_told_where_every_body_is_on_each_engine() -> None:
-    need_engine("pybullet")
     models = [sm.load("so101/scene_box", backend=name) for name in ("mujoco", "pybullet")]
     drawing = drawing_of(models[0])
     with LiveSession(models, "held") as session:

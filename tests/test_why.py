@@ -99,8 +99,7 @@ def test_a_seeded_cause_is_found_and_no_other(arm: Model, name: str) -> None:
             assert (trial.way, trial.explains) == ("alike", 0.0), factor
     assert [trial.factor for trial in found.ladder] == [cause]
     assert found.left == found.unexplained == 0.0
-    page = report.page(found)
-    assert page.holds
+    assert report.page(found).holds
     assert FACTORS[cause].title in " ".join(report.conclusion(found))
 
 
@@ -132,8 +131,7 @@ def test_what_is_not_in_the_table_stays_unexplained(arm: Model) -> None:
     assert found.ladder == ()
     assert found.left == found.gap
     assert found.unexplained == 1.0
-    page = report.page(found)
-    assert not page.holds
+    assert not report.page(found).holds
     assert "none of" in " ".join(report.conclusion(found))
 
 
@@ -250,8 +248,7 @@ def test_what_is_held_is_what_it_is_about() -> None:
     assert found.first["box in the hand"].rms == pytest.approx(np.sqrt((apart**2).mean()))
     assert found.first["box in the hand"].at == traces[0].time[apart.argmax()] - traces[0].time[0]
     # The same box from the default pose lies on the floor, out of reach.
-    arm = attribute(one, two, replace(BOX, keyframe=None))
-    assert arm.quantity == "joints"
+    assert attribute(one, two, replace(BOX, keyframe=None)).quantity == "joints"
 
 
 def test_other_joints_are_refused(arm: Model) -> None:
@@ -278,11 +275,6 @@ def test_a_run_that_diverges_is_said(arm: Model) -> None:
 # PyBullet
 
 
-@pytest.fixture
-def bullet() -> None:
-    need_engine("pybullet")
-
-
 def quietly(name: str, **options: Any) -> Model:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", EngineWarning)
@@ -304,6 +296,27 @@ def path_of(model: Model, experiment: Scenario) -> np.ndarray:
     return np.array(rows)
 
 
+def dialled(name: str = "so101/scene", options: Any = None) -> tuple[Any, Any]:
+    """PyBullet as it comes, and its dials."""
+    from statemachine.engines import room
+
+    fresh = quietly(name, defaults="engine")
+    found = room("pybullet").dials(fresh, options or {})
+    assert found
+    return fresh, found
+
+
+def motors_off(world: Any) -> None:
+    """PyBullet's own motors do nothing any more."""
+    import pybullet as pb
+
+    for tree in world.trees:
+        for joint in tree.joints:
+            pb.setJointMotorControl2(
+                tree.body, joint, pb.VELOCITY_CONTROL, force=0, physicsClientId=world.client
+            )
+
+
 SETTINGS = [name for name in FACTORS if name not in ("integrator", "contact")]
 
 
@@ -323,9 +336,7 @@ def test_the_ends_of_the_dials_are_the_two_models(name: str) -> None:
     from statemachine.engines import room
 
     experiment = replace(scenario(name), seconds=0.7)
-    fresh = quietly(experiment.model, defaults="engine")
-    found = room("pybullet").dials(fresh, experiment.options)
-    assert found
+    fresh, found = dialled(experiment.model, experiment.options)
     raw = fresh.replace(**experiment.options)
     np.testing.assert_array_equal(
         path_of(found.build({}, {}), experiment), path_of(raw, experiment)
@@ -341,12 +352,9 @@ def test_as_it_comes_is_what_a_user_of_pybullet_gets(tmp_path: Path) -> None:
     """Bit for bit the run of a script that knows nothing of this library but the URDF."""
     import pybullet as pb
 
-    from statemachine.engines import room
-    from statemachine.runs.commands import TARGET
+    from statemachine.runs.scenarios import TARGET
 
-    fresh = quietly("so101/scene", defaults="engine")
-    found = room("pybullet").dials(fresh, {})
-    assert found
+    fresh, found = dialled()
     ours = path_of(found.build({}, {}), HOLD)
     file = tmp_path / "arm.urdf"
     file.write_text(fresh.raw["base"])
@@ -376,13 +384,10 @@ def test_with_everything_dialled_off_the_engines_agree() -> None:
 
     Each of the dials is needed for it, so each acts.
     """
-    from statemachine.engines import room
     from statemachine.engines.pybullet import dials as module
 
-    fresh = quietly("so101/scene", defaults="engine")
     limp = {"actuation": False}
-    found = room("pybullet").dials(fresh, limp)
-    assert found
+    _, found = dialled(options=limp)
     bare = {**limp, "timestep": 1e-3, "armature": 0, "frictionloss": 0, "damping": 0}
     one = sm.load("so101/scene").replace(**bare, contacts=False, limits=False)
     values = {**values_of(one), "damping": np.zeros(one.nv)}
@@ -400,25 +405,12 @@ def test_with_everything_dialled_off_the_engines_agree() -> None:
 
     def apart(names: dict[str, Any]) -> float:
         model = found.build(names, values).replace(timestep=one.timestep)
-        model = module._dialled(model, [*model_acts(found.build(names, values)), motors_off])
+        acts = getattr(found.build(names, values), "_acts", ())
+        model = module._dialled(model, [*acts, motors_off])
         try:
             return float(np.abs(path_of(model, experiment) - wanted).max())
         except DivergedError:
             return np.inf
-
-    def model_acts(model: Any) -> tuple[Any, ...]:
-        return getattr(model, "_acts", ())
-
-    def motors_off(world: Any) -> None:
-        for tree in world.trees:
-            for joint in tree.joints:
-                module.pb.setJointMotorControl2(
-                    tree.body,
-                    joint,
-                    module.pb.VELOCITY_CONTROL,
-                    force=0,
-                    physicsClientId=world.client,
-                )
 
     assert apart(every) < 1e-9
     for name in ("gravity", "inertia", "damping", "limits", "contact"):
@@ -436,16 +428,10 @@ def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
     raw = fresh._shared.raw  # pyright: ignore[reportAttributeAccessIssue]
 
     def limp(world: Any) -> None:
+        motors_off(world)
         for tree in world.trees:
             for joint in tree.joints:
                 module._change(world, tree.body, joint, jointDamping=0.05)
-                module.pb.setJointMotorControl2(
-                    tree.body,
-                    joint,
-                    module.pb.VELOCITY_CONTROL,
-                    force=0,
-                    physicsClientId=world.client,
-                )
 
     own = {
         "damping": lambda w: module._set_damping(w, module.BODY_DAMPING, np.full(raw.nv, 0.05)),
@@ -481,7 +467,6 @@ def test_what_is_called_the_engines_own_changes_no_bit_of_it(dial: str) -> None:
 @pytest.mark.usefixtures("bullet")
 def test_links_of_one_robot_meet_where_the_setting_says_so(arm: Model) -> None:
     """In a pose in which the arm is in its own way, by MuJoCo."""
-    from statemachine.engines import room
 
     def own_ways(model: Model, qpos: np.ndarray, run: Any) -> int:
         with sm.make_data(model) as data:
@@ -493,9 +478,7 @@ def test_links_of_one_robot_meet_where_the_setting_says_so(arm: Model) -> None:
     random = np.random.default_rng(3)
     poses = (random.uniform(*arm.jnt_range.T) for _ in range(200))
     pose = next(pose for pose in poses if own_ways(arm, pose, sm.forward) > 2)
-    fresh = quietly("so101/scene", defaults="engine")
-    found = room("pybullet").dials(fresh, {})
-    assert found
+    fresh, found = dialled()
     rest = {name: "model" for name in SETTINGS if name != "surfaces"}
     values = values_of(arm)
     own: Any = found.build(rest, values)  # pyright: ignore[reportArgumentType]
@@ -509,11 +492,7 @@ def test_as_it_comes_has_the_engines_figures_in_the_emulated_world() -> None:
     """Read back from the engine: friction, masses, inertias, timestep and gravity."""
     import pybullet as pb
 
-    from statemachine.engines import room
-
-    fresh = quietly("so101/scene", defaults="engine")
-    found = room("pybullet").dials(fresh, {})
-    assert found
+    fresh, found = dialled()
     model: Any = found.build({"servo": "model"}, {})
 
     def figures(world: Any) -> dict[int, tuple[Any, ...]]:
@@ -542,14 +521,10 @@ def test_as_it_comes_has_the_engines_figures_in_the_emulated_world() -> None:
 @pytest.mark.parametrize("name", SETTINGS)
 def test_each_dial_acts_on_the_emulated_side(name: str) -> None:
     """All settings the model's, one as the engine comes: the run is another one."""
-    from statemachine.engines import room
-
     experiment = {"limits": FALL, "surfaces": replace(scenario("gravity"), seconds=0.8)}.get(
         name, HOLD
     )
-    fresh = quietly("so101/scene", defaults="engine")
-    found = room("pybullet").dials(fresh, experiment.options)
-    assert found
+    fresh, found = dialled(options=experiment.options)
     emulated = quietly("so101/scene").replace(**experiment.options)
     rest = {each: "model" for each in SETTINGS if each != name}
     if name == "servo":
@@ -564,11 +539,7 @@ def test_each_dial_acts_on_the_emulated_side(name: str) -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_dials_outlive_a_reset() -> None:
-    from statemachine.engines import room
-
-    fresh = quietly("so101/scene", defaults="engine")
-    found = room("pybullet").dials(fresh, {})
-    assert found
+    fresh, found = dialled()
     model = found.build({"inertia": "model"}, {})
     first = path_of(model, HOLD)
     assert (first != path_of(fresh, HOLD)).any()
@@ -585,13 +556,10 @@ def test_dials_outlive_a_reset() -> None:
 
 @pytest.mark.usefixtures("bullet")
 def test_a_dial_that_does_not_act_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    from statemachine.engines import room
     from statemachine.engines.pybullet import dials as module
     from statemachine.errors import EngineError
 
-    fresh = quietly("so101/scene", defaults="engine")
-    found = room("pybullet").dials(fresh, {})
-    assert found
+    _, found = dialled()
     monkeypatch.setattr(module, "_change", lambda *_a, **_k: None)
     for name in ("inertia", "surfaces"):
         with pytest.raises(EngineError, match="did not take"):
@@ -657,7 +625,7 @@ def test_the_parts_are_said_to_be_of_one_order(attributions: Any) -> None:
     # The timestep put back, by hand: it acts on the engine's motors, not on the model's law.
     one = sm.load("so101/scene")
     two = sm.load("so101/scene", backend="pybullet").replace(timestep=1 / 240)
-    runs = [angles(model, 2.0, every) for model, every in ((one, 5), (two, 6))]
+    runs = [path_of(m, scenario("hold"))[::every] for m, every in ((one, 5), (two, 6))]
     by_hand = np.abs(runs[0] - runs[1]).max()
     assert alone["timestep"].put_back == pytest.approx(by_hand, rel=1e-6)
     assert ladder["timestep"].explains > 0.05
@@ -675,18 +643,6 @@ def test_the_parts_are_said_to_be_of_one_order(attributions: Any) -> None:
     (from_the_start,) = [line for line in emulated if "act from the start" in line]
     assert "surfaces" not in from_the_start
     assert "dry friction" in from_the_start
-
-
-def angles(model: Model, seconds: float, every: int) -> np.ndarray:
-    """The hold's joints, at every so many steps."""
-    control, rows = scenario("hold").controller(model, 0), []
-    with sm.make_data(model) as data:
-        for k in range(round(seconds / model.timestep) + 1):
-            if k % every == 0:
-                rows.append(np.array(data.qpos))
-            data.ctrl = control(data.time, data)
-            sm.step(model, data)
-    return np.array(rows)
 
 
 @pytest.mark.slow
@@ -720,9 +676,9 @@ def test_two_engines_as_they_come_differ_by_what_was_set() -> None:
 # The command
 
 
+@pytest.mark.usefixtures("bullet")
 @pytest.mark.slow
 def test_the_command(cli: Cli) -> None:
-    need_engine("pybullet")
     done = cli("compare", "hold", "--why", "--seconds", "0.5")
     assert done.returncode == 0, done.stderr
     assert not done.stderr

@@ -18,6 +18,27 @@ from .matching import Matched, Pairs, match_models, start_of
 from .sides import Request
 
 
+def called(trace: Trace, file: str) -> Trace:
+    """A run whose file goes by another name."""
+    header = trace.header
+    made_by = replace(header.provenance, model_file=file)
+    return Trace(replace(header, provenance=made_by), trace.columns)
+
+
+def match_sides(one: Model, two: Model, request: Request) -> Matched | None:
+    """Which is which; None for one file, of which every engine has the same ids."""
+    left, right = request.sides
+    if left.path == right.path and not request.names and one.joint_names == two.joint_names:
+        return None
+    matched = match_models(one, two, request.names)
+    if not matched.joints and one.njnt and two.njnt:
+        raise TraceError(
+            f"{left.label} and {right.label} have no joint in common, by name or by place: name "
+            "one with --map LEFT=RIGHT"
+        )
+    return matched
+
+
 def told_alike(one: Trace, two: Trace, matched: Matched) -> tuple[Trace, Trace]:
     """Both runs with the names of the first; commands in its order where both have all of them.
 

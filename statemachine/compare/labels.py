@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..measures import SAME, Common
-from ..measures.text import milliseconds, numbers, significant
+from ..measures.text import few, milliseconds, numbers, significant
 from ..runs import Header, Trace
 from .series import joint_columns, tell
 
@@ -54,6 +54,20 @@ def labels_of(one: Header, two: Header) -> Labels:
     parts = [*([engines] if engines[0] != engines[1] or not others else []), *others]
     long = ", ".join(part[0] for part in parts), ", ".join(part[1] for part in parts)
     return Labels(_numbered(long), _numbered(short))
+
+
+def lacking(only: Sequence[Mapping[str, Sequence[str]]], labels: Two) -> Iterator[str]:
+    """A line for a side that has what the other has not: names by kind, as in `Matched.only`."""
+    for own, label in zip(only, labels, strict=True):
+        parts = [
+            # Where the other side has some over, too, they may be the same.
+            f"{kind}{'s' * (len(names) > 1)} {few(names, 6)}"
+            + " (--map LEFT=RIGHT)" * all(each.get(kind) for each in only)
+            for kind, names in own.items()
+            if names
+        ]
+        if parts:
+            yield f"only {label} has {'; '.join(parts)}: not compared"
 
 
 def files_apart(one: Sequence[str], two: Sequence[str]) -> Two:
@@ -132,7 +146,11 @@ def _numbered(names: Two) -> Two:
     return names if names[0] != names[1] else (f"{names[0]} (first)", f"{names[1]} (second)")
 
 
-def notes_on(one: Trace, two: Trace, common: Common, of_quantities: Iterable[str]) -> Iterator[str]:
+# A line, and whether it is to be said.
+Note = tuple[object, str]
+
+
+def notes_on(one: Trace, two: Trace, common: Common, of_quantities: Iterable[str]) -> list[str]:
     """A line for each thing that a reader of the figures must know.
 
     Args:
@@ -143,99 +161,101 @@ def notes_on(one: Trace, two: Trace, common: Common, of_quantities: Iterable[str
     """
     a, b = one.header, two.header
     labels = labels_of(a, b).long
-    if a.provenance.model_sha256 != b.provenance.model_sha256:
-        yield (
+    columns = dict.fromkeys(
+        what
+        for column, what in _COMPARED.items()
+        if not tell(one, two, column) and (column in one or column in two)
+    )
+    # The command of a last row is never carried out.
+    used = (common.one < len(one) - 1) & (common.two < len(two) - 1)
+    commands = one.ctrl[common.one[used]], two.ctrl[common.two[used]]
+    same = a.actuators == b.actuators
+    notes: list[Note] = [
+        (
+            a.provenance.model_sha256 != b.provenance.model_sha256,
             f"the models are two: {a.provenance.model_file} and {b.provenance.model_file} "
-            "have other digests"
-        )
-    yield from _of_joints(one, two)
-    yield from _of_columns(one, two)
-    yield from of_quantities
-    if a.experiment != b.experiment:
-        yield f"the experiments are two: {a.experiment} and {b.experiment}"
-    yield from _of_time(one, two, common)
-    if not np.allclose(a.gravity, b.gravity, rtol=0, atol=1e-12):
-        yield f"gravity differs: {numbers(a.gravity)} and {numbers(b.gravity)} m/s²"
-    if any(header.defaults == "engine" and header.energy_by for header in (a, b)):
-        yield (
+            "have other digests",
+        ),
+        *_of_joints(one, two, labels),
+        (columns, f"not compared, for one side does not tell it: {', '.join(columns)}"),
+        *((True, line) for line in of_quantities),
+        (
+            a.experiment != b.experiment,
+            f"the experiments are two: {a.experiment} and {b.experiment}",
+        ),
+        *_of_time(one, two, common, labels),
+        (
+            not np.allclose(a.gravity, b.gravity, rtol=0, atol=1e-12),
+            f"gravity differs: {numbers(a.gravity)} and {numbers(b.gravity)} m/s²",
+        ),
+        (
+            any(header.defaults == "engine" and header.energy_by for header in (a, b)),
             "energy is measured by one yardstick on both sides, masses, armature and gravity of "
-            f"the model ({a.energy_by or b.energy_by}), whatever an engine itself has"
-        )
-    if a.actuators != b.actuators:
-        yield "the actuators differ, in name or in order"
-    elif _commands_differ(one, two, common):
-        yield "the commands differ: the controllers saw different states, or are two"
+            f"the model ({a.energy_by or b.energy_by}), whatever an engine itself has",
+        ),
+        (not same, "the actuators differ, in name or in order"),
+        (
+            same and not np.array_equal(*commands),
+            "the commands differ: the controllers saw different states, or are two",
+        ),
+    ]
     for header, label in zip((a, b), labels, strict=True):
-        if header.ended:
-            yield f"{label} ended early: {header.ended}"
-        if header.rewritten:
-            yield (
+        notes += [
+            (header.ended, f"{label} ended early: {header.ended}"),
+            (
+                header.rewritten,
                 f"{label}: in {header.rewritten} rows the state was written, by the "
-                "controller; that is no part of the commands"
-            )
-        if header.single:
-            yield (
-                f"the recorded run of {header.backend} keeps all but its state in single precision"
-            )
+                "controller; that is no part of the commands",
+            ),
+            (
+                header.single,
+                f"the recorded run of {header.backend} keeps all but its state in single precision",
+            ),
+        ]
+    return [line for said, line in notes if said]
 
 
-def _of_joints(one: Trace, two: Trace) -> Iterator[str]:
+def _of_joints(one: Trace, two: Trace, labels: Two) -> list[Note]:
     a, b = one.header, two.header
-    labels = labels_of(a, b).long
     only = [
         f"{name} ({label})"
         for header, other, label in ((a, b, labels[0]), (b, a, labels[1]))
         for name in header.joint_labels
         if name not in other.joint_labels
     ]
-    if only:
-        yield f"compared is what both have; missing on one side: {', '.join(only)}"
     shared = {
         name: [joint_columns(header, name) for header in (a, b)]
         for name in a.joint_labels
         if name in b.joint_labels
     }
     other = [name for name, (x, y) in shared.items() if x.kind is not y.kind]
-    if other:
-        yield f"not compared, for they are joints of another kind: {', '.join(other)}"
-    if any(
+    moved = any(
         not np.array_equal(one.qpos[0, x.qpos], two.qpos[0, y.qpos])
         or not np.array_equal(one.qvel[0, x.qvel], two.qvel[0, y.qvel])
         for x, y in shared.values()
         if x.kind is y.kind
-    ):
-        yield "the runs do not start in the same state"
-
-
-def _of_columns(one: Trace, two: Trace) -> Iterator[str]:
-    missing = dict.fromkeys(
-        what
-        for column, what in _COMPARED.items()
-        if not tell(one, two, column) and (column in one or column in two)
     )
-    if missing:
-        yield f"not compared, for one side does not tell it: {', '.join(missing)}"
+    return [
+        (only, f"compared is what both have; missing on one side: {', '.join(only)}"),
+        (other, f"not compared, for they are joints of another kind: {', '.join(other)}"),
+        (moved, "the runs do not start in the same state"),
+    ]
 
 
-def _of_time(one: Trace, two: Trace, common: Common) -> Iterator[str]:
+def _of_time(one: Trace, two: Trace, common: Common, labels: Two) -> list[Note]:
     steps = [trace.header.timestep for trace in (one, two)]
-    if steps[0] != steps[1]:
-        apart = float(common.time[-1]) / max(1, len(common.time) - 1)
-        yield (
+    apart = float(common.time[-1]) / max(1, len(common.time) - 1)
+    ends = [float(trace.time[-1] - trace.time[0]) for trace in (one, two)]
+    return [
+        (
+            steps[0] != steps[1],
             f"timesteps differ, {significant(1000 * steps[0])} and {milliseconds(steps[1])}, and "
             f"meet every {milliseconds(apart, 3)}: compared are these common moments alone, "
-            "nothing is interpolated, and a peak between two of them is not seen"
-        )
-    ends = [float(trace.time[-1] - trace.time[0]) for trace in (one, two)]
-    if abs(ends[0] - ends[1]) > max(steps) * (1 + SAME):
-        longer = labels_of(one.header, two.header).long[ends[1] > ends[0]]
-        yield (
-            f"the runs are {ends[0]:g} and {ends[1]:g} s long: what {longer} does after "
-            f"{common.time[-1]:g} s is not compared"
-        )
-
-
-def _commands_differ(one: Trace, two: Trace, common: Common) -> bool:
-    # The command of a last row is never carried out.
-    used = (common.one < len(one) - 1) & (common.two < len(two) - 1)
-    return not np.array_equal(one.ctrl[common.one[used]], two.ctrl[common.two[used]])
+            "nothing is interpolated, and a peak between two of them is not seen",
+        ),
+        (
+            abs(ends[0] - ends[1]) > max(steps) * (1 + SAME),
+            f"the runs are {ends[0]:g} and {ends[1]:g} s long: what {labels[ends[1] > ends[0]]} "
+            f"does after {common.time[-1]:g} s is not compared",
+        ),
+    ]

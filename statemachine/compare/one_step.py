@@ -117,7 +117,7 @@ def one_step(
                     _taken(reader, 1, other, here),
                 )
             except DivergedError:
-                samples.failed += 1
+                samples.failed = True
                 break
             progress(k / rows)
     progress(1.0)
@@ -130,7 +130,7 @@ def one_step(
         stages=samples.gaps(measures),
         spikes=samples.spikes(measures),
         primed=primed,
-        notes=tuple(_notes(matched, reader, samples)),
+        notes=_notes(matched, samples),
     )
 
 
@@ -194,21 +194,29 @@ def _taken(
     return found, (data.qvel - qvel) / model.timestep
 
 
-def _notes(matched: Matched, reader: StageReader, samples: StepSamples) -> Iterator[str]:
+def _notes(matched: Matched, samples: StepSamples) -> tuple[str, ...]:
     one, two = matched.one, matched.two
-    if one.timestep != two.timestep or one.substeps != two.substeps:
-        yield "the sides' steps are not equally long: accelerations are means over each side's own"
-    for model in (one, two):
-        by_us = [
-            name
-            for name in ("position servo", "joint damping", "dry friction", "joint limits")
-            if model.capabilities.behaviours[name].support == "emulated"
-        ]
-        if by_us:
-            yield (
-                f"on {model.backend} this library computes {', '.join(by_us)} from the model: "
-                "that these agree is by construction"
+    names = ("position servo", "joint damping", "dry friction", "joint limits")
+    by_us = [
+        (m.backend, [n for n in names if m.capabilities.behaviours[n].support == "emulated"])
+        for m in (one, two)
+    ]
+    notes = [
+        (
+            (one.timestep, one.substeps) != (two.timestep, two.substeps),
+            "the sides' steps are not equally long: accelerations are means over each side's own",
+        ),
+        *(
+            (
+                bool(laws),
+                f"on {backend} this library computes {', '.join(laws)} from the model: "
+                "that these agree is by construction",
             )
-    if samples.failed:
-        yield "a side does not stand a step from a state of the left one: the rest is left out"
-    yield from matched.notes
+            for backend, laws in by_us
+        ),
+        (
+            samples.failed,
+            "a side does not stand a step from a state of the left one: the rest is left out",
+        ),
+    ]
+    return (*(line for said, line in notes if said), *matched.notes)

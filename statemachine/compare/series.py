@@ -144,11 +144,8 @@ def default_tip(*headers: Header) -> str:
 
 def normal_forces(trace: Trace) -> dict[str, Array]:
     """Sum of the normal contact forces (n,) [N] between each pair of bodies."""
-    sums = {}
-    for pair, places in trace.contact_pairs.items():
-        sums[pair] = np.zeros(len(trace))
-        np.add.at(sums[pair], trace["contact_row"][places], trace["contact_force"][places, 0])
-    return sums
+    sums = _sums(trace, trace["contact_force"][:, :1])
+    return {pair: normal[:, 0] for pair, normal in sums.items()}
 
 
 def total_forces(trace: Trace) -> dict[str, Array]:
@@ -157,14 +154,17 @@ def total_forces(trace: Trace) -> dict[str, Array]:
     Friction and all, added as vectors in world axes: neither at least nor at most the sum of
     the normal forces.
     """
-    lengths = {}
-    pairs = trace.contact_pairs
-    forces = world_forces(trace) if pairs else np.empty((0, 3))
-    for pair, places in pairs.items():
-        total = np.zeros((len(trace), 3))
-        np.add.at(total, trace["contact_row"][places], forces[places])
-        lengths[pair] = np.linalg.norm(total, axis=1)
-    return lengths
+    sums = _sums(trace, world_forces(trace))
+    return {pair: np.linalg.norm(total, axis=1) for pair, total in sums.items()}
+
+
+def _sums(trace: Trace, forces: Array) -> dict[str, Array]:
+    """Sums (n, k) of the forces (c, k) of all contacts between each pair of bodies."""
+    sums = {}
+    for pair, places in trace.contact_pairs.items():
+        sums[pair] = np.zeros((len(trace), forces.shape[1]))
+        np.add.at(sums[pair], trace["contact_row"][places], forces[places])
+    return sums
 
 
 def world_forces(trace: Trace) -> Array:

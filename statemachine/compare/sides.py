@@ -140,16 +140,24 @@ def _refuse_mistyped(word: str) -> None:
     Raises:
         BadInputError: It reads as FILE@, FILE:ENGINE, FILE,FILE or the name of an option.
     """
-    parts = word.split(",")
-    if word.endswith("@") and len(word) > 1:
-        raise BadInputError(f"{word} names no engine: type {word}{DEFAULT}, or {word[:-1]}")
-    before, _, after = word.rpartition(":")
-    if before and after in backend_names():
-        raise BadInputError(f"an engine stands behind an @: type {before}@{after}")
-    if len(parts) == 2 and all(parts) and not word.endswith(("/", "\\")):
-        raise BadInputError(f"two sides are two words: type {' '.join(parts)}")
-    if word in OPTIONS:
-        raise BadInputError(f"{word} is an option of a side: type {word}=VALUE")
+    parts, (before, _, after) = word.split(","), word.rpartition(":")
+    for meant, says in (
+        (
+            word.endswith("@") and len(word) > 1,
+            f"{word} names no engine: type {word}{DEFAULT}, or {word[:-1]}",
+        ),
+        (
+            before and after in backend_names(),
+            f"an engine stands behind an @: type {before}@{after}",
+        ),
+        (
+            len(parts) == 2 and all(parts) and not word.endswith(("/", "\\")),
+            f"two sides are two words: type {' '.join(parts)}",
+        ),
+        (word in OPTIONS, f"{word} is an option of a side: type {word}=VALUE"),
+    ):
+        if meant:
+            raise BadInputError(says)
 
 
 def _option(text: str) -> tuple[str, Any]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..engines import room
 from ..errors import UnsupportedError
@@ -79,12 +79,8 @@ class StageReader:
         self._models = matched.one, matched.two
         self._rooms = [room(model.backend) for model in self._models]
         one, two = self._models
-        self.dofs = (
-            _dofs(one, [a for a, _ in matched.joints]),
-            _dofs(two, [b for _, b in matched.joints]),
-        )
-        names, turns = _dof_names(one, [a for a, _ in matched.joints])
-        self._turns = turns
+        here, names, turns = _dofs(one, [a for a, _ in matched.joints])
+        self.dofs, self._turns = (here, _dofs(two, [b for _, b in matched.joints])[0]), turns
         bodies = tuple(one.body_names[s.one] or f"body {s.one}" for s in matched.solids[1:])
         sites = tuple(one.site_names[a] or f"site {a}" for a, _ in matched.sites)
         self.groups: list[StageGroup] = [
@@ -215,25 +211,16 @@ def _contact_names(matched: Matched) -> tuple[PairNames, PairNames]:
     return (names.pair, left), (names.pair, right)
 
 
-def _dofs(model: Model, joints: Sequence[int]) -> Ints:
-    """Degrees of freedom of some joints, in their order."""
-    found = [
-        int(model.jnt_dofadr[joint]) + k
-        for joint in joints
-        for k in range(JointType(int(model.jnt_type[joint])).nv)
-    ]
-    return np.array(found, dtype=np.int64)
-
-
-def _dof_names(model: Model, joints: Sequence[int]) -> tuple[list[str], Any]:
-    """A name for each degree of freedom of some joints, and whether it turns."""
-    names, turns = [], []
+def _dofs(model: Model, joints: Sequence[int]) -> tuple[Ints, list[str], NDArray[np.bool_]]:
+    """The degrees of freedom of some joints, a name for each, and whether it turns."""
+    dofs, names, turns = [], [], []
     for joint in joints:
-        kind, name = JointType(int(model.jnt_type[joint])), model.joint_names[joint]
-        names += [name or f"joint {joint}"] * kind.nv
+        kind, start = JointType(int(model.jnt_type[joint])), int(model.jnt_dofadr[joint])
+        dofs += range(start, start + kind.nv)
+        names += [model.joint_names[joint] or f"joint {joint}"] * kind.nv
         free = [False] * 3 + [True] * 3
         turns += free if kind is JointType.FREE else [kind is not JointType.SLIDE] * kind.nv
-    return names, np.array(turns, dtype=bool)
+    return np.array(dofs, dtype=np.int64), names, np.array(turns, dtype=bool)
 
 
 def _told(data: Data, name: str, size: int) -> Array:

@@ -106,7 +106,7 @@ class StepSamples:
     """What was read at all moments."""
 
     def __init__(self, reader: StageReader) -> None:
-        self._reader, self.failed = reader, 0
+        self._reader, self.failed = reader, False
         self.times: list[float] = []
         # At each moment the numbers of the groups and the contacts, as of each `add`.
         self._read: list[list[tuple[list[Array], Touching]]] = []

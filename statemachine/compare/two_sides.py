@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -25,14 +25,16 @@ from ..runs.drive import Progress, check_length, part_of, silent, steps_in
 from ..runs.scenarios import SCENARIOS, Controller, Scenario, scenario
 from .alike import (
     beginning_with,
+    called,
     for_left,
     in_terms_of_right,
+    match_sides,
     retold,
     same_commands,
     told_alike,
 )
-from .labels import files_apart, labels_of
-from .matching import Matched, match_models, start_of
+from .labels import files_apart, labels_of, lacking
+from .matching import Matched, start_of
 from .perturbed import Rerun
 from .sides import Request, Side, is_trace
 
@@ -77,15 +79,7 @@ class SidesRun:
         if self.matched is None:
             return ()
         labels = labels_of(self.left.header, self.right.header).long
-        lines = []
-        for only, label in zip(self.matched.only, labels, strict=True):
-            told = [
-                f"{kind}{'s' * (len(names) > 1)} {', '.join(names)}"
-                for kind, names in only.items()
-                if names
-            ]
-            if told:
-                lines.append(f"only {label} has {'; '.join(told)}: not compared")
+        lines = [*lacking(self.matched.only, labels)]
         if any(only.get("joint") for only in self.matched.only):
             lines.append("the energy is not compared, for it is of all that can move")
         return (*lines, *self.matched.notes)
@@ -104,7 +98,7 @@ def run_sides(request: Request, progress: Progress = silent) -> SidesRun:
     given |= request.options
     options = [{**given, **side.options} for side in request.sides]
     models = [side.load(**given) for side in request.sides]
-    matched = _matched(models[0], models[1], left, right, request)
+    matched = match_sides(models[0], models[1], request)
     seconds = float(trace.time[-1] - trace.time[0]) if trace else request.seconds
     seconds = scenario.seconds if scenario and seconds is None else seconds or 0.0
     _check_moments(models, seconds)
@@ -140,32 +134,12 @@ def run_sides(request: Request, progress: Progress = silent) -> SidesRun:
     a, b = (run.header.provenance.model_file for run in pair)
     if left.path != right.path and a == b:  # as much of the paths as tells them apart
         names = files_apart(left.path.parts, right.path.parts)
-        one, rights = _called(one, names[0]), [_called(each, names[1]) for each in rights]
+        one, rights = called(one, names[0]), [called(each, names[1]) for each in rights]
     if matched is not None:
         both = [told_alike(one, each, matched) for each in rights]
         one, rights = both[0][0], [two for _, two in both]
     file = left.path if left.path == right.path else None
     return SidesRun(one, rights[0], rights[-1], commands, matched, reruns, file, said)
-
-
-def _called(trace: Trace, file: str) -> Trace:
-    """A run whose file goes by another name."""
-    header = trace.header
-    made_by = replace(header.provenance, model_file=file)
-    return Trace(replace(header, provenance=made_by), trace.columns)
-
-
-def _matched(one: Model, two: Model, left: Side, right: Side, request: Request) -> Matched | None:
-    """Which is which; None for one file, of which every engine has the same ids."""
-    if left.path == right.path and not request.names and one.joint_names == two.joint_names:
-        return None
-    matched = match_models(one, two, request.names)
-    if not matched.joints and one.njnt and two.njnt:
-        raise TraceError(
-            f"{left.label} and {right.label} have no joint in common, by name or by place: name "
-            "one with --map LEFT=RIGHT"
-        )
-    return matched
 
 
 def _check_moments(models: list[Model], seconds: float) -> None:
@@ -231,14 +205,13 @@ def _of_trace(
     progress: Progress,
 ) -> tuple[tuple[Trace, Trace], tuple[str, ...]]:
     """A recorded run's start and commands, on both sides."""
-    name = request.what[0]
     _refuse_of_run(request)
     theirs = for_left(trace, models[0], request)
     left, right = request.sides
     one = _played(theirs, models[0], options[0], left, part_of(progress, 0.0, 0.5))
     told = theirs if matched is None else in_terms_of_right(theirs, None, matched)
     two = _played(told, models[1], options[1], right, part_of(progress, 0.5, 0.5))
-    said = f"the ctrl of {name} was played on both sides, from the state it starts in"
+    said = f"the ctrl of {request.what[0]} was played on both sides, from the state it starts in"
     return (one, two), (said,)
 
 
@@ -374,7 +347,5 @@ def _of_traces(request: Request, progress: Progress) -> tuple[tuple[Trace, Trace
         options=options,
         progress=progress,
     )
-    said = (
-        f"the ctrl of {request.what[0]} was played on {others[0]}, from the state it starts in",
-    )
-    return (trace, played), said
+    said = f"the ctrl of {request.what[0]} was played on {others[0]}, from the state it starts in"
+    return (trace, played), (said,)

@@ -10,11 +10,11 @@ import numpy as np
 from ..backends import load
 from ..errors import MissingEngineError, StateMachineError
 from ..installed import WITNESS
-from ..interface import JointType
 from ..kinematics import Kinematics, shared_joints
+from ..measures import distances
 from ..runs import Header, Trace, model_file
 from ..runs.provenance import model_files
-from .series import default_tip
+from .series import default_tip, joint_columns
 
 
 @dataclass(frozen=True)
@@ -88,10 +88,8 @@ def _readable(file: Path, header: Header, site: str) -> Kinematics:
 
 def _gap(kinematics: Kinematics, trace: Trace, site: str) -> float:
     header = trace.header
-    places: list[int] = []
-    for joint in shared_joints(kinematics, header.joints):
-        start = header.jnt_qposadr[joint]
-        places += range(start, start + JointType(header.jnt_type[joint]).nq)
-    theirs = kinematics.poses(trace.qpos[:, places], site).pos
+    joints = [header.joint_labels[k] for k in shared_joints(kinematics, header.joints)]
+    qpos = [trace.qpos[:, joint_columns(header, name).qpos] for name in joints]
+    theirs = kinematics.poses(np.concatenate([trace.qpos[:, :0], *qpos], axis=1), site).pos
     ours, _ = trace.site(site)
-    return float(np.linalg.norm(ours - theirs, axis=1).max())
+    return float(distances(ours, theirs).max())

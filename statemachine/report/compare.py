@@ -87,6 +87,26 @@ def page(
     touching = touches(one, two)
     events = events_of(comparison, touching)
     notes = [sentence(line) for line in (*said, *comparison.notes)]
+    both = _over_time(comparison, one, two, curves, events, attribution, tip, floor)
+    reasons: list[Block] = [Text(why_not)] if why_not else []
+    if attribution is not None:
+        reasons = [*_rerun(attribution), *why.causes(attribution)]
+    elif explanation is not None:
+        reasons = [*explain.causes(explanation), *explain.three_of(explanation)]
+    kept = emulated(comparison)
+    agree = why.steps(attribution) if attribution is not None and attribution.alone else []
+    made_by = [Text("This page was made by:"), Code([command])] if command else []
+    origin = [provenance((one.header, two.header), comparison), *made_by]
+    sections = [
+        Section("why", "What causes it", reasons),
+        Section("curves", "How far apart, over time", _sorted(both.charts), detail=True),
+        Section("figures", "The figures", _figures(comparison, witness, floor)),
+        Section("events", "What happens when", [events_table(events, labels)], detail=True),
+        *([_models(models, bool(kept))] if models is not None else []),
+        Section(*_EMULATED, kept),
+        Section("agree", "To make them agree", agree),
+        Section("origin", "Where this comes from", origin, detail=True),
+    ]
     blocks: list[Block] = [
         *unmatched(run),
         *([Text(one.header.says)] if one.header.says else []),
@@ -95,34 +115,10 @@ def page(
         *in_words(comparison, events, attribution),
         *(() if comparison.ended else contact_words(comparison, touching)),
         *([Items(notes)] if notes else []),
+        both,
+        *loops(comparison, played),
+        *(section for section in sections if section.blocks),
     ]
-    both = _over_time(comparison, one, two, curves, events, attribution, tip, floor)
-    blocks.append(both)
-    blocks += loops(comparison, played)
-    if attribution is not None:
-        blocks.append(
-            Section("why", "What causes it", [*_rerun(attribution), *why.causes(attribution)])
-        )
-    elif explanation is not None:
-        found = [*explain.causes(explanation), *explain.three_of(explanation)]
-        blocks.append(Section("why", "What causes it", found))
-    elif why_not:
-        blocks.append(Section("why", "What causes it", [Text(why_not)]))
-    blocks.append(Section("curves", "How far apart, over time", _sorted(both.charts), detail=True))
-    blocks.append(Section("figures", "The figures", _figures(comparison, witness, floor)))
-    table = events_table(events, (comparison.one.label, comparison.two.label))
-    blocks.append(Section("events", "What happens when", [table], detail=True))
-    kept = emulated(comparison)
-    if models is not None:
-        blocks.append(_models(models, bool(kept)))
-    if kept:
-        blocks.append(Section(*_EMULATED, kept))
-    if attribution is not None and attribution.alone:
-        blocks.append(Section("agree", "To make them agree", why.steps(attribution)))
-    made: list[Block] = [provenance((one.header, two.header), comparison)]
-    if command:
-        made += [Text("This page was made by:"), Code([command])]
-    blocks.append(Section("origin", "Where this comes from", made, detail=True))
     return Page(
         f"{one.header.experiment}: {comparison.one.label} and {comparison.two.label}",
         _origin(comparison),

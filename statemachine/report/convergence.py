@@ -6,8 +6,14 @@ from collections.abc import Sequence
 
 from ..compare import QuantityLimit, TimestepConvergence
 from ..measures.text import listed, milliseconds, quantity, short_time
-from ..page import Block, Headline, Page, Table, TableCell, Text
+from ..page import Block, Headline, Page, Table, Text
 from .finding import name_of
+
+_CONTACT = (
+    "An engine's contact law depends on its own timestep, so that after a touch the two runs need "
+    "not have a common limit. A gap that vanishes nevertheless is discretisation; of one that "
+    "stays it cannot be said here whether the law or the timestep makes it."
+)
 
 
 def page(result: TimestepConvergence, experiment: str, said: Sequence[str] = ()) -> Page:
@@ -20,42 +26,25 @@ def page(result: TimestepConvergence, experiment: str, said: Sequence[str] = ())
     """
     steps = [milliseconds(step, 3) for step in result.steps]
     one, two = result.labels
-    blocks: list[Block] = [Text(line) for line in said]
-    blocks.append(
+    touched = result.touch is not None
+    before = f"The gap with finer steps, before the first touch at {short_time(result.touch or 0)}"
+    blocks: list[Block] = [
+        *(Text(line) for line in said),
         Text(
             "Both sides run three times, with their engines' steps as given "
             f"({' and '.join(dict.fromkeys(steps))}), halved and quartered; commands and moments "
             "stay. A gap that vanishes with the steps is discretisation: each engine goes to the "
             "same motion, in steps of its own. A gap that stays is of the machines."
-        )
-    )
-    if result.touch is None:
-        blocks.append(_table(result.whole, "The gap with finer steps"))
-    else:
-        if result.before:
-            title = f"The gap with finer steps, before the first touch at {_time(result.touch)}"
-            blocks.append(_table(result.before, title))
-        blocks += [
-            _table(result.whole, "The gap with finer steps, over the whole run"),
-            Text(
-                "An engine's contact law depends on its own timestep, so that after a touch the "
-                "two runs need not have a common limit. A gap that vanishes nevertheless is "
-                "discretisation; of one that stays it cannot be said here whether the law or the "
-                "timestep makes it."
-            ),
-        ]
-    if result.whole:
-        blocks.append(Text(_own(result)))
-    blocks.append(
-        Text("Left, where the steps have no length: on the line through the last two.", small=True)
-    )
+        ),
+        *([_table(result.before, before)] if touched and result.before else []),
+        _table(result.whole, "The gap with finer steps" + ", over the whole run" * touched),
+        *([Text(_CONTACT)] if touched else []),
+        *([Text(_own(result))] if result.whole else []),
+        Text("Left, where the steps have no length: on the line through the last two.", small=True),
+    ]
     origin = f"{one} and {two}, {result.until:g} s"
     title = f"{experiment}: does the gap vanish with the timestep?"
     return Page(title, origin, blocks, _headline(result))
-
-
-def _time(seconds: float) -> TableCell:
-    return TableCell(short_time(seconds), at=seconds)
 
 
 def _table(limits: Sequence[QuantityLimit], title: str) -> Table:

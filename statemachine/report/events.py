@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -32,29 +32,41 @@ class Event:
 
 def events_of(comparison: Comparison, touches: Sequence[Touch]) -> list[Event]:
     """First touches on each side, where each quantity parts, largest differences, early ends."""
-    found: list[Event] = []
-    for touch in touches:
-        for side, contact in enumerate((touch.one, touch.two)):
-            if contact.first is not None:
-                text = f"first touch: {touch.pair}"
-                found.append(Event(contact.first, "touch", text, side, touch.pair))
-    since: dict[float, list[str]] = {}
-    largest: dict[float, list[str]] = {}
-    for agreement in comparison.agreements:
-        if agreement.kind == "contact":
-            continue
-        if agreement.since is not None:
-            since.setdefault(agreement.since, []).append(agreement.name.replace(", ", " "))
-            largest.setdefault(agreement.at, []).append(agreement.name.replace(", ", " "))
-    for time, names in since.items():
-        found.append(Event(time, "part", f"beyond tolerance from here: {'; '.join(names)}", None))
-    for time, names in largest.items():
-        found.append(Event(time, "largest", f"largest difference: {'; '.join(names)}", None))
-    for number, side in enumerate((comparison.one, comparison.two)):
-        if side.ended:
-            last = (side.rows - 1) * side.timestep
-            found.append(Event(last, "end", f"ends early: {side.ended}", number))
+    parted = [
+        (found.since, found.at, found.name.replace(", ", " "))
+        for found in comparison.agreements
+        if found.kind != "contact" and found.since is not None
+    ]
+    found = [
+        *(
+            Event(contact.first, "touch", f"first touch: {touch.pair}", side, touch.pair)
+            for touch in touches
+            for side, contact in enumerate((touch.one, touch.two))
+            if contact.first is not None
+        ),
+        *(
+            Event(since, "part", f"beyond tolerance from here: {names}", None)
+            for since, names in _together((since, name) for since, _, name in parted)
+        ),
+        *(
+            Event(at, "largest", f"largest difference: {names}", None)
+            for at, names in _together((at, name) for _, at, name in parted)
+        ),
+        *(
+            Event((side.rows - 1) * side.timestep, "end", f"ends early: {side.ended}", number)
+            for number, side in enumerate((comparison.one, comparison.two))
+            if side.ended
+        ),
+    ]
     return sorted(found, key=lambda event: event.time)
+
+
+def _together(moments: Iterable[tuple[float, str]]) -> Iterable[tuple[float, str]]:
+    """The names of each moment in a row, in the order in which the moments first come."""
+    names: dict[float, list[str]] = {}
+    for time, name in moments:
+        names.setdefault(time, []).append(name)
+    return [(time, "; ".join(those)) for time, those in names.items()]
 
 
 def events_table(events: Sequence[Event], labels: tuple[str, str]) -> Table:

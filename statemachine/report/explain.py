@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..compare.labels import lacking
 from ..compare.why import ADDS_UP, CauseShare, Explanation
-from ..measures.text import NONE, capital, few, percent, quantity, short_time, significant
+from ..measures.text import NONE, capital, percent, quantity, sentence, short_time, significant
 from ..page import Block, Items, Page, Section, Table, TableCell, Text, Verdict
 from . import why
 from .why_words import SMALL, THREE, gap_sentence, inside, noisy, three
@@ -39,7 +40,9 @@ def page(result: Explanation, said: Sequence[str] = ()) -> Page:
         f"left: {result.one}; right: {result.two}; {result.seconds:g} s, {result.runs} runs "
         f"in {short_time(result.took)}, compared at {result.moments} moments"
     )
-    first = [Text(line) for line in (*said, *_unmatched(result), result.says) if line]
+    only = lacking(result.unmatched, ("the left", "the right"))  # it comes first
+    lines = [*said, *map(sentence, (*only, *result.notes)), result.says]
+    first = [Text(line) for line in lines if line]
     name = f"{result.experiment}: why the right is not the left"
     return Page(name, origin, [*first, *causes(result), *_verdict(result)])
 
@@ -67,20 +70,6 @@ def three_of(result: Explanation) -> list[Block]:
         return []
     text = three(result.explained, result.located, result.unexplained)
     return [Text(f"{text}."), Text(THREE, small=True)]
-
-
-def _unmatched(result: Explanation) -> list[str]:
-    """What has no counterpart; it comes first."""
-    lines = []
-    for side, only in zip(("left", "right"), result.unmatched, strict=True):
-        for kind in ("joint", "actuator"):
-            names = only.get(kind, ())
-            if names:
-                plural = "s" if len(names) > 1 else ""
-                # Where the other side has some over, too, they may be the same.
-                hint = " (--map LEFT=RIGHT)" if all(o.get(kind) for o in result.unmatched) else ""
-                lines.append(f"Only the {side} has the {kind}{plural} {few(names, 6)}{hint}.")
-    return lines + [f"{capital(note)}." for note in result.notes]
 
 
 def _nothing(result: Explanation) -> str:

@@ -108,21 +108,19 @@ def of_comparison(
     ]
     parted = [agreement for agreement in comparison.agreements if agreement.since is not None]
     first = min((agreement.since or 0.0 for agreement in parted), default=None)
+    parting = few([a.name for a in parted if a.since == first], 1)
     notes = [
         "Upper: both sides. Lower: how far apart, on a log axis, and below it in grey what is "
         "exactly 0; the dotted line is the tolerance, and what is beyond it is filled. Beside "
-        "the verdict: the largest difference."
+        "the verdict: the largest difference.",
+        ""
+        if floor is None
+        else "Grey band: the chaos floor, how far the first side gets from "
+        f"itself with {changed_by(floor)}.",
+        "" if first is None else f"Grey line: they part at {short_time(first)}, first {parting}.",
+        f"{len(shown) - len(kept)} further joints and bodies differ less."
+        * (len(shown) > len(kept)),
     ]
-    if floor is not None:
-        notes.append(
-            "Grey band: the chaos floor, how far the first side gets from itself with "
-            f"{changed_by(floor)}."
-        )
-    if first is not None:
-        names = [agreement.name for agreement in parted if agreement.since == first]
-        notes.append(f"Grey line: they part at {short_time(first)}, first {few(names, 1)}.")
-    if len(shown) > len(kept):
-        notes.append(f"{len(shown) - len(kept)} further joints and bodies differ less.")
     return Plot(
         title=one.header.experiment,
         lines=_origin(one, two),
@@ -131,7 +129,7 @@ def of_comparison(
         touches=_touches([one, two], comparison.until),
         seconds=comparison.until,
         part=first,
-        notes=notes,
+        notes=[note for note in notes if note],
     )
 
 

@@ -45,31 +45,34 @@ def emulated(comparison: Comparison) -> list[Block]:
 
 def provenance(headers: tuple[Header, Header], comparison: Comparison) -> Table:
     """What made both sides."""
-    rows: list[tuple[str, ...]] = []
-
-    def row(name: str, *values: str) -> None:
-        if any(values):
-            rows.append((name, *values))
-
     a, b = (header.provenance for header in headers)
-    row(
-        "ran as", *("recorded, opened here" if h.recorded else "run for this page" for h in headers)
-    )
-    for engine in dict.fromkeys([*a.versions, *b.versions]):
-        row(engine, a.versions.get(engine, "–"), b.versions.get(engine, "–"))
-    row("model", a.model_file, b.model_file)
-    row("its SHA-256", *(TableCell(p.model_sha256, code=True) for p in (a, b)))
-    row("defaults", *(header.defaults for header in headers))
-    row("options", *(_options(header) for header in headers))
-    row("starts in", *(h.keyframe or "the default state" for h in headers))
-    row("timestep", *(milliseconds(h.timestep) + _substeps(h) for h in headers))
-    row("gravity", *(numbers(h.gravity) + " m/s²" for h in headers))
-    row("rows", f"{comparison.one.rows}", f"{comparison.two.rows}")
-    row("seed", *("none drawn" if p.seed is None else f"{p.seed}" for p in (a, b)))
-    row("energies by", *(header.energy_by or "–" for header in headers))
-    row("made again by", *(TableCell(h.command, code=True) if h.command else "–" for h in headers))
+    rows: list[tuple[str, ...]] = [
+        (
+            "ran as",
+            *("recorded, opened here" if h.recorded else "run for this page" for h in headers),
+        ),
+        *(
+            (e, a.versions.get(e, "–"), b.versions.get(e, "–"))
+            for e in {**a.versions, **b.versions}
+        ),
+        ("model", a.model_file, b.model_file),
+        ("its SHA-256", *(TableCell(p.model_sha256, code=True) for p in (a, b))),
+        ("defaults", *(header.defaults for header in headers)),
+        ("options", *(_options(header) for header in headers)),
+        ("starts in", *(h.keyframe or "the default state" for h in headers)),
+        ("timestep", *(milliseconds(h.timestep) + _substeps(h) for h in headers)),
+        ("gravity", *(numbers(h.gravity) + " m/s²" for h in headers)),
+        ("rows", f"{comparison.one.rows}", f"{comparison.two.rows}"),
+        ("seed", *("none drawn" if p.seed is None else f"{p.seed}" for p in (a, b))),
+        ("energies by", *(header.energy_by or "–" for header in headers)),
+        (
+            "made again by",
+            *(TableCell(h.command, code=True) if h.command else "–" for h in headers),
+        ),
+    ]
     labels = comparison.one.label, comparison.two.label
-    return Table(("", *labels), rows, "What made the two runs", words=frozenset({0, 1, 2}))
+    told = [row for row in rows if any(row[1:])]
+    return Table(("", *labels), told, "What made the two runs", words=frozenset({0, 1, 2}))
 
 
 def _options(header: Header) -> str:

@@ -74,11 +74,6 @@ class Live:
         self._note = ""
         self._late = 0.0  # until when it counts as late
 
-    @property
-    def speed(self) -> float:
-        """Simulated seconds that are wanted in a second of the clock."""
-        return self._pacer.speed
-
     def run(self, seconds: float | None = None, stop: Sequence[object] = ()) -> None:
         """Turn until interrupted, until `stop` has an entry, or for some seconds of the clock."""
         end = None if seconds is None else self._clock() + seconds

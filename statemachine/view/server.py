@@ -56,16 +56,12 @@ def free_port(host: str, port: int) -> int:
                 trial.bind((address[0], candidate, *address[2:]))
             except OSError as error:
                 last = error
-                if isinstance(error, PermissionError) or not _is_taken(error):
+                # Windows says WSAEADDRINUSE.
+                if error.errno not in (errno.EADDRINUSE, 10048):
                     break
             else:
                 return int(trial.getsockname()[1])
     raise BadInputError(f"cannot listen on {host}, port {port}: {last}")
-
-
-def _is_taken(error: OSError) -> bool:
-    # Windows says WSAEADDRINUSE.
-    return error.errno in (errno.EADDRINUSE, 10048)
 
 
 def serve(host: str, port: int, label: str, door: Door) -> Any:
@@ -83,7 +79,8 @@ def serve(host: str, port: int, label: str, door: Door) -> Any:
     viser = require_viser()
     # Who connects and says nothing, as browsers do to be quick, is no news for a terminal.
     logging.getLogger("websockets").addHandler(logging.NullHandler())
-    with redirect_stdout(StringIO()), _without("_VISER_PORT_OVERRIDE"), _guarded(door) as guarded:
+    os.environ.pop("_VISER_PORT_OVERRIDE", None)  # by which viser takes another port than asked
+    with redirect_stdout(StringIO()), _guarded(door) as guarded:
         server = viser.ViserServer(host=host, port=port, label=label, verbose=False)
     if not guarded:
         stop(server)
@@ -128,13 +125,3 @@ def _guarded(door: Door) -> Iterator[list[Any]]:
         yield guarded
     finally:
         websockets.serve = plain
-
-
-@contextmanager
-def _without(name: str) -> Any:
-    value = os.environ.pop(name, None)
-    try:
-        yield
-    finally:
-        if value is not None:
-            os.environ[name] = value

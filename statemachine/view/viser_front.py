@@ -60,12 +60,7 @@ class ViserFront:
 
     def commands(self) -> Sequence[Command]:
         """What was asked for since the last time."""
-        found: list[Command] = []
-        while True:
-            try:
-                found.append(self._asked.get_nowait())
-            except queue.Empty:
-                return found
+        return [self._asked.get_nowait() for _ in range(self._asked.qsize())]
 
     def show(self, frame: Snapshot, pace: Tempo, note: str) -> None:
         """Move the bodies, and what stands beside them."""
@@ -153,27 +148,27 @@ class ViserFront:
         )
         self._readout = gui.add_html("")
         self._switch_button = gui.add_button("Run", color="blue")
-        self._on_click(self._switch_button, self._toggle)
+        self._on(self._switch_button.on_click, self._toggle)
         self._count = gui.add_number("steps", 1, min=1, max=100_000, step=1)
-        self._on_click(gui.add_button("Step"), lambda: Step(int(self._count.value)))
+        self._on(gui.add_button("Step").on_click, lambda: Step(int(self._count.value)))
         start = _DEFAULT if keyframe is None else session.places[keyframe]
         places = (*session.places, _DEFAULT) if session.length is None else ("start",)
         start = start if start in places else places[0]
         self._places = gui.add_dropdown("to", places, initial_value=start)
-        self._on_click(gui.add_button("Reset"), self._reset)
+        self._on(gui.add_button("Reset").on_click, self._reset)
         self._speed = gui.add_number("speed ×", float(speed), min=SLOWEST, max=FASTEST, step=0.05)
-        self._on_update(self._speed, lambda: SetSpeed(float(self._speed.value)))
+        self._on(self._speed.on_update, lambda: SetSpeed(float(self._speed.value)))
         self._ghost: Any = None
         if len(session.names) > 1:
             self._ghost = gui.add_checkbox(f"ghost: {session.names[1]}", True)
-            self._on_update(self._ghost, self._show_ghost)
+            self._on(self._ghost.on_update, self._show_ghost)
         self._sliders: list[Any] = []
         self._seek: Any = None
         if session.length:
             self._seek = gui.add_slider(
                 "seek [s]", 0.0, float(session.length), float(session.timestep), 0.0
             )
-            self._on_update(self._seek, self._sought)
+            self._on(self._seek.on_update, self._sought)
         if session.controls:
             with gui.add_folder("ctrl"):
                 for index in range(len(session.controls)):
@@ -192,7 +187,7 @@ class ViserFront:
             value = min(max(float(slider.value), control.low), control.high)
             return SetCtrl(index, value * control.scale)
 
-        self._on_update(slider, asked)
+        self._on(slider.on_update, asked)
         self._sliders.append(slider)
 
     def _follow(self, frame: Snapshot) -> None:
@@ -242,21 +237,16 @@ class ViserFront:
         for handle in self._frames[1].values():
             handle.visible = bool(self._ghost.value)
 
-    def _on_click(self, button: Any, command: Callable[[], Command]) -> None:
+    def _on(self, listen: Callable[[Any], Any], command: Callable[[], Command | None]) -> None:
+        """Ask for something at each event of a control that comes from a tab."""
+
         # As coroutines they run one after another, in the order in which they came.
-        async def put(_event: Any) -> None:
-            self._asked.put(command())
-
-        button.on_click(put)
-
-    def _on_update(self, handle: Any, command: Callable[[], Command | None]) -> None:
         async def put(event: Any) -> None:
-            if event.client_id is not None:  # not by `_follow`
-                asked = command()
-                if asked is not None:
-                    self._asked.put(asked)
+            asked = None if event.client_id is None else command()  # None: by `_follow`
+            if asked is not None:
+                self._asked.put(asked)
 
-        handle.on_update(put)
+        listen(put)
 
 
 def _page(rows: Sequence[tuple[str, str]], warning: str) -> str:

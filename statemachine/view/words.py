@@ -15,25 +15,22 @@ def rows(frame: Snapshot, pace: Tempo, tip: str) -> list[tuple[str, str]]:
         pace: How fast it goes.
         tip: Name of the site that stands for the fingertip, or "".
     """
+    tips, joint = (None, None) if frame.gap is None else (frame.gap.tip, frame.gap.joint)
+    far = "" if joint is None else position(joint.size or 0.0, joint.unit == "m", 3)
     found = [
         ("time", short_time(frame.time)),
         ("steps", f"{frame.steps:,}"),
         ("pace", _pace(frame, pace)),
+        ("tip", tip),
+        *(
+            (f"on {pose.name}", "  ".join(f"{1000 * value:.1f}" for value in pose.tip) + " mm")
+            for pose in frame.poses
+            if pose.tip is not None
+        ),
+        ("tips apart", "" if tips is None else millimetres(tips, 3)),
+        ("joints apart", "" if joint is None else f"{far}, {joint.where}"),
     ]
-    if tip:
-        found.append(("tip", tip))
-    for pose in frame.poses:
-        if pose.tip is not None:
-            where = "  ".join(f"{1000 * value:.1f}" for value in pose.tip)
-            found.append((f"on {pose.name}", f"{where} mm"))
-    if frame.gap is not None:
-        if frame.gap.tip is not None:
-            found.append(("tips apart", millimetres(frame.gap.tip, 3)))
-        joint = frame.gap.joint
-        if joint is not None:
-            far = position(joint.size or 0.0, joint.unit == "m", 3)
-            found.append(("joints apart", f"{far}, {joint.where}"))
-    return found
+    return [(name, text) for name, text in found if text]
 
 
 def _pace(frame: Snapshot, pace: Tempo) -> str:

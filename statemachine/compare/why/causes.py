@@ -94,7 +94,12 @@ def causes(differences: Iterable[ModelDifference], finer: bool = False) -> tuple
     """
     found = list(differences)
     able = [each for each in found if not each.refused]
-    ways: list[Callable[[ModelDifference], str]] = [lambda each: each.title, _element, _kind]
+    # By themselves, those of one element, those of one kind.
+    ways: list[Callable[[ModelDifference], str]] = [
+        lambda each: each.title,
+        lambda each: f"{each.kind} {each.where}" if each.where else each.title,
+        lambda each: f"{each.subject}, of each {each.kind}" if each.where else each.title,
+    ]
     grouped = _grouped(able, ways[0])
     for way in ways[1:]:
         if finer or len(grouped) <= _MOST:
@@ -102,14 +107,6 @@ def causes(differences: Iterable[ModelDifference], finer: bool = False) -> tuple
         grouped = _grouped(able, way)
     refused = _grouped([each for each in found if each.refused], ways[0])
     return (*grouped, *refused)
-
-
-def _element(each: ModelDifference) -> str:
-    return f"{each.kind} {each.where}" if each.where else each.title
-
-
-def _kind(each: ModelDifference) -> str:
-    return f"{each.subject}, of each {each.kind}" if each.where else each.title
 
 
 def _grouped(

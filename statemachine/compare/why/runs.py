@@ -100,7 +100,8 @@ class Runs:
             except (DivergedError, EngineError, UnsupportedError) as error:
                 self._curves[key], self._reasons[key] = None, str(error)
         if self._curves[key] is None and key in self._reasons:
-            self.ended = f"{self.names[place]} does not stand: {_first(self._reasons[key])}"
+            reason = self._reasons[key].split(". ", maxsplit=1)[0]
+            self.ended = f"{self.names[place]} does not stand: {reason}"
         return self._curves[key]
 
     def gaps(self, one: Changes, two: Changes) -> dict[str, Deviation]:
@@ -179,11 +180,6 @@ class _Watch:
             two if one in robot else one for one, two in pairs if (one in robot) != (two in robot)
         ]
         return frozenset(self._model.body_names[body] for body in others)
-
-
-def _first(text: str) -> str:
-    """The first sentence of a text."""
-    return text.split(". ", maxsplit=1)[0]
 
 
 def _names(one: str, two: str) -> tuple[str, str]:
