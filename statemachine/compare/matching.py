@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..description.match import Matching, Pair, match, renamed
-from ..description.records import HERE, Robot
+from ..description.records import Robot
 from ..description.tree import GroupTree
 from ..engines import needed_part
 from ..engines.model_differences import BodyPair
@@ -21,6 +21,7 @@ from ..engines.parts import CompilerPart
 from ..errors import BadInputError, unknown_name
 from ..installed import DEFAULT
 from ..interface import Array, Model, make_data, reset
+from ..rotations import HERE
 
 Pairs = tuple[tuple[int, int], ...]
 Only = Mapping[str, tuple[str, ...]]

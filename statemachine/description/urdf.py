@@ -15,9 +15,10 @@ import numpy as np
 
 from ..errors import ModelError
 from ..interface import Array
+from ..rotations import HERE, Placement
 from ._urdf_numbers import number, numbers, origin
 from .meshes import read_mesh, volume_of
-from .records import HERE, CollisionShape, Inertial, Link, Placement, Robot, RobotJoint
+from .records import CollisionShape, Inertial, Link, Robot, RobotJoint
 
 Element = ElementTree.Element
 _LARGEST = 64 * 2**20  # bytes; a description is text, its meshes are elsewhere

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from ..description.records import Placement
+from ..rotations import Placement
 
 
 @dataclass(frozen=True, eq=False)
