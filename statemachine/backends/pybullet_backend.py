@@ -213,7 +213,7 @@ class PybulletModel(HiddenModel):
             engine_version=engine_version("pybullet"),
             path=path,
             raw={
-                raw.body(b).name or f"body {b}": plan.described(b, shared.kind)
+                raw.body(b).name or f"body {b}": plan.described(b, shared.kind)[0]
                 for b in (0, *urdf.roots(raw))
             },
             capabilities=_capabilities(as_it_comes, bound, softness(plan)),
