@@ -60,11 +60,13 @@ def checked_options(of: Any, options: Mapping[str, Any]) -> dict[str, Any]:
     return checked
 
 
-def unsupported(of: Any, feature: str) -> UnsupportedError:
-    """The error for what this backend cannot do; the reason is in its record."""
-    known = of.capabilities.behaviours.get(feature)
-    reason = known.note if known else "the engine has no such setting"
-    reason = of.capabilities.refused.get(feature, reason)
+def unsupported(of: Any, feature: str, reason: str = "") -> UnsupportedError:
+    """The error for what a backend cannot do; without a reason, that of its record."""
+    record = of.capabilities
+    if not reason:
+        known = record.behaviours.get(feature)
+        reason = known.note if known else "the engine has no such setting"
+        reason = record.refused.get(feature, reason)
     return UnsupportedError(
         f"backend {of.backend!r} does not support {feature!r}: {reason}",
         backend=of.backend,
