@@ -44,14 +44,15 @@ def check(plan: Plan, backend: str) -> None:
     rows = [*_of_joints(raw), *_of_bodies(raw), *_of_actuators(raw)]
     if not raw.opt.disableflags & NO_CONTACT:
         rows += _of_geoms(raw)
-    for kind, feature, which, says in rows:
-        for k in np.flatnonzero(which).tolist():
-            found.append((feature, f"{kind} {_name(raw, kind, k)} {says}"))
-    if not raw.opt.disableflags & NO_CONTACT:
-        found += [
-            ("contact masks within a body", f"of {pair} some geoms meet and some do not")
-            for pair in plan.surfaces.mixed
-        ]
+    found += [
+        (feature, f"{kind} {_name(raw, kind, k)} {says}")
+        for kind, feature, which, says in rows
+        for k in np.flatnonzero(which).tolist()
+    ]
+    found += [
+        ("contact masks within a body", f"of {pair} some geoms meet and some do not")
+        for pair in plan.surfaces.mixed
+    ]
     if not found:
         return
     feature, reason = found[0]
