@@ -10,6 +10,9 @@ from pathlib import Path
 
 from .errors import BadInputError
 
+if sys.platform != "win32":
+    import resource
+
 # The environment of several processes that run at once, each on one processor.
 ALONE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
@@ -43,8 +46,8 @@ def checked_jobs(jobs: int | None, processors: int = 1) -> int:
 def free_memory() -> int | None:
     """Bytes that processes may still take before the kernel ends one; None where unknown.
 
-    What Linux calls available, and what is left to the control groups (containers) of this
-    process.
+    What Linux calls available, what is left to the control groups (containers) of this process,
+    and what its own limit of addresses (`ulimit -v`) leaves it.
     """
     if sys.platform == "win32":
         return None
@@ -54,7 +57,17 @@ def free_memory() -> int | None:
         free = int(lines["MemAvailable"].split()[0]) << 10
     except (OSError, KeyError):  # nor on macOS
         return None
-    return max(min([free, *_left_to_groups()]), 0)
+    return max(min([free, *_left_to_groups(), *_left_of_addresses()]), 0)
+
+
+def _left_of_addresses() -> Iterator[int]:
+    """Bytes that this process may still map, where it has a limit of its own."""
+    if sys.platform == "win32":
+        return
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit != resource.RLIM_INFINITY:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+        yield limit - pages * resource.getpagesize()
 
 
 # Of a control group: where it is mounted, its limit, what it uses, and what of that the kernel

@@ -1,10 +1,13 @@
-"""Rotations as NumPy arrays: quaternions in both orders, matrices, angles.
+"""Rotations as NumPy arrays: quaternions in both orders, matrices, angles; and poses.
 
 Everywhere in this library a quaternion is (w, x, y, z), as in MuJoCo. Backends
 whose engine stores (x, y, z, w) convert at their own edge, with these functions.
 """
 
 from __future__ import annotations
+
+import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -74,3 +77,41 @@ def angle_between(a: ArrayLike, b: ArrayLike) -> Array:
     sine = np.linalg.norm(skew, axis=-1) / 2
     cosine = (np.trace(turn, axis1=-2, axis2=-1) - 1) / 2
     return np.arctan2(sine, cosine)
+
+
+def rotation(axis: Array, angle: float) -> Array:
+    """Rotation matrix about a unit axis (Rodrigues)."""
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+
+
+class Placement(NamedTuple):
+    """A pose: `pos` (3,) [m], `mat` (3, 3)."""
+
+    pos: Array
+    mat: Array
+
+    def __matmul__(self, inner: Placement) -> Placement:
+        """The pose `inner`, given in this frame, in the frame that this one is given in."""
+        return Placement(self.pos + self.mat @ inner.pos, self.mat @ inner.mat)
+
+    @property
+    def inverse(self) -> Placement:
+        """The way back."""
+        return Placement(-self.mat.T @ self.pos, self.mat.T)
+
+    def of(self, point: Array) -> Array:
+        """A point (3,) of this frame in the frame that this one is given in."""
+        return self.pos + self.mat @ point
+
+    def distance(self, other: Placement) -> float:
+        """Between the origins [m]."""
+        return float(np.linalg.norm(self.pos - other.pos))
+
+    def angle(self, other: Placement) -> float:
+        """Between the axes [rad]."""
+        return float(angle_between(self.mat, other.mat))
+
+
+HERE = Placement(np.zeros(3), np.eye(3))

@@ -93,6 +93,9 @@ def test_digests_count_only_from_a_folder_of_the_users_own(
     tmp_path: Path, cache: Path, how: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _saved(tmp_path)
+    monkeypatch.setattr(binary, "_trusted", set[str]())
+    monkeypatch.chdir(tmp_path)
+    assert sm.load("arm.mjb").nq == 13
     if how == "entered by others":
         cache.chmod(0o770)
     elif how == "a link":
@@ -105,12 +108,8 @@ def test_digests_count_only_from_a_folder_of_the_users_own(
         (tmp_path / "c").rename(tmp_path / ".cache")
         monkeypatch.setenv("XDG_CACHE_HOME", "")
         monkeypatch.setattr(os.path, "expanduser", lambda path: path.removeprefix("~/"))
-        monkeypatch.chdir(tmp_path)
-        monkeypatch.setattr(binary, "_trusted", set[str]())
-        with pytest.raises(ModelError, match="did not write"):
-            sm.load("arm.mjb")
-        return
-    assert "did not write" in in_its_own_python(LOAD, tmp_path).stderr
+    with pytest.raises(ModelError, match="did not write"):
+        sm.load("arm.mjb")
 
 
 def test_a_cache_that_cannot_be_written_keeps_nobody_from_saving(

@@ -80,14 +80,6 @@ def test_hold_until_and_after_its_first_contact(golden: Golden) -> None:
     assert np.abs(np.degrees(run[-1] - expected[-1])).max() < 0.0006
 
 
-def test_golden_data_notice_a_missing_armature(golden: Golden) -> None:
-    expected = _angles(golden("golden_gravity_on"))
-    model = sm.load("so101/scene").replace(armature=0.0)
-    with sm.make_data(model) as data:
-        sm.step(model, data, 2)
-        assert np.abs(data.qpos - expected[2]).max() > 1e-6
-
-
 def test_figures_are_the_public_models(menagerie: Path) -> None:
     ours = sm.load("so101").raw
     public = sm.load("so101", menagerie=menagerie).raw

@@ -437,7 +437,7 @@ def test_what_was_done_to_the_text_is_told(tmp_path: Path) -> None:
         "two joints without a name": "joints without a name given one: 2",
         "a slide with a ref": "ref of joints subtracted from qpos: 1",
         "two defaults": "top-level <default> blocks taken together: 2",
-        "mixed euler angles": "euler in another order written as quat: 1",
+        "mixed euler angles": "euler in another order written as axes: 1",
         "several roots, some of them free": "root bodies put below one body that stands still: 3",
         "a site of a body that stands still on a jointed one": "written as bodies: 1",
     }.items():

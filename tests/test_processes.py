@@ -66,33 +66,9 @@ def test_threads_continue_with_the_same_bits(backend: str) -> None:
 @pytest.mark.slow
 def test_a_replay_of_20000_steps_is_bit_identical(backend: str) -> None:
     model = sm.load("so101/scene_box", backend=backend)
-    runs = []
-    with sm.make_data(model) as used:
-        for _ in range(2):
-            for data in (used, sm.make_data(model)):
-                sm.reset(model, data, keyframe=0)
-                runs.append(_swing(model, data, 20_000))
-                if data is not used:
-                    data.close()
-    assert len(set(runs)) == 1
-
-
-def test_many_data_of_one_model(backend: str) -> None:
-    """Ten worlds, stepped in turns, each as if it were alone."""
-    model = sm.load("so101/scene_box", backend=backend)
-    worlds = [sm.make_data(model) for _ in range(10)]
-    try:
-        for k, data in enumerate(worlds):
+    runs = set()
+    with sm.make_data(model) as used, sm.make_data(model) as new:
+        for data in (used, new, used):
             sm.reset(model, data, keyframe=0)
-            data.ctrl[0] += 0.05 * k
-        for _ in range(50):
-            for data in worlds:
-                sm.step(model, data)
-        with sm.make_data(model) as alone:
-            sm.reset(model, alone, keyframe=0)
-            alone.ctrl[0] += 0.05 * 7
-            sm.step(model, alone, 50)
-            assert sm.get_state(model, alone) == sm.get_state(model, worlds[7])
-    finally:
-        for data in worlds:
-            data.close()
+            runs.add(_swing(model, data, 20_000))
+    assert len(runs) == 1

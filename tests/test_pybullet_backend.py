@@ -766,7 +766,7 @@ def test_a_dropped_data_gives_its_client_back() -> None:
 def test_no_room_for_a_client_is_said(monkeypatch: pytest.MonkeyPatch, memory: str) -> None:
     from statemachine.backends import _bullet_client
 
-    model, connect, room = load("so101"), _bullet_client.pb.connect, _bullet_client._room
+    model, connect, room = load("so101"), _bullet_client.pb.connect, _bullet_client.free_memory
     answers = [-1, -1]
     if memory == "free":
         monkeypatch.setattr(
@@ -774,7 +774,9 @@ def test_no_room_for_a_client_is_said(monkeypatch: pytest.MonkeyPatch, memory: s
         )
         said = "1024 worlds in one process at most, of 35 MB each"
     else:
-        monkeypatch.setattr(_bullet_client, "_room", lambda: answers.pop() if answers else room())
+        monkeypatch.setattr(
+            _bullet_client, "free_memory", lambda: answers.pop() if answers else room()
+        )
         said = "no memory for another world of PyBullet's: one takes 35 MB"
     with pytest.raises(EngineError, match=f"{said}.*close some Data"):
         sm.make_data(model)

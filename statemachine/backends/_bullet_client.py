@@ -19,7 +19,7 @@ pb: Any = require("pybullet")
 
 
 MOST_CLIENTS = 1024  # in one process
-_WORLD = 35  # [MB] that a client takes, nearly all of it for messages to the engine
+_WORLD = 35 << 20  # bytes that a client takes, nearly all of it for messages to the engine
 
 
 def connect() -> int:
@@ -28,41 +28,23 @@ def connect() -> int:
     Raises:
         EngineError: There is no place for another, or no memory.
     """
-    room, client = _room(), -1
-    if room >= 2 * _WORLD:  # without memory, the engine ends the process
-        client = pb.connect(pb.DIRECT)
-    if client < 0:
+    room: int | None = 0
+    for _ in range(2):
+        room = free_memory()
+        if room is None or room >= 2 * _WORLD:  # without memory, the engine ends the process
+            client = pb.connect(pb.DIRECT)
+            if client >= 0:
+                return client
         gc.collect()  # Data that nobody closed may hold the places
-        room = _room()
-        if room < 2 * _WORLD:
-            raise EngineError(
-                f"no memory for another world of PyBullet's: one takes {_WORLD} MB, and "
-                f"{room} MB are left: close some Data"
-            )
-        client = pb.connect(pb.DIRECT)
-    if client < 0:
+    if room is not None and room < 2 * _WORLD:
         raise EngineError(
-            f"PyBullet holds 1024 worlds in one process at most, of {_WORLD} MB each: "
-            "close some Data"
+            f"no memory for another world of PyBullet's: one takes {_WORLD >> 20} MB, and "
+            f"{room >> 20} MB are left: close some Data"
         )
-    return client
-
-
-def _room() -> int:
-    """Megabytes that this process may still take, as far as Linux tells; else many."""
-    room = free_memory()
-    if room is None:
-        return 1 << 20
-    try:
-        import resource
-
-        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-        if limit != resource.RLIM_INFINITY:
-            with open("/proc/self/statm", encoding="ascii") as file:
-                room = min(room, limit - int(file.read().split()[0]) * resource.getpagesize())
-    except (ImportError, OSError):
-        return 1 << 20
-    return room >> 20
+    raise EngineError(
+        f"PyBullet holds {MOST_CLIENTS} worlds in one process at most, of {_WORLD >> 20} MB each: "
+        "close some Data"
+    )
 
 
 def disconnect(client: int) -> None:

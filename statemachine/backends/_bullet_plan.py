@@ -35,8 +35,7 @@ class Plan:
         self.raw = raw
         self.surfaces = Surfaces(raw)
         self.names = urdf.Names(raw)
-        self._texts: dict[tuple[int, str], str] = {}
-        self._files: dict[tuple[int, str], dict[str, str]] = {}
+        self._described: dict[tuple[int, str], tuple[str, dict[str, str]]] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Plan, (self.raw,)
@@ -66,22 +65,14 @@ class Plan:
         weights = np.maximum(raw.body_invweight0[moving, 0], whole)
         return float(_YIELDS * raw.opt.timestep * np.median(weights)) if moving else 0.0
 
-    def described(self, root: int, kind: str) -> str:
-        """URDF of a tree of bodies as a world of that kind reads it."""
-        if (root, kind) not in self._texts:
-            self._texts[root, kind] = self._write(root, kind)
-        return self._texts[root, kind]
+    def described(self, root: int, kind: str) -> tuple[str, dict[str, str]]:
+        """URDF of a tree of bodies as a world of that kind reads it.
 
-    def beside(self, root: int, kind: str) -> dict[str, str]:
-        """The files that the URDF of a tree names: the hulls of its geoms."""
-        if (root, kind) not in self._files:
-            owner = self.raw.body_rootid[self.raw.geom_bodyid]
-            self._files[root, kind] = {
-                urdf.hull_file(geom): self.hulls[geom].obj(smaller=kind == "stepped")
-                for geom in self._hull_geoms(kind)
-                if owner[geom] == root
-            }
-        return self._files[root, kind]
+        And the files that it names, by their names: the hulls of its geoms.
+        """
+        if (root, kind) not in self._described:
+            self._described[root, kind] = self._describe(root, kind)
+        return self._described[root, kind]
 
     @cached_property
     def hulls(self) -> dict[int, Hull]:
@@ -104,18 +95,24 @@ class Plan:
             geom for geom, mesh in meshes.items() if mesh < 0 or raw.mesh_pathadr[mesh] < 0
         )
 
-    def _write(self, root: int, kind: str) -> str:
+    def _describe(self, root: int, kind: str) -> tuple[str, dict[str, str]]:
+        raw, hulls = self.raw, self._hull_geoms(kind)
         dialect = urdf.Dialect(
             capsules=True,
             looks=False,
             solids=kind != "ghost" and bool(self.surfaces.solids),
             dynamics=kind == "engine",
-            anchored=bool(root) and not floats(self.raw, root),
+            anchored=bool(root) and not floats(raw, root),
             padding=self.padding if kind == "stepped" else None,
             tips=kind != "stepped" and self._room_for_tips(root),
-            hulls=self._hull_geoms(kind),
+            hulls=hulls,
         )
-        return urdf.write(self.raw, root, dialect, self.names)
+        files = {
+            urdf.hull_file(geom): self.hulls[geom].obj(smaller=kind == "stepped")
+            for geom in hulls
+            if raw.body_rootid[raw.geom_bodyid[geom]] == root
+        }
+        return urdf.write(raw, root, dialect, self.names), files
 
 
 def _padding(raw: mujoco.MjModel) -> Array:

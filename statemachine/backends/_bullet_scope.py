@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import mujoco
@@ -13,13 +12,14 @@ from ..errors import UnsupportedError
 from ..interface import Array, JointType
 from ._bullet_hulls import ELLIPSOID, HULLS, MARGIN, roughness
 from ._bullet_law import in_force
-from ._bullet_plan import MOST_PARTS, Plan
+from ._bullet_plan import MOST_PARTS, Plan, floats
 from ._bullet_surfaces import NO_CONTACT, PLANE, damping_ratios
-from ._bullet_urdf import axes, parts, tree
+from ._bullet_urdf import parts, roots, tree
 
 _FREE, _BALL = int(JointType.FREE), int(JointType.BALL)
 # What MuJoCo's contacts have by default; and the part of a speed that is a bounce to tell of.
 _SOLREF, _SOLIMP, _BOUNCE = (0.02, 1.0), (0.9, 0.95, 0.001, 0.5, 2.0), 0.2
+_AFFINE = [int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE)]
 _SOLIDS = [
     int(kind)
     for kind in (
@@ -40,13 +40,19 @@ def check(plan: Plan, backend: str) -> None:
         backend: For the message.
     """
     raw = plan.raw
-    found = [*_parts(raw), *_joints(raw), *_bodies(raw), *_actuators(raw)]
+    found = _of_the_whole(raw)
+    rows = [*_of_joints(raw), *_of_bodies(raw), *_of_actuators(raw)]
     if not raw.opt.disableflags & NO_CONTACT:
-        found += _geoms(raw)
-        found += [
-            ("contact masks within a body", f"of {pair} some geoms meet and some do not")
-            for pair in plan.surfaces.mixed
-        ]
+        rows += _of_geoms(raw)
+    found += [
+        (feature, f"{kind} {_name(raw, kind, k)} {says}")
+        for kind, feature, which, says in rows
+        for k in np.flatnonzero(which).tolist()
+    ]
+    found += [
+        ("contact masks within a body", f"of {pair} some geoms meet and some do not")
+        for pair in plan.surfaces.mixed
+    ]
     if not found:
         return
     feature, reason = found[0]
@@ -60,23 +66,88 @@ def check(plan: Plan, backend: str) -> None:
     )
 
 
-Found = Iterator[tuple[str, str]]
-
-
-def _parts(raw: mujoco.MjModel) -> Found:
-    """Whole kinds of elements, and settings of the model."""
-    for feature, count in (
-        ("equality constraint", raw.neq),
-        ("tendon", raw.ntendon),
-        ("flex", raw.nflex),
-        ("explicit contact pair", raw.npair),
-        ("plugin", raw.nplugin),
-        ("gravity compensation", raw.ngravcomp),
-    ):
-        if count:
-            yield feature, f"the model has {count}"
+def _of_the_whole(raw: mujoco.MjModel) -> list[tuple[str, str]]:
+    """Whole kinds of elements, and settings of the model, with what is to be said of them."""
+    counts = {
+        "equality constraint": raw.neq,
+        "tendon": raw.ntendon,
+        "flex": raw.nflex,
+        "explicit contact pair": raw.npair,
+        "plugin": raw.nplugin,
+        "gravity compensation": raw.ngravcomp,
+    }
+    found = [(feature, f"the model has {count}") for feature, count in counts.items() if count]
     if raw.opt.density or raw.opt.viscosity:
-        yield "fluid", "density or viscosity is not zero"
+        found.append(("fluid", "density or viscosity is not zero"))
+    return found
+
+
+# A kind of element, what it may have, which ones have it (a mask), and how that is said.
+Rows = list[tuple[str, str, Any, str]]
+
+
+def _of_joints(raw: mujoco.MjModel) -> Rows:
+    free = raw.jnt_type == _FREE
+    # The degrees of freedom of a free joint; those of another are of no matter.
+    dofs = np.minimum(raw.jnt_dofadr[:, None] + np.arange(6), raw.nv - 1)
+    span = raw.jnt_range[:, 1] - raw.jnt_range[:, 0]
+    features = {
+        "ball joint": raw.jnt_type == _BALL,
+        "armature of a free joint": free & raw.dof_armature[dofs].any(axis=1),
+        "damping of a free joint": free & raw.dof_damping[dofs].any(axis=1),
+        "frictionloss of a free joint": free & raw.dof_frictionloss[dofs].any(axis=1),
+        "stiffness of a free joint": free & (raw.jnt_stiffness != 0),
+        "nonlinear spring": raw.jnt_stiffnesspoly.any(axis=1),
+        "nonlinear damping": raw.dof_dampingpoly[raw.jnt_dofadr].any(axis=1),
+        "two limits at once": (raw.jnt_limited > 0) & (span < 2 * raw.jnt_margin),
+    }
+    return [("joint", feature, which, "has it") for feature, which in features.items()]
+
+
+def _of_bodies(raw: mujoco.MjModel) -> Rows:
+    large, several = np.zeros(raw.nbody, dtype=bool), np.zeros(raw.nbody, dtype=bool)
+    for root in roots(raw):
+        large[root] = parts(raw, root) > MOST_PARTS
+        several[root] = floats(raw, root) and len(tree(raw, root)) > 1
+    much = f"has more than {MOST_PARTS} bodies and joints"
+    return [
+        ("body", "mocap body", raw.body_mocapid >= 0, "is one"),
+        ("body", "a tree of so many parts", large, much),
+        ("body", "free body of several bodies", several, "carries others"),
+    ]
+
+
+def _of_actuators(raw: mujoco.MjModel) -> Rows:
+    own = (raw.actuator_armature != 0) | (raw.actuator_damping != 0)
+    own |= raw.actuator_dampingpoly.any(axis=1)
+    used, joints = in_force(raw), raw.actuator_trnid[:, 0]
+    on_joint = raw.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
+    turning = np.zeros(raw.nactuator, dtype=bool)
+    turning[on_joint] = np.isin(raw.jnt_type[joints[on_joint]], (_FREE, _BALL))
+    between = (raw.actuator_delay != 0) & (raw.actuator_history[:, 1] != 0)
+    straight = raw.actuator_gaintype == int(mujoco.mjtGain.mjGAIN_FIXED)
+    straight &= np.isin(raw.actuator_biastype, _AFFINE)
+    stateful = raw.actuator_dyntype != int(mujoco.mjtDyn.mjDYN_NONE)
+    name, says = "actuator", "has it: give it to the joint"
+    return [
+        (name, "actuator armature or damping", own, says),
+        (name, "actuator transmission", used & ~on_joint, "does not drive a joint"),
+        (name, "actuator of a free joint", used & turning, "is one"),
+        (name, "actuator dynamics", used & stateful, "has a state of its own"),
+        (name, "interpolated latency", used & between, "acts between two commands"),
+        (name, "actuator gain", used & ~straight, "has one that is not constant"),
+    ]
+
+
+def _of_geoms(raw: mujoco.MjModel) -> Rows:
+    touching = (raw.geom_contype | raw.geom_conaffinity).astype(bool)
+    strange = touching & ~np.isin(raw.geom_type, _SOLIDS)
+    planes = touching & (raw.geom_type == PLANE) & (raw.geom_bodyid > 0)
+    rows = [("geom", "plane on a body", planes, "is not the world's own")]
+    for kind in np.unique(raw.geom_type[strange]).tolist():
+        says = f"is a {mujoco.mjtGeom(kind).name[7:].lower()}"
+        rows.append(("geom", "shape of a geom", strange & (raw.geom_type == kind), says))
+    return rows
 
 
 def ignored(plan: Plan) -> list[str]:
@@ -89,13 +160,12 @@ def ignored(plan: Plan) -> list[str]:
         int(mujoco.mjtIntegrator.mjINT_DISCRETE): "discrete acts as implicitfast",
     }.get(int(raw.opt.integrator))
     found = [f"the integrator {integrator}"] if integrator else []
-    for what, there in (
-        ("noslip_iterations", raw.opt.noslip_iterations),
-        ("the override of contact parameters", raw.opt.enableflags & int(override)),
-        ("sleep", raw.opt.enableflags & int(sleep)),
-    ):
-        if there:
-            found.append(f"{what} has no effect")
+    settings = {
+        "noslip_iterations": raw.opt.noslip_iterations,
+        "the override of contact parameters": raw.opt.enableflags & int(override),
+        "sleep": raw.opt.enableflags & int(sleep),
+    }
+    found += [f"{what} has no effect" for what, there in settings.items() if there]
     if raw.jnt_springyield.any():
         found.append(f"springyield has no effect ({_list(raw, 'joint', raw.jnt_springyield)})")
     if not raw.opt.disableflags & NO_CONTACT:
@@ -172,83 +242,6 @@ def _list(raw: mujoco.MjModel, kind: str, values: Array) -> str:
     order = [int(k) for k in np.argsort(-np.abs(values), kind="stable") if values[k]]
     named = [f"{_name(raw, kind, k)} {values[k]:.3g}" for k in order[:2]]
     return ", ".join(named) + (f", and {len(order) - 2} more" if len(order) > 2 else "")
-
-
-def _joints(raw: mujoco.MjModel) -> Found:
-    for j in range(raw.njnt):
-        name, kind, dof = _name(raw, "joint", j), raw.jnt_type[j], raw.jnt_dofadr[j]
-        if kind == _BALL:
-            yield "ball joint", f"joint {name} has no counterpart in URDF"
-        elif kind == _FREE:
-            own = slice(dof, dof + 6)
-            for what in ("armature", "damping", "frictionloss"):
-                if getattr(raw, f"dof_{what}")[own].any():
-                    yield f"{what} of a free joint", f"joint {name} has it"
-            if raw.jnt_stiffness[j]:
-                yield "stiffness of a free joint", f"joint {name} has it"
-        low, high = raw.jnt_range[j]
-        for what, values in (
-            ("nonlinear spring", raw.jnt_stiffnesspoly[j]),
-            ("nonlinear damping", raw.dof_dampingpoly[dof]),
-            ("two limits at once", raw.jnt_limited[j] and high - low < 2 * raw.jnt_margin[j]),
-        ):
-            if np.any(values):
-                yield what, f"joint {name} has it"
-
-
-def _bodies(raw: mujoco.MjModel) -> Found:
-    for b in range(1, raw.nbody):
-        name = _name(raw, "body", b)
-        if raw.body_mocapid[b] >= 0:
-            yield "mocap body", f"body {name} is one"
-        if not raw.body_parentid[b]:
-            count = parts(raw, b)
-            if count > MOST_PARTS:
-                yield (
-                    "a tree of so many parts",
-                    f"{name} has {count} bodies and joints: more than {MOST_PARTS}",
-                )
-        if not raw.body_parentid[b] and raw.body_jntnum[b] and not axes(raw, b):
-            rest = len(tree(raw, b)) - 1
-            if rest:
-                yield "free body of several bodies", f"{name} carries {rest} more"
-
-
-def _geoms(raw: mujoco.MjModel) -> Found:
-    for g in range(raw.ngeom):
-        if not (raw.geom_contype[g] or raw.geom_conaffinity[g]):
-            continue
-        name, kind = _name(raw, "geom", g), int(raw.geom_type[g])
-        if kind not in _SOLIDS:
-            yield "shape of a geom", f"geom {name} is a {mujoco.mjtGeom(kind).name[7:].lower()}"
-        elif kind == PLANE and raw.geom_bodyid[g]:
-            yield "plane on a body", f"geom {name} is not the world's own"
-
-
-def _actuators(raw: mujoco.MjModel) -> Found:
-    gain, bias = mujoco.mjtGain, mujoco.mjtBias
-    used = in_force(raw)
-    for a in range(raw.nactuator):
-        name, joint = _name(raw, "actuator", a), int(raw.actuator_trnid[a, 0])
-        if raw.actuator_armature[a] or raw.actuator_damping[a] or raw.actuator_dampingpoly[a].any():
-            yield "actuator armature or damping", f"actuator {name} has it: give it to the joint"
-        if not used[a]:
-            continue
-        if raw.actuator_trntype[a] != int(mujoco.mjtTrn.mjTRN_JOINT):
-            yield "actuator transmission", f"actuator {name} does not drive a joint"
-        elif raw.jnt_type[joint] in (_FREE, _BALL):
-            yield "actuator of a free joint", f"actuator {name} is one"
-        if raw.actuator_dyntype[a] != int(mujoco.mjtDyn.mjDYN_NONE):
-            yield "actuator dynamics", f"actuator {name} has a state of its own"
-        if raw.actuator_delay[a] and raw.actuator_history[a, 1]:
-            yield "interpolated latency", f"that of actuator {name} is between two commands"
-        affine = raw.actuator_biastype[a] in (int(bias.mjBIAS_NONE), int(bias.mjBIAS_AFFINE))
-        if raw.actuator_gaintype[a] != int(gain.mjGAIN_FIXED) or not affine:
-            kind = gain(raw.actuator_gaintype[a]) if affine else bias(raw.actuator_biastype[a])
-            yield (
-                "actuator gain",
-                f"that of actuator {name} is not constant ({kind.name[7:].lower()})",
-            )
 
 
 def _name(raw: mujoco.MjModel, kind: str, number: int) -> Any:

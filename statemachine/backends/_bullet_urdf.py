@@ -199,23 +199,22 @@ def _geom(
 ) -> Iterator[str]:
     pos, mat = raw.geom_pos[geom] - anchor, matrix_from_quat(raw.geom_quat[geom])
     size, kind = raw.geom_size[geom], int(raw.geom_type[geom])
+    around = f'radius="{_number(size[0])}"'
+    along = f'{around} length="{_number(2 * size[1])}"'
+    shapes = {
+        _BOX: f'<box size="{_numbers(2 * size)}"/>',
+        _SPHERE: f"<sphere {around}/>",
+        _CYLINDER: f"<cylinder {along}/>",
+        _CAPSULE: f"<{'capsule' if dialect.capsules else 'cylinder'} {along}/>",
+    }
     solids: list[tuple[Array, str]] = []
     if geom in dialect.hulls:
         solids.append((pos, f'<mesh filename="{hull_file(geom)}"/>'))
-    elif kind == _BOX:
-        solids.append((pos, f'<box size="{_numbers(2 * size)}"/>'))
-    elif kind == _SPHERE:
-        solids.append((pos, f'<sphere radius="{_number(size[0])}"/>'))
-    elif kind == _CYLINDER or (kind == _CAPSULE and dialect.capsules):
-        tag = "cylinder" if kind == _CYLINDER else "capsule"
-        length = _number(2 * size[1])
-        solids.append((pos, f'<{tag} radius="{_number(size[0])}" length="{length}"/>'))
-    elif kind == _CAPSULE:
-        length = _number(2 * size[1])
-        solids.append((pos, f'<cylinder radius="{_number(size[0])}" length="{length}"/>'))
-        for sign in (-1, 1):
-            end = pos + sign * size[1] * mat[:, 2]
-            solids.append((end, f'<sphere radius="{_number(size[0])}"/>'))
+    elif kind in shapes:
+        solids.append((pos, shapes[kind]))
+        if kind == _CAPSULE and not dialect.capsules:
+            end = size[1] * mat[:, 2]
+            solids += [(pos - end, shapes[_SPHERE]), (pos + end, shapes[_SPHERE])]
     elif kind == _MESH:
         mesh = int(raw.geom_dataid[geom])
         # MuJoCo moved the mesh to its centre and axes; the file has it where it was.

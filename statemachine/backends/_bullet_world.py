@@ -153,7 +153,7 @@ class World:
 
     def _load(self, root: int, kind: str) -> None:
         raw = self._raw
-        text = self._plan.described(root, kind)
+        text, files = self._plan.described(root, kind)
         if not root and "<collision" not in text:
             return
         free = floats(raw, root)
@@ -163,7 +163,7 @@ class World:
             | pb.URDF_USE_SELF_COLLISION_INCLUDE_PARENT  # which pairs meet, _take_surfaces says
             | pb.URDF_USE_IMPLICIT_CYLINDER  # else a polygon, and a millimetre too large
         )
-        with as_file(text, self._plan.beside(root, kind)) as name, silence() as said:
+        with as_file(text, files) as name, silence() as said:
             try:
                 body = pb.loadURDF(
                     name,

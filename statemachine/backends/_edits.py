@@ -29,6 +29,13 @@ _HINDRANCES = {  # option -> flags of a file that would leave it without effect
     "contacts": (_DISABLE.mjDSBL_CONSTRAINT,),
     "limits": (_DISABLE.mjDSBL_CONSTRAINT,),
 }
+_ARRAYS = {  # option -> the array that it is
+    "gravity": "opt.gravity",
+    "armature": "dof_armature",
+    "damping": "dof_damping",
+    "frictionloss": "dof_frictionloss",
+    "mass": "body_mass",
+}
 # Options after which constants of the compiled model have to follow (`mj_setConst`).
 CONSTANTS_FOLLOW = frozenset({"armature", "mass"})
 
@@ -56,12 +63,9 @@ def changes(raw: mujoco.MjModel, options: Mapping[str, Any]) -> dict[str, Any]:
         if name in _SWITCHES:
             flag = int(_SWITCHES[name])
             flags = (flags & ~flag) | np.where(value, 0, flag)
-        elif name == "gravity":
-            found["opt.gravity"] = value
-        elif name in ("armature", "damping", "frictionloss"):
-            found[f"dof_{name}"] = value
-        elif name == "mass":
-            found["body_mass"] = value
+        elif name in _ARRAYS:
+            found[_ARRAYS[name]] = value
+        if name == "mass":
             own = raw.body_mass > 0
             factor = np.where(own, value / np.where(own, raw.body_mass, 1.0), 1.0)
             found["body_inertia"] = factor[..., None] * raw.body_inertia

@@ -32,23 +32,24 @@ _NOTES = {
         f"{HUGE:g}, the engine's own bound",
     ),
 }
-_WITH_RK4 = Behaviour("unsupported", "with RK4 derived values are those of its fourth stage")
-_WITH_SLEEP = Behaviour("unsupported", "the counters of sleeping bodies are in no State")
-_WITH_RESET = Behaviour(
-    "unsupported", "the engine's default: it resets, and the divergence is raised after"
-)
 
 
 def capabilities(raw: mujoco.MjModel) -> Capabilities:
     """The record of one compiled model: two of its own settings show in it."""
     behaviours = {name: _NOTES.get(name, _NATIVE) for name in BEHAVIOURS}
     if raw.opt.integrator == int(mujoco.mjtIntegrator.mjINT_RK4):
-        behaviours["stale after a step"] = _WITH_RK4
+        behaviours["stale after a step"] = Behaviour(
+            "unsupported", "with RK4 derived values are those of its fourth stage"
+        )
     if resets_itself(raw):
-        behaviours["no automatic reset"] = _WITH_RESET
+        behaviours["no automatic reset"] = Behaviour(
+            "unsupported", "the engine's default: it resets, and the divergence is raised after"
+        )
     asleep = bool(raw.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP))
     if asleep:
-        behaviours["exact restore"] = _WITH_SLEEP
+        behaviours["exact restore"] = Behaviour(
+            "unsupported", "the counters of sleeping bodies are in no State"
+        )
     return Capabilities(
         options=tuple(name for name in OPTIONS if name != "max_qvel"),
         integrators=tuple(INTEGRATORS),

@@ -15,9 +15,10 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
-from ..errors import BadInputError, UnsupportedError
+from ..errors import BadInputError
 from ..interface import Array, Ints, Model, State
 from ..interface.checks import check_vector
+from ..interface.options import unsupported
 from ..interface.worlds import WRITABLE, Worlds, check_memory
 from ._delays import hold, places_of, with_room_of
 from ._mujoco_alarms import (
@@ -85,7 +86,7 @@ class MujocoWorlds(Worlds):
         except (MemoryError, mujoco.FatalError) as error:
             raise gave_up(error) from error
         except ValueError as error:  # what a Batch cannot do
-            raise _unsupported(error) from error
+            raise unsupported(model, "worlds", " ".join(str(error).split())) from error
         self._batch, self._base = batch, base
         self._varied = bool(varied[0])
         history = varied[0].get("actuator_history")
@@ -174,7 +175,7 @@ class MujocoWorlds(Worlds):
             for world in error.ids.tolist():
                 errors[world] = gave_up(self._batch.error(world))
         except ValueError as error:  # a callback in Python
-            raise _unsupported(error) from error
+            raise unsupported(self.model, "worlds", " ".join(str(error).split())) from error
         if (self._warned != self._told).any():
             errors.update(self._attend(count))
         return errors
@@ -301,7 +302,7 @@ class MujocoWorlds(Worlds):
         except SimulationError as error:
             redo[error.ids] = True
         except ValueError as error:  # a callback in Python
-            raise _unsupported(error) from error
+            raise unsupported(self.model, "worlds", " ".join(str(error).split())) from error
         redo |= (self._warned != self._told).any(axis=(1, 2))
         if not every_one:
             for name, array in arrays.items():
@@ -315,14 +316,3 @@ class MujocoWorlds(Worlds):
             for array in arrays.values():
                 array[again] = np.nan
         return again
-
-
-def _unsupported(error: ValueError) -> UnsupportedError:
-    """The error for what a Batch refuses."""
-    reason = " ".join(str(error).split())
-    return UnsupportedError(
-        f"backend 'mujoco' cannot step many worlds of this model: {reason}",
-        backend="mujoco",
-        feature="worlds",
-        reason=reason,
-    )

@@ -15,7 +15,7 @@ from typing import Any, Literal, cast
 import mujoco
 import numpy as np
 
-from ..errors import BadInputError, UnsupportedError
+from ..errors import BadInputError
 from ..interface import (
     FORCES,
     INPUTS,
@@ -27,6 +27,7 @@ from ..interface import (
     State,
 )
 from ..interface.checks import TINY, check_vector
+from ..interface.options import unsupported
 from ._delays import hold, saved
 from ._edits import CONSTANTS_FOLLOW, varied
 from ._mujoco_alarms import AlarmError, Alarms, ended, gave_up, pass_on
@@ -169,12 +170,7 @@ class MujocoModel(Model):
         override = int(mujoco.mjtEnableBit.mjENBL_OVERRIDE)
         if "friction" in options and self.raw.opt.enableflags & override:
             reason = "the file overrides the friction of all contacts (flag override)"
-            raise UnsupportedError(
-                f"backend 'mujoco' does not support 'friction' here: {reason}",
-                backend=self.backend,
-                feature="friction",
-                reason=reason,
-            )
+            raise unsupported(self, "friction", reason)
 
     def _replace(self, options: dict[str, Any]) -> MujocoModel:
         self._check_friction(options)

@@ -35,7 +35,7 @@ from ._bullet_plan import Plan
 from ._bullet_scope import check, ignored, softness
 from ._bullet_shared import Shared
 from ._bullet_world import ENGINE_TIMESTEP, World
-from ._hidden_data import HiddenData, HiddenModel
+from ._hidden_data import HiddenModel
 from .compiled import (
     check_numbers,
     compile_file,
@@ -213,7 +213,7 @@ class PybulletModel(HiddenModel):
             engine_version=engine_version("pybullet"),
             path=path,
             raw={
-                raw.body(b).name or f"body {b}": plan.described(b, shared.kind)
+                raw.body(b).name or f"body {b}": plan.described(b, shared.kind)[0]
                 for b in (0, *urdf.roots(raw))
             },
             capabilities=_capabilities(as_it_comes, bound, softness(plan)),
@@ -242,9 +242,6 @@ class PybulletModel(HiddenModel):
         worlds = {"still copy": self._shared.made_ghost, "look-ahead": ahead and ahead.raw}
         return {name: world for name, world in worlds.items() if world is not None}
 
-    def _make_data(self) -> PybulletData:
-        return PybulletData(self)
-
     def _replace(self, options: dict[str, Any]) -> PybulletModel:
         raw = edited(self.plan.raw, options)
         substeps = options.get("substeps", self.substeps)
@@ -258,11 +255,3 @@ class PybulletModel(HiddenModel):
         plan = Plan(raw)
         check(plan, "pybullet")
         return PybulletModel(plan, self.path, substeps, self.defaults, asked)
-
-
-class PybulletData(HiddenData):
-    """A Data around one client; `raw` is that client and the ids in it."""
-
-    __slots__ = ()
-
-    _home: PybulletModel  # pyright: ignore[reportIncompatibleVariableOverride]

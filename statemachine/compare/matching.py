@@ -12,13 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..description.match import Matching, Pair, match, renamed
-from ..description.records import HERE, Robot
+from ..description.records import Robot
 from ..description.tree import GroupTree
 from ..engines import room
 from ..engines.records import BodyPair
 from ..errors import BadInputError, unknown_name
 from ..installed import DEFAULT
 from ..interface import Array, Model, make_data, reset
+from ..rotations import HERE
 
 Pairs = tuple[tuple[int, int], ...]
 Only = Mapping[str, tuple[str, ...]]

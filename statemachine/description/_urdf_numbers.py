@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..interface import Array
-from .records import HERE, Placement
+from ..rotations import HERE, Placement
 
 
 def origin(element: Element, where: str) -> Placement:

@@ -14,7 +14,8 @@ import numpy as np
 
 from ..errors import unknown_name
 from ..interface import Array
-from .records import HERE, Placement, Robot
+from ..rotations import HERE, Placement
+from .records import Robot
 from .tree import Group, GroupTree
 
 _NEAR, _TILT = 5e-3, 0.1  # [m] and [rad] within which two axes may be one

@@ -7,48 +7,15 @@ something else than zero.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
 from ..interface import Array
-from ..rotations import angle_between
+from ..rotations import HERE, Placement, rotation
 
 Range = tuple[float, float]
-
-
-class Placement(NamedTuple):
-    """A pose: `pos` (3,) [m], `mat` (3, 3)."""
-
-    pos: Array
-    mat: Array
-
-    def __matmul__(self, inner: Placement) -> Placement:
-        """The pose `inner`, given in this frame, in the frame that this one is given in."""
-        return Placement(self.pos + self.mat @ inner.pos, self.mat @ inner.mat)
-
-    @property
-    def inverse(self) -> Placement:
-        """The way back."""
-        return Placement(-self.mat.T @ self.pos, self.mat.T)
-
-    def of(self, point: Array) -> Array:
-        """A point (3,) of this frame in the frame that this one is given in."""
-        return self.pos + self.mat @ point
-
-    def distance(self, other: Placement) -> float:
-        """Between the origins [m]."""
-        return float(np.linalg.norm(self.pos - other.pos))
-
-    def angle(self, other: Placement) -> float:
-        """Between the axes [rad]."""
-        return float(angle_between(self.mat, other.mat))
-
-
-HERE = Placement(np.zeros(3), np.eye(3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,10 +185,3 @@ def moved(joint: RobotJoint | None, amount: float) -> Placement:
         return Placement(joint.axis * amount, np.eye(3))
     mat = rotation(joint.axis, amount)
     return Placement(joint.anchor - mat @ joint.anchor, mat)
-
-
-def rotation(axis: Array, angle: float) -> Array:
-    """Rotation matrix about a unit axis (Rodrigues)."""
-    x, y, z = axis
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross

@@ -14,17 +14,9 @@ from functools import cached_property
 import numpy as np
 
 from ..interface import Array
+from ..rotations import HERE, Placement
 from .meshes import with_capsules
-from .records import (
-    HERE,
-    CollisionShape,
-    Inertial,
-    Link,
-    Placement,
-    Robot,
-    RobotJoint,
-    moved,
-)
+from .records import CollisionShape, Inertial, Link, Robot, RobotJoint, moved
 
 
 @dataclass(frozen=True, eq=False)

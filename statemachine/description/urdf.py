@@ -7,7 +7,6 @@ on Windows; both refuse a file for one missing mesh. The format is small, so its
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -15,9 +14,10 @@ import numpy as np
 
 from ..errors import ModelError
 from ..interface import Array
+from ..rotations import HERE
 from ._urdf_numbers import number, numbers, origin
 from .meshes import read_mesh, volume_of
-from .records import HERE, CollisionShape, Inertial, Link, Placement, Robot, RobotJoint
+from .records import CollisionShape, Inertial, Link, Robot, RobotJoint
 
 Element = ElementTree.Element
 _LARGEST = 64 * 2**20  # bytes; a description is text, its meshes are elsewhere
@@ -77,7 +77,7 @@ class _Reader:
         self.path = path
         self.root = _parse(path)
         self.notes: list[str] = []
-        self._scaled: dict[tuple[str, tuple[float, ...]], tuple[Array | None, str]] = {}
+        self._meshes: dict[str, tuple[Array | None, str]] = {}
 
     def robot(self) -> Robot:
         elements = {}
@@ -125,63 +125,63 @@ class _Reader:
         place, moves = HERE, None
         if joint is not None:
             place, moves = origin(joint, f"joint {_name(joint)!r}"), _joint(joint)
-        shapes = [self._shape(each, name) for each in element.findall("collision")]
         friction = self._friction(element, name)
-        if friction is not None:
-            shapes = [replace(each, friction=friction) for each in shapes]
+        shapes = [self._shape(each, name, friction) for each in element.findall("collision")]
         return Link(name, parent, place, moves, _inertial(element, name), tuple(shapes))
 
     def _friction(self, element: Element, name: str) -> tuple[float, ...] | None:
         """Of PyBullet's own element <contact>, where there is one."""
-        contact = element.find("contact")
-        if contact is None:
-            return None
-        tags = ("lateral_friction", "spinning_friction", "rolling_friction")
-        found = [contact.find(tag) for tag in tags]
+        kinds = ("lateral", "spinning", "rolling")
+        found = [element.find(f"contact/{kind}_friction") for kind in kinds]
         if found[0] is None:
             return None
         return tuple(
             0.0 if each is None else number(each, "value", f"link {name!r}") for each in found
         )
 
-    def _shape(self, element: Element, link: str) -> CollisionShape:
+    def _shape(
+        self, element: Element, link: str, friction: tuple[float, ...] | None
+    ) -> CollisionShape:
         where = f"a collision shape of link {link!r}"
-        geometry = element.find("geometry")
-        solid = None if geometry is None else next(iter(geometry), None)
+        solid = element.find("geometry/*")
         if solid is None:
             raise ModelError(f"{where} has no geometry")
-        place, name = origin(element, where), element.get("name", "")
-        if solid.tag == "mesh":
-            return self._mesh(solid, place, name, link, where)
-        if solid.tag == "box":
+        kind, size, points = solid.tag, (), None
+        if kind == "mesh":
+            points = self._mesh(solid, link, where)
+        elif kind == "box":
             size = tuple(edge / 2 for edge in numbers(solid, "size", 3, where))
-        elif solid.tag == "sphere":
+        elif kind == "sphere":
             size = (number(solid, "radius", where),)
-        elif solid.tag in ("cylinder", "capsule"):
+        elif kind in ("cylinder", "capsule"):
             size = (number(solid, "radius", where), number(solid, "length", where) / 2)
         else:
-            self.notes.append(f"{where} is a <{solid.tag}>, which is not known here")
-            return CollisionShape(solid.tag, place, name=name)
-        if min(size) < 0:
+            self.notes.append(f"{where} is a <{kind}>, which is not known here")
+        if min(size, default=0) < 0:
             raise ModelError(f"{where} has a negative size")
-        return CollisionShape(solid.tag, place, size, volume=volume_of(solid.tag, size), name=name)
+        return CollisionShape(
+            kind,
+            origin(element, where),
+            size,
+            points=None if points is None else points.reshape(-1, 3),
+            volume=volume_of(kind, size, points),
+            name=element.get("name", ""),
+            friction=friction,
+        )
 
-    def _mesh(
-        self, solid: Element, place: Placement, name: str, link: str, where: str
-    ) -> CollisionShape:
+    def _mesh(self, solid: Element, link: str, where: str) -> Array | None:
+        """Triangles (n, 3, 3) of a mesh [m], or None."""
         file = solid.get("filename", "")
-        scale = tuple(numbers(solid, "scale", 3, where, (1.0, 1.0, 1.0)))
-        if (file, scale) not in self._scaled:
-            self._scaled[file, scale] = read_mesh(file, self.path.parent)
-        points, trouble = self._scaled[file, scale]
+        scale = numbers(solid, "scale", 3, where, (1.0, 1.0, 1.0))
+        if file not in self._meshes:
+            self._meshes[file] = read_mesh(file, self.path.parent)
+        points, trouble = self._meshes[file]
         if points is None:
             self.notes.append(
                 f"the mesh {file!r} of link {link!r} {trouble}: its size is not known"
             )
-            return CollisionShape("mesh", place, name=name)
-        scaled = points * scale
-        volume = volume_of("mesh", (), scaled)
-        return CollisionShape("mesh", place, points=scaled.reshape(-1, 3), volume=volume, name=name)
+            return None
+        return points * scale
 
 
 def _name(element: Element) -> str:
@@ -228,10 +228,9 @@ def _joint(element: Element) -> RobotJoint | None:
         return None
     if kind not in _KINDS:
         raise ModelError(f"{where} is of type {kind!r}; known: fixed, {', '.join(_KINDS)}")
-    axis_element = element.find("axis")
     axis = np.array([1.0, 0.0, 0.0])  # what the format takes where none is given
-    if axis_element is not None:
-        axis = numbers(axis_element, "xyz", 3, where, (1.0, 0.0, 0.0))
+    if (given := element.find("axis")) is not None:
+        axis = numbers(given, "xyz", 3, where, (1.0, 0.0, 0.0))
     length = float(np.linalg.norm(axis))
     if length < 1e-9 and kind != "floating":
         raise ModelError(f"the axis of {where} is zero")
@@ -273,22 +272,15 @@ def _inertial(link: Element, name: str) -> Inertial | None:
     if element is None:
         return None
     where = f"the <inertial> of link {name!r}"
-    mass_element, inertia = element.find("mass"), element.find("inertia")
-    if mass_element is None:
+    heavy, inertia = element.find("mass"), element.find("inertia")
+    if heavy is None:
         raise ModelError(f"{where} has no <mass>")
-    mass = number(mass_element, "value", where)
+    mass = number(heavy, "value", where)
     if mass < 0:
         raise ModelError(f"{where} gives a mass of {mass} kg")
     tensor = np.zeros((3, 3))
     if inertia is not None:
-        for i, j, word in (
-            (0, 0, "xx"),
-            (0, 1, "xy"),
-            (0, 2, "xz"),
-            (1, 1, "yy"),
-            (1, 2, "yz"),
-            (2, 2, "zz"),
-        ):
-            tensor[i, j] = tensor[j, i] = number(inertia, f"i{word}", where)
+        for i, j in zip(*np.triu_indices(3), strict=True):
+            tensor[i, j] = tensor[j, i] = number(inertia, f"i{'xyz'[i]}{'xyz'[j]}", where)
     place = origin(element, where)
     return Inertial(mass, place.pos, place.mat @ tensor @ place.mat.T)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,13 @@ from .camera import Camera
 
 # MuJoCo's mjtGeom, in its order.
 _KINDS = ["plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf"]
+_PRIMITIVES: dict[str, Callable[[list[float]], Surface]] = {  # of their sizes
+    "sphere": lambda size: _shapes.ellipsoid([size[0]] * 3),
+    "ellipsoid": _shapes.ellipsoid,
+    "capsule": lambda size: _shapes.capsule(size[0], size[1]),
+    "cylinder": lambda size: _shapes.cylinder(size[0], size[1]),
+    "box": _shapes.box,
+}
 _SEEN_GROUPS = 3  # MuJoCo's viewer shows groups 0 to 2; 3 to 5 are for what only touches
 _UNSET = np.array([0.5, 0.5, 0.5, 1], dtype=np.float32)  # the rgba of a geom that names none
 _WIDE = 4  # half an endless plane is so many times the model's extent
@@ -131,36 +139,25 @@ def drawing_of(model: Model) -> Drawing:
 
 def _shape(raw: Any, geom: int, kind: str) -> Surface | None:
     """A geom in its own frame; None if there are no triangles to be had of it."""
-    size = raw.geom_size[geom].tolist()
-    data = int(raw.geom_dataid[geom])
-    match kind:
-        case "plane":
-            wide = _WIDE * float(raw.stat.extent)
-            return _shapes.rectangle(size[0] or wide, size[1] or wide)
-        case "sphere":
-            return _shapes.ellipsoid([size[0]] * 3)
-        case "ellipsoid":
-            return _shapes.ellipsoid(size)
-        case "capsule":
-            return _shapes.capsule(size[0], size[1])
-        case "cylinder":
-            return _shapes.cylinder(size[0], size[1])
-        case "box":
-            return _shapes.box(size)
-        case "hfield":
-            rows, columns = int(raw.hfield_nrow[data]), int(raw.hfield_ncol[data])
-            half_x, half_y, top, _ = raw.hfield_size[data].tolist()
-            start = int(raw.hfield_adr[data])
-            heights = raw.hfield_data[start : start + rows * columns].reshape(rows, columns)
-            return _shapes.terrain(top * heights, half_x, half_y)
-        case "mesh" | "sdf" if data >= 0:
-            vert, face = int(raw.mesh_vertadr[data]), int(raw.mesh_faceadr[data])
-            return Surface(
-                raw.mesh_vert[vert : vert + int(raw.mesh_vertnum[data])],
-                raw.mesh_face[face : face + int(raw.mesh_facenum[data])],
-            )
-        case _:
-            return None
+    size, data = raw.geom_size[geom].tolist(), int(raw.geom_dataid[geom])
+    if kind == "plane":
+        wide = _WIDE * float(raw.stat.extent)
+        return _shapes.rectangle(size[0] or wide, size[1] or wide)
+    if kind in _PRIMITIVES:
+        return _PRIMITIVES[kind](size)
+    if kind == "hfield":
+        rows, columns = int(raw.hfield_nrow[data]), int(raw.hfield_ncol[data])
+        half_x, half_y, top, _ = raw.hfield_size[data].tolist()
+        start = int(raw.hfield_adr[data])
+        heights = raw.hfield_data[start : start + rows * columns].reshape(rows, columns)
+        return _shapes.terrain(top * heights, half_x, half_y)
+    if kind in ("mesh", "sdf") and data >= 0:
+        vert, face = int(raw.mesh_vertadr[data]), int(raw.mesh_faceadr[data])
+        return Surface(
+            raw.mesh_vert[vert : vert + int(raw.mesh_vertnum[data])],
+            raw.mesh_face[face : face + int(raw.mesh_facenum[data])],
+        )
+    return None
 
 
 def _mesh_name(raw: Any, geom: int, kind: str) -> str:

@@ -84,21 +84,14 @@ def framed(
     tangent = math.tan(math.radians(fovy) / 2) * _MARGIN
     target = (cloud.min(axis=0) + cloud.max(axis=0)) / 2
     distance = 0.0
-    for _ in range(8):  # the middle of a box is not the middle of its picture: centre that
+    for k in range(9):
         offset = cloud - target
-        depth = offset @ forward
-        needed = np.maximum(
-            np.abs(offset @ right) / (tangent * aspect), np.abs(offset @ up) / tangent
-        )
+        x, y, depth = offset @ right, offset @ up, offset @ forward
+        needed = np.maximum(np.abs(x) / (tangent * aspect), np.abs(y) / tangent)
         distance = max(float((needed - depth).max()), 1e-3)
-        x = (offset @ right) / (distance + depth)
-        y = (offset @ up) / (distance + depth)
-        target = target + distance * ((x.min() + x.max()) / 2 * right)
-        target = target + distance * ((y.min() + y.max()) / 2 * up)
-    offset = cloud - target
-    depth = offset @ forward
-    needed = np.maximum(np.abs(offset @ right) / (tangent * aspect), np.abs(offset @ up) / tangent)
-    distance = max(float((needed - depth).max()), 1e-3)
+        if k < 8:  # the middle of a box is not the middle of its picture: centre that
+            for axis, along in ((right, x / (distance + depth)), (up, y / (distance + depth))):
+                target = target + distance * ((along.min() + along.max()) / 2 * axis)
     x, y, z = target.tolist()
     return Camera((x, y, z), distance, azimuth, elevation, fovy)
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
-from ..description.records import Placement
 from ..interface import Array, Model
+from ..rotations import Placement
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from numpy.typing import ArrayLike
@@ -18,7 +17,7 @@ from ..errors import ClosedDataError, DivergedError, ReadOnlyError
 from .checks import as_scalar, as_vector, check_writable
 from .model import Model
 from .records import INPUTS, Array, Contacts, State, read_only
-from .turns import Turn, alone, refuse_unless_held
+from .turns import Closable, Turn, alone, refuse_unless_held
 
 # By name, so that type checkers take the inputs for the descriptors below.
 _ENGINE = ("_advance", "_raw_model", "_raw", "_warned", "_told")
@@ -39,7 +38,7 @@ if TYPE_CHECKING:
         def __set__(self, data: object, value: float) -> None: ...
 
 
-class Data(ABC):
+class Data(Closable, ABC):
     """Everything that changes: the state, the command, and what follows from them.
 
     The inputs `qpos`, `qvel` and `ctrl` are writable in place, and the same arrays for the whole
@@ -195,14 +194,6 @@ class Data(ABC):
         """The Model that made this Data."""
         return self._home
 
-    def close(self) -> None:
-        """Give back what the engine holds. Idempotent.
-
-        The last qpos, qvel and ctrl stay readable; every other use is an error.
-        """
-        with suppress(ClosedDataError):
-            alone(self, self._shut, even_troubled=True)
-
     def _shut(self) -> None:
         self._give_up("closed")
         for name in INPUTS:
@@ -214,12 +205,6 @@ class Data(ABC):
         for name in _ENGINE:
             super().__setattr__(name, None)
         self._close()
-
-    def __enter__(self) -> Data:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self.close()
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name in INPUTS:
@@ -272,10 +257,10 @@ class Data(ABC):
     def _recover(self) -> None:
         self._trouble = ""
 
-    def _attend(self) -> None:  # noqa: B027  (optional hook)
+    def _attend(self) -> None:
         """Raise, or pass on, what the engine warned of since the last time."""
 
-    def _failed(self, error: Exception) -> None:  # noqa: B027  (optional hook)
+    def _failed(self, error: Exception) -> None:
         """Raise what `error`, out of the engine, means for this Data, if it means more."""
 
     @abstractmethod

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import BadInputError, ReadOnlyError, UnsupportedError, unknown_name
+from ..errors import BadInputError, ReadOnlyError, unknown_name
 from .checks import TINY, index_of, whole_number
-from .options import checked_options
+from .options import checked_options, unsupported
 from .records import Array, Capabilities, Ints, JointType, Keyframe, read_only
 
 
@@ -209,12 +209,7 @@ class Model(ABC):
             UnsupportedError: The backend starts from no compiled model, or cannot run this one.
             ModelError: It has a number that nothing can be computed with.
         """
-        raise UnsupportedError(
-            f"{self.backend} makes no Model from a compiled one",
-            backend=self.backend,
-            feature="compiled",
-            reason="it does not start from one",
-        )
+        raise unsupported(self, "compiled", "it does not start from a compiled model")
 
     def _check_quaternions(self, qpos: Array) -> None:
         """Raise BadInputError for a quaternion of `qpos` (nq,) that is zero."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from ..errors import BadInputError, UnsupportedError, shown, unknown_name
 from .checks import as_count, as_numbers, as_scalar, as_switch, as_vector
-from .records import Array, Capabilities, Ints, JointType
+from .records import Array, JointType
 
 # One number for each degree of freedom.
 PER_DOF = ("armature", "damping", "frictionloss")
@@ -33,28 +33,12 @@ OPTIONS = (
 )
 
 
-class Optioned(Protocol):
-    """What options are checked against: a Model, or the facts that one will be made from."""
-
-    backend: str
-    capabilities: Capabilities
-    nu: int
-    nv: int
-    nbody: int
-    ngeom: int
-    body_names: tuple[str, ...]
-    actuator_names: tuple[str, ...]
-    jnt_type: Ints
-    jnt_dofadr: Ints
-    dof_armature: Array
-    dof_damping: Array
-    dof_frictionloss: Array
-    body_mass: Array
-    actuator_kp: Array
-
-
-def checked_options(of: Optioned, options: Mapping[str, Any]) -> dict[str, Any]:
+def checked_options(of: Any, options: Mapping[str, Any]) -> dict[str, Any]:
     """Options of `Model.replace`, as a backend takes them.
+
+    Args:
+        of: What they are checked against: a Model, or the facts that one will be made from.
+        options: Values by name, as the caller gave them.
 
     Raises:
         UnsupportedError: The backend has no such option.
@@ -76,11 +60,13 @@ def checked_options(of: Optioned, options: Mapping[str, Any]) -> dict[str, Any]:
     return checked
 
 
-def unsupported(of: Optioned, feature: str) -> UnsupportedError:
-    """The error for what this backend cannot do; the reason is in its record."""
-    known = of.capabilities.behaviours.get(feature)
-    reason = known.note if known else "the engine has no such setting"
-    reason = of.capabilities.refused.get(feature, reason)
+def unsupported(of: Any, feature: str, reason: str = "") -> UnsupportedError:
+    """The error for what a backend cannot do; without a reason, that of its record."""
+    record = of.capabilities
+    if not reason:
+        known = record.behaviours.get(feature)
+        reason = known.note if known else "the engine has no such setting"
+        reason = record.refused.get(feature, reason)
     return UnsupportedError(
         f"backend {of.backend!r} does not support {feature!r}: {reason}",
         backend=of.backend,
@@ -89,19 +75,7 @@ def unsupported(of: Optioned, feature: str) -> UnsupportedError:
     )
 
 
-def _per_dof(of: Optioned, name: str, value: Any) -> Array:
-    """The value of an option of `PER_DOF`, one number or (nv,), as a new array (nv,)."""
-    given = _not_negative(name, value, of.nv)
-    if given.ndim:
-        return given
-    # One number is meant for the joints of the robot, not for a free body.
-    values = np.array(getattr(of, f"dof_{name}"))
-    scalar = np.isin(of.jnt_type, (JointType.SLIDE, JointType.HINGE))
-    values[of.jnt_dofadr[scalar]] = given
-    return values
-
-
-def _mass(of: Optioned, name: str, value: Any) -> Array:
+def _mass(of: Any, name: str, value: Any) -> Array:
     """The mass of each body, (nbody,), as a new array."""
     given = as_vector(value, (of.nbody,), name)
     wrong = (given > 0) != (of.body_mass > 0)
@@ -118,20 +92,7 @@ def _mass(of: Optioned, name: str, value: Any) -> Array:
     return given
 
 
-def _friction(of: Optioned, name: str, value: Any) -> Array:
-    """The sliding friction of each geom, one number or (ngeom,), as a new array (ngeom,)."""
-    return np.array(np.broadcast_to(_not_negative(name, value, of.ngeom), (of.ngeom,)))
-
-
-def _latency(of: Optioned, name: str, value: Any) -> Array:
-    """How late each number of ctrl acts [s], one number or (nu,), as a new array (nu,)."""
-    given = _not_negative(name, value, of.nu)
-    if (given > LONGEST).any():
-        raise BadInputError(f"{name} is at most {LONGEST:g} s; got {shown(value)}")
-    return np.array(np.broadcast_to(given, (of.nu,)))
-
-
-def _gain(of: Optioned, name: str, value: Any) -> Array:
+def _gain(of: Any, name: str, value: Any) -> Array:
     """A gain, one number or (nu,), as a new array (nu,) with NaN where there is no servo."""
     servo = ~np.isnan(of.actuator_kp)
     numbers = as_numbers(value, name)
@@ -156,38 +117,32 @@ def _gain(of: Optioned, name: str, value: Any) -> Array:
     return given
 
 
-def _fastest(of: Optioned, name: str, value: Any) -> Array:
-    """The value of max_qvel, one number or (nv,), as a new array (nv,)."""
-    given = _numbers(name, value, of.nv)
-    if (given <= 0).any():
-        raise BadInputError(f"max_qvel must be above 0; got {shown(value)}")
-    return np.array(np.broadcast_to(given, (of.nv,)))
+def _numbers(of: Any, name: str, value: Any) -> Array:
+    """The value of an option of `_LENGTHS`, one number or one for each, as a new array."""
+    length, numbers = getattr(of, _LENGTHS[name]), as_numbers(value, name)
+    given = as_vector(numbers, (length,) if numbers.ndim else (), name)
+    wanted = ""
+    if name == "max_qvel":
+        wanted = "must be above 0" if (given <= 0).any() else ""
+    elif (given < 0).any():
+        wanted = "must not be negative"
+    elif name == "latency" and (given > LONGEST).any():
+        wanted = f"is at most {LONGEST:g} s"
+    if wanted:
+        raise BadInputError(f"{name} {wanted}; got {shown(value)}")
+    values = np.array(np.broadcast_to(given, (length,)))
+    if name in PER_DOF and not given.ndim:
+        # One number is meant for the joints of the robot, not for a free body.
+        scalar = np.isin(of.jnt_type, (JointType.SLIDE, JointType.HINGE))
+        values = np.array(getattr(of, f"dof_{name}"))
+        values[of.jnt_dofadr[scalar]] = given
+    return values
 
 
-def _not_negative(name: str, value: Any, length: int) -> Array:
-    """One number, or (length,), that are at least 0."""
-    given = _numbers(name, value, length)
-    if (given < 0).any():
-        raise BadInputError(f"{name} must not be negative; got {shown(value)}")
-    return given
-
-
-def _numbers(name: str, value: Any, length: int) -> Array:
-    """One number, or (length,)."""
-    numbers = as_numbers(value, name)
-    return as_vector(numbers, (length,) if numbers.ndim else (), name)
-
-
+# Options with one number for each of what a Model counts.
+_LENGTHS = dict.fromkeys(PER_DOF, "nv") | {"friction": "ngeom", "latency": "nu", "max_qvel": "nv"}
 # What depends on the model: its options, and how a value is checked.
-_OF_MODELS = {
-    **dict.fromkeys(PER_DOF, _per_dof),
-    "mass": _mass,
-    "friction": _friction,
-    "kp": _gain,
-    "kv": _gain,
-    "latency": _latency,
-    "max_qvel": _fastest,
-}
+_OF_MODELS = {**dict.fromkeys(_LENGTHS, _numbers), "mass": _mass, "kp": _gain, "kv": _gain}
 
 
 def as_option(name: str, value: Any, integrators: Sequence[str]) -> Any:

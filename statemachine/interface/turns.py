@@ -18,10 +18,11 @@ import os
 import sys
 import weakref
 from collections.abc import Callable
+from contextlib import suppress
 from types import CodeType
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
-from ..errors import BusyDataError
+from ..errors import BusyDataError, ClosedDataError
 from .checks import kind_of
 
 T = TypeVar("T")
@@ -83,6 +84,30 @@ def alone(
             finally:
                 turn.free = data._trouble or data._home
         raise
+
+
+class Closable:
+    """What belongs to one thread at a time, and is closed in the end: a Data, or Worlds."""
+
+    __slots__ = ()
+
+    def close(self) -> None:
+        """Give back what the engine holds, and threads and processes. Idempotent.
+
+        The last inputs stay readable, and the time of Worlds; every other use is an error.
+        """
+        with suppress(ClosedDataError):
+            alone(self, self._shut, even_troubled=True)
+
+    def _shut(self) -> None:
+        """Close it; called once."""
+        raise NotImplementedError
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
 
 
 def refuse_unless_held(data: Any) -> None:

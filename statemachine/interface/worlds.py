@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from contextlib import suppress
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -31,7 +30,7 @@ from .checks import (
 )
 from .model import Model
 from .records import FORCES, INPUTS, POSES, Array, Ints, State, read_only
-from .turns import Turn, alone
+from .turns import Closable, Turn
 
 if TYPE_CHECKING:
     from .data import _Input
@@ -41,7 +40,7 @@ WRITABLE = (*INPUTS, "time")
 _SPARE = 0.95  # of the memory that is free, what worlds may take
 
 
-class Worlds(ABC):
+class Worlds(Closable, ABC):
     """n worlds: each what one Data of its Model would be, bit for bit.
 
     The inputs and the time are writable in place and the same arrays for the whole life;
@@ -142,14 +141,6 @@ class Worlds(ABC):
         self._refuse_if_troubled()
         return self._model_of(self._world(world))
 
-    def close(self) -> None:
-        """Give back threads, processes and memory. Idempotent.
-
-        The last qpos, qvel, ctrl and time stay readable; every other use is an error.
-        """
-        with suppress(ClosedDataError):
-            alone(self, self._shut, even_troubled=True)
-
     def _shut(self) -> None:
         # Copies: a view would keep the memory of the engine alive, or outlive it.
         own = vars(self)
@@ -216,7 +207,7 @@ class Worlds(ABC):
             ctrl: (n, nstep // every, nu), the command from each record to the next, or None.
         """
 
-    def _failed(self, error: Exception) -> None:  # noqa: B027  (optional hook)
+    def _failed(self, error: Exception) -> None:
         """Raise what `error`, out of a hook, means for all worlds, if it means more."""
 
     def _refuse_if_troubled(self) -> None:
@@ -301,12 +292,6 @@ class Worlds(ABC):
 
     def __delattr__(self, name: str) -> None:
         raise ReadOnlyError(f"{name!r} of Worlds cannot be deleted")
-
-    def __enter__(self) -> Worlds:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self.close()
 
     def __len__(self) -> int:
         return self.n

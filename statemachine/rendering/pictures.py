@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Generator, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -167,7 +167,7 @@ def drawn(
     """Pictures of one motion, or of two in one place, as `frames` has them."""
     files = [motion.file for motion in motions]
     bodies = [motion.xpos.shape[1] for motion in motions]
-    with LivePictures(files, bodies, size, camera, renderer) as pictures:
+    with closing(LivePictures(files, bodies, size, camera, renderer)) as pictures:
         last = len(motions[0].xpos) - 1
         for k in range(-1, last):
             pictures.ask([(motion.xpos[k + 1], motion.xquat[k + 1]) for motion in motions])
@@ -177,10 +177,7 @@ def drawn(
 
 
 class LivePictures:
-    """A process that draws bodies wherever they are told to be, one picture after the other.
-
-    A context manager.
-    """
+    """A process that draws bodies wherever they are told to be, one picture after the other."""
 
     def __init__(
         self,
@@ -247,12 +244,6 @@ class LivePictures:
                     stream.close()
         self._child.wait()
         self._said.close()
-
-    def __enter__(self) -> LivePictures:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self.close()
 
     def _send(self, content: bytes) -> None:
         assert self._child.stdin is not None

@@ -18,8 +18,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ..errors import ModelError
-from ..rotations import Array
-from .mjcf_places import Place, numbers, own_place
+from ..rotations import HERE, Array, Placement
+from .mjcf_places import numbers, own_place
 from .mjcf_text import Source, attached_source, body_of, source_of
 
 Element = ElementTree.Element
@@ -31,14 +31,6 @@ _PLACED_BY = {"quat", "euler", "axisangle", "xyaxes", "zaxis", "fromto"}
 _KINEMATIC = {"joint": {"type", "pos", "axis", "ref"}, "site": {"pos"} | _PLACED_BY}
 
 
-class FileJoint(NamedTuple):
-    """A joint of a file: its name, its kind, and its ref [rad or m]."""
-
-    name: str
-    kind: str
-    ref: float
-
-
 @dataclass
 class FileBody:
     """A body of a file.
@@ -46,13 +38,13 @@ class FileBody:
     Attributes:
         name: "" if it has none.
         written: Its name in what Pinocchio reads: there, names are unique and never empty.
-        joints: In order.
+        joints: In order: the name of each, its kind, and its ref [rad or m].
         sites: Their names, and what they are called in what Pinocchio reads.
     """
 
     name: str
     written: str
-    joints: list[FileJoint] = field(default_factory=list[FileJoint])
+    joints: list[tuple[str, str, float]] = field(default_factory=list[tuple[str, str, float]])
     sites: list[tuple[str, str]] = field(default_factory=list[tuple[str, str]])
 
 
@@ -66,7 +58,7 @@ class _Surroundings(NamedTuple):
         prefix, suffix: What its names begin with, and end in.
     """
 
-    frame: Place
+    frame: Placement
     childclass: str
     sources: tuple[Source, ...]
     prefix: str = ""
@@ -112,7 +104,7 @@ class PlainMjcf:
         still = ElementTree.SubElement(ground, "body", name="body 0")
         self.bodies: list[FileBody] = [FileBody("world", "body 0")]
         self._sites = self._joints = 0
-        around = _Surroundings(Place.IDENTITY, "", (source,))
+        around = _Surroundings(HERE, "", (source,))
         for worldbody in source.root.findall("worldbody"):
             self._write(worldbody, ground, self.bodies[0], around, still)
         roots = ground.findall("body")
@@ -218,7 +210,7 @@ class PlainMjcf:
         written = ElementTree.SubElement(target, "body", name=body.written)
         self._place(element.attrib, written, around)
         childclass = element.get("childclass") or around.childclass
-        inside = around._replace(frame=Place.IDENTITY, childclass=childclass)
+        inside = around._replace(frame=HERE, childclass=childclass)
         self._write(element, written, body, inside, written)
 
     def _joint(
@@ -235,18 +227,18 @@ class PlainMjcf:
             )
         ref = float(numbers(given.get("ref", "0"), 1)[0]) if kind in ("hinge", "slide") else 0.0
         self._done["ref"] += bool(ref)
-        if kind == "hinge" and compiler.degrees:
-            ref = float(np.deg2rad(ref))
+        if kind == "hinge":
+            ref = compiler.radians(ref)
         name = self._name(element, around)
-        body.joints.append(FileJoint(name, kind, ref))
+        body.joints.append((name, kind, ref))
         self._done["joint names"] += not name
         written = {"name": f"joint {self._joints}", "type": kind}
         self._joints += 1
         if kind != "free":
             pos, axis = given.get("pos", "0 0 0"), given.get("axis", "0 0 1")
-            if not around.frame.is_identity:
-                pos = _text(around.frame.carry(numbers(pos, 3)))
-                axis = _text(around.frame.turn @ numbers(axis, 3))
+            if not _nowhere_else(around.frame):
+                pos = _text(around.frame.of(numbers(pos, 3)))
+                axis = _text(around.frame.mat @ numbers(axis, 3))
             written |= {"pos": pos, "axis": axis}
         ElementTree.SubElement(target, "joint", written)
 
@@ -266,14 +258,14 @@ class PlainMjcf:
         plain = {"quat", "xyaxes"}
         if compiler.eulerseq == "xyz" and compiler.degrees == self._degrees:
             plain.add("euler")
-        if around.frame.is_identity and by <= plain:
+        if _nowhere_else(around.frame) and by <= plain:
             for name in ("pos", *by):
                 if name in given:
                     target.set(name, given[name])
             return
         place = around.frame @ own_place(given, compiler)
         target.set("pos", _text(place.pos))
-        target.set("quat", _text(place.quat))
+        target.set("xyaxes", _text(place.mat[:, :2].T.ravel()))
         for name in by - plain:
             unit = name == "euler" and compiler.eulerseq == "xyz"
             self._done["unit" if unit else name] += 1
@@ -308,14 +300,18 @@ _CHANGES = {
     "frame": "<frame> written out: {}",
     "replicate": "<replicate> written out: {}",
     "attach": "<attach> written out: {}",
-    "euler": "euler in another order written as quat: {}",
-    "unit": "euler in another unit written as quat: {}",
-    "axisangle": "axisangle written as quat: {}",
-    "zaxis": "zaxis written as quat: {}",
-    "fromto": "fromto of a site written as pos and quat: {}",
+    "euler": "euler in another order written as axes: {}",
+    "unit": "euler in another unit written as axes: {}",
+    "axisangle": "axisangle written as axes: {}",
+    "zaxis": "zaxis written as axes: {}",
+    "fromto": "fromto of a site written as pos and axes: {}",
     "still sites": "sites of bodies without a joint written as bodies: {}",
     "root bodies": "root bodies put below one body that stands still: {}",
 }
+
+
+def _nowhere_else(place: Placement) -> bool:
+    return not place.pos.any() and np.array_equal(place.mat, HERE.mat)
 
 
 def _text(values: Array) -> str:

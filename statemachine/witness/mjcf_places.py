@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import ModelError
-from ..rotations import Array, matrix_from_quat, times
-
-_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+from ..rotations import HERE, Array, Placement, matrix_from_quat, rotation
 
 
 class Compiler(NamedTuple):
@@ -20,38 +18,9 @@ class Compiler(NamedTuple):
     eulerseq: str
     aligned: bool
 
-
-class Place:
-    """A frame in another: `pos` (3,) [m] and `quat` (4,), wxyz, of length one."""
-
-    __slots__ = ("pos", "quat")
-    IDENTITY: ClassVar[Place]
-
-    def __init__(self, pos: Array, quat: Array) -> None:
-        self.pos = pos
-        self.quat = quat
-
-    @property
-    def turn(self) -> Array:
-        """The rotation matrix (3, 3)."""
-        return matrix_from_quat(self.quat)
-
-    @property
-    def is_identity(self) -> bool:
-        """Whether it changes nothing."""
-        return not self.pos.any() and not self.quat[1:].any()
-
-    def carry(self, point: Array) -> Array:
-        """A point (3,) of this frame, in the other."""
-        return self.pos + self.turn @ point
-
-    def __matmul__(self, inner: Place) -> Place:
-        """Where a place in this frame is, in the other."""
-        quat = times(self.quat, inner.quat)
-        return Place(self.carry(inner.pos), quat / np.linalg.norm(quat))
-
-
-Place.IDENTITY = Place(np.zeros(3), np.array([1.0, 0, 0, 0]))
+    def radians(self, angle: float) -> float:
+        """An angle of the file [rad]."""
+        return float(np.deg2rad(angle)) if self.degrees else angle
 
 
 def numbers(text: str, count: int) -> Array:
@@ -69,7 +38,7 @@ def numbers(text: str, count: int) -> Array:
     return found
 
 
-def own_place(given: Mapping[str, str], compiler: Compiler) -> Place:
+def own_place(given: Mapping[str, str], compiler: Compiler) -> Placement:
     """The place that an element's attributes give it.
 
     Args:
@@ -79,62 +48,34 @@ def own_place(given: Mapping[str, str], compiler: Compiler) -> Place:
     """
     if "fromto" in given:
         ends = numbers(given["fromto"], 6)
-        return Place((ends[:3] + ends[3:]) / 2, _z_along(ends[:3] - ends[3:]))
-    pos = numbers(given.get("pos", "0 0 0"), 3)
+        return Placement((ends[:3] + ends[3:]) / 2, _z_along(ends[:3] - ends[3:]))
+    mat = HERE.mat
     if "quat" in given:
-        return Place(pos, _unit(numbers(given["quat"], 4)))
-    if "axisangle" in given:
+        mat = matrix_from_quat(_unit(numbers(given["quat"], 4)))
+    elif "axisangle" in given:
         axis, angle = np.split(numbers(given["axisangle"], 4), [3])
-        return Place(pos, _about(_unit(axis), float(angle[0]), compiler.degrees))
-    if "euler" in given:
-        return Place(pos, _euler(numbers(given["euler"], 3), compiler))
-    if "xyaxes" in given:
+        mat = rotation(_unit(axis), compiler.radians(float(angle[0])))
+    elif "euler" in given:
+        # A small letter turns about the axes as they are by now, a capital about the parent's.
+        for letter, angle in zip(compiler.eulerseq, numbers(given["euler"], 3), strict=True):
+            turn = rotation(HERE.mat["xyz".index(letter.lower())], compiler.radians(angle))
+            mat = mat @ turn if letter.islower() else turn @ mat
+    elif "xyaxes" in given:
         x, y = np.split(numbers(given["xyaxes"], 6), 2)
         x = _unit(x)
         y = _unit(y - x * (x @ y))
-        return Place(pos, _quat_from_columns(x, y, np.cross(x, y)))
-    if "zaxis" in given:
-        return Place(pos, _z_along(numbers(given["zaxis"], 3)))
-    return Place(pos, Place.IDENTITY.quat)
-
-
-def _euler(angles: Array, compiler: Compiler) -> Array:
-    """A small letter turns about the axes as they are by now, a capital about the parent's."""
-    quat = Place.IDENTITY.quat
-    for letter, angle in zip(compiler.eulerseq, angles, strict=True):
-        turn = _about(np.array(_AXES[letter.lower()]), float(angle), compiler.degrees)
-        quat = times(quat, turn) if letter.islower() else times(turn, quat)
-    return quat
-
-
-def _about(axis: Array, angle: float, degrees: bool) -> Array:
-    half = np.deg2rad(angle) / 2 if degrees else angle / 2
-    return np.array([np.cos(half), *(np.sin(half) * axis)])
+        mat = np.array([x, y, np.cross(x, y)]).T
+    elif "zaxis" in given:
+        mat = _z_along(numbers(given["zaxis"], 3))
+    return Placement(numbers(given.get("pos", "0 0 0"), 3), mat)
 
 
 def _z_along(direction: Array) -> Array:
     """The shortest turn that takes z to a direction; the opposite of z, about x."""
     x, y, z = _unit(direction)
     sine = float(np.hypot(x, y))
-    axis = np.array([-y / sine, x / sine, 0.0]) if sine > 1e-10 else np.array([1.0, 0, 0])
-    return _about(axis, float(np.arctan2(sine, z)), degrees=False)
-
-
-def _quat_from_columns(x: Array, y: Array, z: Array) -> Array:
-    """Of the four ways to find it, that which divides by the largest number."""
-    squares = np.array(
-        [
-            1 + x[0] + y[1] + z[2],
-            1 + x[0] - y[1] - z[2],
-            1 - x[0] + y[1] - z[2],
-            1 - x[0] - y[1] + z[2],
-        ]
-    )
-    a, b, c = y[2] - z[1], z[0] - x[2], x[1] - y[0]
-    d, e, f = x[1] + y[0], z[0] + x[2], y[2] + z[1]
-    s = squares
-    rows = ([s[0], a, b, c], [a, s[1], d, e], [b, d, s[2], f], [c, e, f, s[3]])
-    return _unit(np.array(rows[int(squares.argmax())]))
+    axis = np.array([-y / sine, x / sine, 0.0]) if sine > 1e-10 else HERE.mat[0]
+    return rotation(axis, float(np.arctan2(sine, z)))
 
 
 def _unit(vector: Array) -> Array:

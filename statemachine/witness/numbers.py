@@ -14,7 +14,13 @@ import numpy as np
 from ..rotations import matrix_from_quat
 from .record import SAME_READING, Segment, WitnessModel, labels
 
-_KINDS = ("free", "ball", "slide", "hinge")  # MuJoCo's mjtJoint, in order
+# MuJoCo's mjtJoint, in order, and what Pinocchio calls such a joint.
+_KINDS = (
+    ("free", "JointModelFreeFlyer"),
+    ("ball", "JointModelSpherical"),
+    ("slide", "JointModelPrismaticUnaligned"),
+    ("hinge", "JointModelRevoluteUnaligned"),
+)
 
 
 def read_numbers(
@@ -40,16 +46,17 @@ def read_numbers(
         parent, pose, frame = carriers[int(compiled.body_parentid[body])]
         pose = pose * _pose(pin, compiled.body_pos[body], compiled.body_quat[body])
         for joint in np.flatnonzero(np.asarray(compiled.jnt_bodyid) == body).tolist():
-            kind = _KINDS[int(compiled.jnt_type[joint])]
+            kind, name = _KINDS[int(compiled.jnt_type[joint])]
             anchor = pin.SE3(np.eye(3), np.array(compiled.jnt_pos[joint], dtype=np.float64))
             if kind == "free":  # its qpos is a pose in the world
                 pose = anchor = pin.SE3.Identity()
-            moving = _joint(pin, kind, np.array(compiled.jnt_axis[joint], dtype=np.float64))
+            axis, ref = [], 0.0
+            if kind in ("slide", "hinge"):
+                axis = [np.array(compiled.jnt_axis[joint], dtype=np.float64)]
+                ref = float(compiled.qpos0[compiled.jnt_qposadr[joint]])
+            moving = getattr(pin, name)(*axis)
             parent = model.addJoint(parent, moving, pose * anchor, f"joint {joint}")
             pose = anchor.inverse()
-            ref = 0.0
-            if kind in ("slide", "hinge"):
-                ref = float(compiled.qpos0[compiled.jnt_qposadr[joint]])
             added = model.joints[parent]
             found.append((joints[joint], Segment(kind, added.idx_q, added.idx_v, ref)))
         own = model.addFrame(pin.Frame(f"body {body}", parent, frame, pose, types.BODY))
@@ -73,13 +80,3 @@ def read_numbers(
 def _pose(pin: Any, pos: Any, quat: Any) -> Any:
     turn = np.array(quat, dtype=np.float64)
     return pin.SE3(matrix_from_quat(turn / np.linalg.norm(turn)), np.array(pos, dtype=np.float64))
-
-
-def _joint(pin: Any, kind: str, axis: Any) -> Any:
-    if kind == "free":
-        return pin.JointModelFreeFlyer()
-    if kind == "ball":
-        return pin.JointModelSpherical()
-    if kind == "slide":
-        return pin.JointModelPrismaticUnaligned(axis)
-    return pin.JointModelRevoluteUnaligned(axis)

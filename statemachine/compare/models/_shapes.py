@@ -12,9 +12,10 @@ import numpy as np
 
 from ...description.match import Pair
 from ...description.meshes import extent
-from ...description.records import CollisionShape, Placement, rotation
+from ...description.records import CollisionShape
 from ...description.tree import GroupTree
 from ...interface import Array
+from ...rotations import Placement, rotation
 from .ledger import Ledger
 
 _AXES = [sign * axis for axis in np.eye(3) for sign in (1.0, -1.0)]

@@ -7,9 +7,10 @@ import math
 import numpy as np
 
 from ...description.match import Pair
-from ...description.records import Inertial, Placement
+from ...description.records import Inertial
 from ...description.tree import Group, GroupTree
 from ...interface import Array
+from ...rotations import Placement
 from .ledger import Ledger
 
 _STILL = "stands still"

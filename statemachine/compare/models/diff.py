@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...description.match import Matching, frame_names, match
-from ...description.records import HERE
 from ...description.tree import Group, GroupTree
 from ...measures.text import few, rounded
+from ...rotations import HERE
 from . import _joints, _places, _settings, _shapes, _solids
 from .ledger import AgreedFigures, Difference, Ledger, ordered
 

@@ -16,7 +16,6 @@ from ...description.records import (
     Inertial,
     Link,
     NamedFrame,
-    Placement,
     Robot,
     RobotJoint,
     Setting,
@@ -24,7 +23,7 @@ from ...description.records import (
 )
 from ...installed import require
 from ...interface import Array
-from ...rotations import matrix_from_quat
+from ...rotations import Placement, matrix_from_quat
 from . import _description_drives as drives
 
 _JOINTS = ("free", "ball", "slide", "hinge")  # mjtJoint, in its order

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...description.records import HERE, Placement
 from ...interface import Array
-from ...rotations import matrix_from_quat
+from ...rotations import HERE, Placement, matrix_from_quat
 from ..records import Counterparts, Edit, ModelDifference
 from . import _fields as fields
 from ._element_pairs import ElementPairs, Pairs, switched_off

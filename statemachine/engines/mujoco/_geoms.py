@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ...description.records import HERE, Placement
 from ...installed import require
 from ...interface import Array
 from ...measures.text import few
+from ...rotations import HERE, Placement
 from ..records import BodyPair, Counterparts, Edit, ModelDifference
 from . import _meshes as meshes
 from ._element_pairs import switched_off

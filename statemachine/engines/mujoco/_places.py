@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ...description.records import HERE, Placement, rotation
 from ...installed import require
 from ...interface import Array
+from ...rotations import HERE, Placement, rotation
 from ..records import BodyPair, Edit, ModelDifference
 from ._figures import plain, same
 from ._solid import HINGE, NEAR, SLIDE, SolidPairs, apart, name_of, quat_of

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ...description.records import HERE, Inertial, Placement
+from ...description.records import Inertial
 from ...installed import require
 from ...interface import Array
-from ...rotations import matrix_from_quat
+from ...rotations import HERE, Placement, matrix_from_quat
 from ..records import BodyPair, Counterparts
 
 SLIDE, HINGE = 2, 3  # mjtJoint

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...description.records import HERE, Inertial, Placement
+from ...description.records import Inertial
 from ...interface import Array
+from ...rotations import HERE, Placement
 from ..records import BodyPair, Edit, ModelDifference
 from ._figures import plain, same
 from ._solid import NEAR, SolidPairs, apart, name_of, quat_of

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ...backends import load
-from ...description.records import CollisionShape, Placement, Robot
+from ...description.records import CollisionShape, Robot
 from ...errors import ModelError
 from ...installed import require
-from ...rotations import matrix_from_quat
+from ...rotations import Placement, matrix_from_quat
 from ._description import description_of
 
 _FORMATS = {".mjb": "MJB", ".urdf": "URDF"}

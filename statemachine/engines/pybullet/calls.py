@@ -10,10 +10,10 @@ import marshal
 import types
 import weakref
 from collections.abc import Mapping, Sequence
-from typing import Any, cast
+from typing import Any
 
-from ...backends._hidden_data import Machine
-from ...backends.pybullet_backend import PybulletData, PybulletModel
+from ...backends._hidden_data import HiddenData, Machine
+from ...backends.pybullet_backend import PybulletModel
 from ...installed import require
 from ...interface import DERIVED, INPUTS
 from ..call_watch import CallWatch, CallWords, Contents, WatchedObject, entries, named
@@ -199,8 +199,8 @@ class PybulletWatch(CallWatch):
         for label, value in named(namespace):
             if isinstance(value, PybulletModel):
                 self._name_model(label, value)
-            elif isinstance(value, PybulletData):
-                self._name_model(f"{label}.model", cast("PybulletModel", value.model))
+            elif isinstance(value, HiddenData) and isinstance(value.model, PybulletModel):
+                self._name_model(f"{label}.model", value.model)
                 self._label(value.machine.world.raw, f"the world of {label}")
                 machine = value.machine
                 kept = self._arrays.get(machine) or _Arrays(machine)

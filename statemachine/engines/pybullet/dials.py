@@ -23,7 +23,7 @@ from ...backends._bullet_plan import Plan
 from ...backends._bullet_shared import Shared
 from ...backends._bullet_surfaces import Surfaces
 from ...backends._bullet_world import UNCLAMPED, World
-from ...backends.pybullet_backend import PybulletData, PybulletModel
+from ...backends.pybullet_backend import PybulletModel
 from ...errors import EngineError
 from ...interface import Array, Model
 from ..records import Setting
@@ -129,7 +129,7 @@ class PybulletDials:
         """(nbody, 3) inertias that the engine takes from the shapes, in the file's axes."""
         raw = self.model.compiled
         inertias = np.array(raw.body_inertia)
-        with cast("PybulletData", self.model._make_data()) as data:
+        with self.model._make_data() as data:
             world = data.raw
             for body, link, b in _links(world):
                 inertias[b] = pb.getDynamicsInfo(body, link, world.client)[2]
@@ -138,7 +138,7 @@ class PybulletDials:
     @property
     def frictions(self) -> Array:
         """(nsolid,) lateral friction that the engine tells of each link that touches."""
-        with cast("PybulletData", self.model._make_data()) as data:
+        with self.model._make_data() as data:
             world = data.raw
             told = [pb.getDynamicsInfo(b, link, world.client)[1] for b, link, _ in world.solids()]
         return np.array(told)

@@ -15,20 +15,11 @@ from ...backends import load
 from ...backends._bullet_urdf import UNLIMITED
 from ...description import urdf
 from ...description.meshes import volume_of
-from ...description.records import (
-    HERE,
-    CollisionShape,
-    Inertial,
-    Link,
-    Placement,
-    Robot,
-    RobotJoint,
-    Setting,
-)
+from ...description.records import CollisionShape, Inertial, Link, Robot, RobotJoint, Setting
 from ...errors import ModelError
 from ...installed import engine_version, require
 from ...interface import make_data
-from ...rotations import matrix_from_quat, wxyz_from_xyzw
+from ...rotations import HERE, Placement, matrix_from_quat, wxyz_from_xyzw
 from ...silence import silence
 from .world import fresh_world
 

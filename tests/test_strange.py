@@ -1,0 +1,231 @@
+"""What no simulation can be made of: numbers and names in a file, arguments of the wrong kind."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+import statemachine as sm
+from statemachine.errors import EngineWarning, ModelError, StateMachineError
+
+from .conftest import in_its_own_python, need_engine
+
+_BODY = (
+    '<body name="arm"{body}><joint name="lift"{joint}/><geom name="part" size="0.1"{geom}/></body>'
+)
+
+
+def _model(before: str = "", after: str = "", **parts: str) -> str:
+    inside = _BODY.format(**{"body": "", "joint": "", "geom": "", **parts})
+    return f"<mujoco>{before}<worldbody>{inside}</worldbody>{after}</mujoco>"
+
+
+def _servo(attribute: str) -> str:
+    return _model(after=f'<actuator><{attribute} name="servo" joint="lift"/></actuator>')
+
+
+def _key(attribute: str) -> str:
+    return _model(after=f'<keyframe><key name="up" {attribute}/></keyframe>')
+
+
+# How the error names what is wrong, and the file.
+STRANGE = {
+    "timestep is nan": _model('<option timestep="nan"/>'),
+    "timestep is 0, .* above 0": _model('<option timestep="0"/>'),
+    "timestep is -1, .* above 0": _model('<option timestep="-1"/>'),
+    "gravity of the options": _model('<option gravity="0 0 inf"/>'),
+    "body_pos of body arm is NaN": _model(body=' pos="nan 0 0"'),
+    "of body arm is infinite": _model(geom=' mass="inf"'),
+    "inertia of body arm is infinite": _model().replace("0.1", "1e200"),
+    "geom_friction of geom part is NaN": _model(geom=' friction="nan 1 1"'),
+    "geom_solimp of geom part is NaN": _model(geom=' solimp="nan 1 1"'),
+    "jnt_range of joint lift is NaN": _model(joint=' range="nan nan" limited="true"'),
+    "dof_armature of joint lift is negative": _model(joint=' armature="-5"'),
+    "dof_frictionloss of joint lift": _model(joint=' frictionloss="-1"'),
+    "actuator_.*prm of actuator servo is NaN": _servo('position kp="nan"'),
+    "key_qpos of key up is NaN": _key('qpos="nan"'),
+    "key_time of key up is NaN": _key('time="nan"'),
+    "jnt_axis of joint lift has no direction": _model(joint=' axis="0 1e300 0"'),
+    "body_quat of body arm has no direction": _model(body=' quat="1e300 0 1e300 0"'),
+}
+# Names that a file in Latin-1 may have.
+NOT_UTF_8 = {
+    "of a body": _model().replace('"arm"', '"ärm"'),
+    "of a joint": _model().replace('"lift"', '"äft"'),
+    "of a keyframe": _key('qpos="0"').replace('"up"', '"ä"'),
+    "of the model": _model().replace("<mujoco", '<mujoco model="ä"'),
+}
+# What engines take, and is seldom meant.
+NEGATIVE = {
+    "dof_damping of joint lift": _model(joint=' damping="-1"'),
+    "jnt_stiffness of joint lift": _model(joint=' stiffness="-1"'),
+    "geom_friction of geom part": _model(geom=' friction="-1 1 1"'),
+    "kp of actuator servo": _servo('position kp="-1"'),
+    "kv of actuator servo": _servo('velocity kv="-1"'),
+}
+# What is unusual, and all right.
+UNUSUAL = [
+    *(
+        _model(joint=f' armature=".1" limited="true" range="{ends}"')
+        for ends in ("-inf 1", "0 inf", "-inf inf", "5 inf", "-1.5e308 1.5e308")
+    ),
+    _servo('position kp="1" forcerange="-inf inf" forcelimited="true"'),
+    _model('<option timestep="1e-6"/>', joint=' armature="0"'),
+]
+
+
+@pytest.mark.filterwarnings("ignore::statemachine.errors.EngineWarning")
+@pytest.mark.parametrize("named", STRANGE)
+def test_a_strange_number_is_refused_by_name(named: str, backend: str, tmp_path: Path) -> None:
+    file = tmp_path / "m.xml"
+    file.write_text(STRANGE[named])
+    with pytest.raises(ModelError, match=rf"m\.xml.*{named}") as caught:
+        sm.load(file, backend=backend)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", NOT_UTF_8)
+def test_a_name_that_is_not_utf_8_is_refused(name: str, backend: str, tmp_path: Path) -> None:
+    file = tmp_path / "m.xml"
+    file.write_bytes(NOT_UTF_8[name].encode("latin-1"))
+    with pytest.raises(ModelError, match=r"m\.xml has a name that is not UTF-8: b'\\xe4") as caught:
+        sm.load(file, backend=backend)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("named", NEGATIVE)
+def test_a_negative_number_that_engines_take_is_told(
+    named: str, backend: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "m.xml"
+    file.write_text(NEGATIVE[named])
+    with pytest.warns(EngineWarning, match=rf"m\.xml: {named} is negative$") as caught:
+        sm.load(file, backend=backend)
+    assert caught[0].filename == __file__
+
+
+@pytest.mark.parametrize("text", UNUSUAL)
+def test_an_unusual_number_is_taken(text: str, backend: str, tmp_path: Path) -> None:
+    file = tmp_path / "m.xml"
+    file.write_text(text)
+    model = sm.load(file, backend=backend)
+    with sm.make_data(model) as data:
+        sm.step(model, data, 20)
+        assert np.isfinite(data.qpos).all()
+
+
+def test_public_models_are_taken(menagerie: Path) -> None:
+    files = sorted(menagerie.glob("*/scene.xml"))
+    assert files
+    for file in files:
+        sm.load(file)
+
+
+def test_a_message_is_cut_and_keeps_its_ends(tmp_path: Path) -> None:
+    file, name = tmp_path / "m.xml", "j" * 10**6
+    file.write_text(_model(joint=' armature="-1"').replace("lift", name))
+    with pytest.raises(ModelError) as caught:
+        sm.load(file)
+    message = str(caught.value)
+    assert len(message) <= 2000
+    assert message.startswith(str(file))
+    assert message.endswith("j is negative")
+    assert str(pickle.loads(pickle.dumps(caught.value))) == message
+    file.write_text(_model(joint=' damping="-1"').replace("lift", name))
+    with pytest.warns(EngineWarning) as warned:
+        sm.load(file)
+    assert len(str(warned[0].message)) <= 2000
+
+
+def test_what_compiling_warns_of_is_said_and_leaves_no_file(backend: str, tmp_path: Path) -> None:
+    """MuJoCo takes the density for a mass that is no number, and says so in a log file."""
+    (tmp_path / "m.xml").write_text(_model(geom=' mass="nan"'))
+    code = f"""
+import warnings
+import statemachine as sm
+with warnings.catch_warnings(record=True) as caught:
+    warnings.simplefilter("always")
+    model = sm.load("m.xml", backend="{backend}")
+    with sm.make_data(model) as data:
+        sm.step(model, data)
+for each in caught:
+    print(each.category.__name__, each.message)
+"""
+    done = in_its_own_python(code, tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("EngineWarning MuJoCo")
+    assert "contains a 'NaN'" in done.stdout
+    assert backend == "mujoco" or "m.xml" in done.stdout
+    assert [path.name for path in tmp_path.iterdir()] == ["m.xml"]
+
+
+def test_a_load_gives_back_the_handler_of_others(tmp_path: Path) -> None:
+    need_engine("pybullet")
+    file, heard = tmp_path / "m.xml", []
+    file.write_text(_model(geom=' mass="nan"'))
+    handler, before = heard.append, mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(handler)
+    try:
+        with pytest.warns(EngineWarning, match="m.xml"):
+            sm.load(file, backend="pybullet")
+        assert mujoco.get_mju_user_warning() is handler
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+@pytest.mark.parametrize("model", [5, None, b"so101", ["so101"], 1.5, object()])
+def test_what_is_no_name_of_a_model(model: Any) -> None:
+    with pytest.raises(TypeError, match="its name or a path") as caught:
+        sm.load(model)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("word", [[], {}, None, 5, np.array([1, 2]), b"mujoco", "mujcoo"])
+@pytest.mark.parametrize("argument", ["backend", "defaults"])
+def test_what_is_no_name_of_a_backend_or_of_defaults(argument: str, word: Any) -> None:
+    with pytest.raises(StateMachineError, match=f"no {argument} named"):
+        sm.load("so101", **{argument: word})
+
+
+@pytest.mark.parametrize(
+    "option",
+    ["gravity", "timestep", "substeps", "armature", "damping", "limits", "integrator"],
+)
+@pytest.mark.parametrize(
+    "value",
+    [10**400, [[1, 2], [3]], [10**400, 0, 0], np.array(["x", "y"]), np.zeros((2, 2, 2)), {}, "1",
+     None, [None, 1, 2], np.full((40, 3), 7), object()],
+)  # fmt: skip
+def test_options_of_the_wrong_kind_are_one_line(option: str, value: Any) -> None:
+    model = sm.load("so101")
+    with pytest.raises(StateMachineError) as caught:
+        model.replace(**{option: value})
+    assert "\n" not in str(caught.value)
+
+
+class Lines:
+    """Something whose repr has many lines."""
+
+    def __repr__(self) -> str:
+        return "a\nb\x1b[31m" * 300
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda model, data, lines: sm.step(model, data, lines),
+        lambda model, data, lines: sm.reset(model, data, lines),
+        lambda model, data, lines: model.replace(limits=lines),
+    ],
+)
+def test_a_repr_of_many_lines_is_one_line_of_a_message(call: Any) -> None:
+    model = sm.load("so101")
+    with sm.make_data(model) as data, pytest.raises(StateMachineError) as caught:
+        call(model, data, Lines())
+    assert len(str(caught.value).splitlines()) == 1
+    assert "\x1b" not in str(caught.value)
