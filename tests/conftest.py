@@ -81,11 +81,25 @@ def around(owner: Any, name: str) -> Callable[[Callable[..., Any]], Patch]:
     return decorate
 
 
+def written(file: Path, text: str) -> Path:
+    """A file with a text."""
+    file.write_text(text)
+    return file
+
+
+@contextmanager
+def opened(model: Model, keyframe: int | str | None = None) -> Iterator[tuple[Model, Data]]:
+    """A Model and a Data of it, in a keyframe or in the default state."""
+    with make_data(model) as data:
+        if keyframe is not None:
+            reset(model, data, keyframe)
+        yield model, data
+
+
 @contextmanager
 def started(model: Model) -> Iterator[Data]:
     """A Data in keyframe 0."""
-    with make_data(model) as data:
-        reset(model, data, keyframe=0)
+    with opened(model, 0) as (_, data):
         yield data
 
 
@@ -191,10 +205,15 @@ def here(capsys: pytest.CaptureFixture[str]) -> Cli:
 
 @pytest.fixture
 def cli(tmp_path: Path) -> Cli:
-    """Run the command line in a process of its own, from an empty folder."""
+    """Run the command line in a process of its own, from an empty folder.
 
-    def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
+    `code` is the exit code that it must have, if that is all that is asked of it.
+    """
+
+    def run(
+        *arguments: str, code: int | None = None, **environment: str
+    ) -> subprocess.CompletedProcess[str]:
+        done = subprocess.run(
             [sys.executable, "-m", "statemachine", *arguments],
             capture_output=True,
             text=True,
@@ -203,5 +222,7 @@ def cli(tmp_path: Path) -> Cli:
             env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUTF8": "1", **environment},
             check=False,
         )
+        assert code in (None, done.returncode), done.stderr
+        return done
 
     return run

@@ -23,7 +23,7 @@ from statemachine.runs import record_scenario
 from statemachine.runs.commands import hold_ctrl, is_servo
 from statemachine.runs.scenarios import SCENARIOS, fitting
 
-from .conftest import need_engine
+from .conftest import written
 
 # A slide with a servo whose gear is 2, a hinge with a motor of gear 3 that holds a load, and a
 # hinge that a velocity servo drives.
@@ -69,9 +69,7 @@ SEVERAL = """<mujoco><worldbody><body name="b"><joint name="ball" type="ball"/><
 @pytest.fixture
 def model(tmp_path: Path) -> Any:
     def make(text: str, name: str = "robot.xml") -> sm.Model:
-        file = tmp_path / name
-        file.write_text(text)
-        return sm.load(file)
+        return sm.load(written(tmp_path / name, text))
 
     return make
 
@@ -307,8 +305,8 @@ def test_an_actuator_may_take_several_numbers_of_ctrl(model: Any) -> None:
     assert main(["compare", "--models", str(robot.path), str(robot.path)]) == 0
 
 
+@pytest.mark.usefixtures("bullet")
 def test_no_filler_of_ours_is_shown(model: Any, capsys: pytest.CaptureFixture[str]) -> None:
-    need_engine("pybullet")
     file = str(model(MIXED.format(rest="").replace(' range="-1 1" limited="true"', "")).path)
     # The robots are the same; a motor whose ctrl has a range may differ in what it can exert.
     main(["compare", "--models", file, "--backends", "mujoco", "pybullet"])

@@ -13,6 +13,8 @@ import statemachine as sm
 from statemachine.interface import JointType
 from statemachine.models import model_names, models_dir
 
+from .conftest import opened
+
 ARM = models_dir() / "so101" / "so101.xml"
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
 
@@ -87,9 +89,7 @@ def test_what_touches_at_first(
     scene: str, keyframe: int | None, touching: tuple[int, set[str]]
 ) -> None:
     """Nothing at the zero pose; the box, between open jaws, the floor."""
-    model = sm.load(scene)
-    with sm.make_data(model) as data:
-        sm.reset(model, data, keyframe=keyframe)
+    with opened(sm.load(scene), keyframe=keyframe) as (model, data):
         sm.forward(model, data)
         assert _touching(model, data) == touching
 

@@ -35,7 +35,7 @@ from statemachine.probes.audit.points import points
 from statemachine.probes.audit.trials import AuditFinding
 from statemachine.report import audit as report
 
-from .conftest import Cli, Patch, around, need_engine, registered
+from .conftest import Cli, Patch, around, need_engine, registered, written
 
 SCENE = "so101/scene_box"
 
@@ -226,10 +226,10 @@ MODELS = {
 
 @pytest.mark.parametrize("body", MODELS)
 def test_any_model_has_save_points(body: str, tmp_path: Path) -> None:
-    file = tmp_path / "model.xml"
-    file.write_text(
+    file = written(
+        tmp_path / "model.xml",
         '<mujoco><worldbody><geom type="plane" size="3 3 1"/><body pos="0 0 .5">'
-        f"{MODELS[body]}</body></worldbody></mujoco>"
+        f"{MODELS[body]}</body></worldbody></mujoco>",
     )
     result = audit.run(sm.load(file), steps=20)
     assert result.holds
@@ -246,13 +246,13 @@ def test_any_model_has_save_points(body: str, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_components_of_other_models_are_tried(tmp_path: Path) -> None:
-    file = tmp_path / "model.xml"
-    file.write_text(
+    file = written(
+        tmp_path / "model.xml",
         """<mujoco><worldbody><body name="m" mocap="true" pos="1 0 1"><geom size=".05"/></body>
         <body pos="0 0 1"><joint name="j" axis="0 1 0"/><geom size=".05" pos=".3 0 0"/></body>
         <body name="f" pos="0 -1 .5"><freejoint/><geom size=".05"/></body></worldbody>
         <equality><weld body1="f" body2="m"/></equality><actuator>
-        <general joint="j" dyntype="filter" dynprm=".1" gainprm="5"/></actuator></mujoco>"""
+        <general joint="j" dyntype="filter" dynprm=".1" gainprm="5"/></actuator></mujoco>""",
     )
     found = audit.run(sm.load(file), steps=20).audited[0].conclusion
     assert {"act", "eq_active", "mocap_pos"} <= {each.field for each in found.missing}
@@ -260,20 +260,21 @@ def test_components_of_other_models_are_tried(tmp_path: Path) -> None:
 
 
 def test_a_model_without_anything_that_moves_is_refused(tmp_path: Path) -> None:
-    file = tmp_path / "model.xml"
-    file.write_text('<mujoco><worldbody><geom size="1"/></worldbody></mujoco>')
+    file = written(
+        tmp_path / "model.xml", '<mujoco><worldbody><geom size="1"/></worldbody></mujoco>'
+    )
     with pytest.raises(BadInputError, match="nothing moves"):
         audit.run(sm.load(file))
 
 
 @pytest.mark.slow
 def test_where_a_run_diverges_it_is_not_saved(tmp_path: Path) -> None:
-    file = tmp_path / "model.xml"
-    file.write_text(
+    file = written(
+        tmp_path / "model.xml",
         """<mujoco><worldbody><body>
         <joint name="j" axis="0 1 0" stiffness="-3e4" damping="10"/>
         <geom size=".1" pos=".3 0 0"/></body></worldbody>
-        <actuator><position joint="j" kp="9e4" ctrlrange="-1 1"/></actuator></mujoco>"""
+        <actuator><position joint="j" kp="9e4" ctrlrange="-1 1"/></actuator></mujoco>""",
     )
     with pytest.warns(EngineWarning, match="stiffness of joint j is negative"):
         model = sm.load(file)
@@ -483,8 +484,8 @@ def test_an_engine_whose_restore_drops_the_warm_start(monkeypatch: pytest.Monkey
     assert broken(found) == {("interface", STATE)}
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_restore_of_pybullet_that_depends_on_the_past(monkeypatch: pytest.MonkeyPatch) -> None:
-    need_engine("pybullet")
     from statemachine.backends._bullet_world import World
 
     monkeypatch.setattr(World, "place", World.put)
@@ -496,8 +497,8 @@ def test_a_restore_of_pybullet_that_depends_on_the_past(monkeypatch: pytest.Monk
     assert "taken apart + targets" not in engine.agree
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_read_of_pybullet_that_perturbs(monkeypatch: pytest.MonkeyPatch) -> None:
-    need_engine("pybullet")
     pb: Any = require("pybullet")
     right = pb.getContactPoints
 
@@ -624,8 +625,7 @@ def test_the_page_says_that_nothing_suffices(of_pybullet: audit.Audit) -> None:
 
 @pytest.mark.slow
 def test_the_command_fits_the_terminal(cli: Cli, backend: str) -> None:
-    done = cli("audit", "--steps", "10", "--backend", backend)
-    assert done.returncode == 0, done.stderr
+    done = cli("audit", "--steps", "10", "--backend", backend, code=0)
     assert done.stderr == ""
     lines = done.stdout.splitlines()
     assert max(map(cell_len, lines)) <= 80
@@ -634,8 +634,7 @@ def test_the_command_fits_the_terminal(cli: Cli, backend: str) -> None:
 
 
 def test_the_command_speaks_json(cli: Cli) -> None:
-    done = cli("audit", "--steps", "10", "--json", "--seed", "3")
-    assert done.returncode == 0
+    done = cli("audit", "--steps", "10", "--json", "--seed", "3", code=0)
     found = json.loads(done.stdout, parse_constant=pytest.fail)["mujoco"]
     assert found["holds"] is True
     assert found["provenance"]["seed"] == 3
@@ -655,15 +654,14 @@ def test_a_broken_promise_is_exit_code_1(
 
 @pytest.mark.parametrize("wrong", [("--steps", "0"), ("--seed=-1",), ("--backend", "mujcoo")])
 def test_bad_input_is_one_line(cli: Cli, wrong: tuple[str, ...]) -> None:
-    done = cli("audit", *wrong)
-    assert done.returncode == 2
+    done = cli("audit", *wrong, code=2)
     assert done.stdout == ""
     assert len(done.stderr.splitlines()) == 1
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("bullet")
 def test_no_file_and_no_world_stay(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    need_engine("pybullet")
     pb: Any = require("pybullet")
 
     def worlds() -> set[int]:

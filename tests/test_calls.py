@@ -205,9 +205,9 @@ def test_looks_disturb_nothing_for_long(engine: str) -> None:
     assert [call.count for call in loop.calls if call.function == step] == [200]
 
 
+@pytest.mark.usefixtures("bullet")
 def test_looks_leave_stale_what_is_stale() -> None:
     """Link poses and contact points are those of before the step until someone asks anew."""
-    need_engine("pybullet")
     reads = """
 import pybullet
 arm = next(tree.body for tree in data.raw.trees if tree.joints)
@@ -227,8 +227,8 @@ def test_nothing_lives_longer_for_being_recorded() -> None:
     assert line.printed == "True\n"
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_world_is_not_taken_for_the_next_of_its_number() -> None:
-    need_engine("pybullet")
     lines = short("pybullet", "data.close()\nother = sm.make_data(model)\nsm.step(model, other)")
     assert [call.on for call in lines[0].calls] == ["the world of data"]
     assert "the world of data" not in {call.on for line in lines[1:] for call in line.calls}
@@ -345,8 +345,8 @@ def test_several_data_are_told_apart(engine: str) -> None:
         ]
 
 
+@pytest.mark.usefixtures("bullet")
 def test_pybullet_computes_when_it_is_read() -> None:
-    need_engine("pybullet")
     forward, read, again, step, late = short(
         "pybullet",
         "sm.forward(model, data)\nprint(data.site_xpos)\nprint(data.site_xpos)\n"
@@ -368,8 +368,8 @@ def test_pybullet_computes_when_it_is_read() -> None:
     assert ours["getJointStates"].changed == ()
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_still_copy_is_never_stepped() -> None:
-    need_engine("pybullet")
     recording = record(WHOLE.format(engine="pybullet"), "pybullet")
     on = {
         (call.on, call.function)
@@ -395,8 +395,8 @@ def test_the_still_copy_is_never_stepped() -> None:
     ]
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_client_of_a_call_is_found_where_it_is_given() -> None:
-    need_engine("pybullet")
     from statemachine.engines.pybullet import calls as watched
 
     found = watched.client_of
@@ -422,8 +422,8 @@ def test_the_client_of_a_call_is_found_where_it_is_given() -> None:
             getattr(pb, name)(*arguments, nowhere, nowhere)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_every_call_of_the_backend_says_its_client() -> None:
-    need_engine("pybullet")
     from statemachine.engines.pybullet import calls as watched
 
     folder = Path(backends.__file__).parent
@@ -485,8 +485,8 @@ def test_a_hidden_write_beside_a_call_is_seen(monkeypatch: pytest.MonkeyPatch) -
     assert line.changed == ("data.qvel[2]",)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_getter_that_moves_the_world_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    need_engine("pybullet")
     pb: Any = installed.require("pybullet")
     right = pb.getJointStates
 

@@ -31,7 +31,7 @@ from statemachine.grading.transcript import decode, encode
 from statemachine.grading.watch import engine_watched
 from statemachine.grading.worlds import ExerciseWorld, Scenes
 
-from .conftest import ROOT, Cli, need_engine
+from .conftest import ROOT, Cli, need_engine, written
 from .exercises import RIGHT, WRONG, Attempt
 
 for _module in ("gravity", "state", "forward", "replay"):
@@ -429,8 +429,9 @@ def test_what_reads_somebody_s_answers_is_not_graded(tmp_path: Path) -> None:
 
 
 def test_what_belongs_to_a_file_is_given_along(tmp_path: Path) -> None:
-    student = tmp_path / "student.py"
-    student.write_text("import helper\nfrom tools import more\nDATA = 'table.json'\n")
+    student = written(
+        tmp_path / "student.py", "import helper\nfrom tools import more\nDATA = 'table.json'\n"
+    )
     (tmp_path / "helper.py").write_text("import deeper\n")
     for name in ("deeper.py", "table.json", "unnamed.py", ".hidden.py", "tools.txt"):
         (tmp_path / name).write_text("")
@@ -522,8 +523,7 @@ def test_a_file_that_cannot_be_called_is_told_in_a_line(
 
 
 def test_the_solution_passes_on_every_backend(cli: Cli, backend: str) -> None:
-    done = cli("check", str(SOLUTION), "--backend", backend)
-    assert done.returncode == 0, done.stdout + done.stderr
+    done = cli("check", str(SOLUTION), "--backend", backend, code=0)
     assert done.stderr == ""
     assert done.stdout.count("✓") == 4
     assert "4 of 4 functions do what they should" in done.stdout
@@ -531,8 +531,7 @@ def test_the_solution_passes_on_every_backend(cli: Cli, backend: str) -> None:
 
 
 def test_the_students_file_is_still_to_be_written(cli: Cli) -> None:
-    done = cli("check", str(STUDENT), "--json")
-    assert done.returncode == 1
+    done = cli("check", str(STUDENT), "--json", code=1)
     found = json.loads(done.stdout)
     assert (found["right"], found["passed"]) == (0, False)
     assert [each["function"] for each in found["functions"]] == list(JUDGES)

@@ -32,7 +32,7 @@ from statemachine.page import Table, Text
 from statemachine.report import gradescope
 from statemachine.report.classroom import page
 
-from .conftest import ROOT, Cli
+from .conftest import ROOT, Cli, written
 
 TEMPLATE = ROOT / "exercises" / "step_loop.py"
 SOLUTION = ROOT / "teaching" / "solutions" / "step_loop.py"
@@ -405,8 +405,7 @@ def test_a_table_is_resumed(folder: Path, judged: list[str], tmp_path: Path) -> 
 
 
 def test_the_table_is_safe_in_a_spreadsheet(tmp_path: Path, judged: list[str]) -> None:
-    evil = tmp_path / '=HYPERLINK("x").py'
-    evil.write_text("return 'refuse'\n")
+    evil = written(tmp_path / '=HYPERLINK("x").py', "return 'refuse'\n")
     entries = judge_all([Submission(evil.name, evil)], "mujoco")
     (row,) = csv.DictReader(io.StringIO(as_csv(entries)))
     assert row["file"] == f"'{evil.name}"
@@ -472,8 +471,7 @@ def test_a_folder_from_the_command_line(cli: Cli, folder: Path, tmp_path: Path) 
     (folder / "hal.py").write_text("def demo_gravity(model, seconds=4):\n    while True: pass\n")
     table = tmp_path / "grades.csv"
     command = ("check", str(folder), "--csv", str(table), "--time-limit", "2")
-    done = cli(*command)
-    assert done.returncode == 0, done.stderr
+    done = cli(*command, code=0)
     rows = {
         row["file"]: row
         for row in csv.DictReader(table.read_text(encoding="utf-8-sig").splitlines())
@@ -529,14 +527,11 @@ def test_where_to_write_is_asked_before_anything_is_judged(
 @pytest.mark.slow
 def test_one_file_for_gradescope(cli: Cli, tmp_path: Path) -> None:
     results = tmp_path / "results.json"
-    done = cli("check", str(SOLUTION), "--gradescope", str(results))
-    assert done.returncode == 0, done.stderr
+    cli("check", str(SOLUTION), "--gradescope", str(results), code=0)
     assert sum(each["score"] for each in json.loads(results.read_text())["tests"]) == 4
-    done = cli("check", str(tmp_path / "none.py"), "--gradescope", str(results))
-    assert done.returncode == 2
+    cli("check", str(tmp_path / "none.py"), "--gradescope", str(results), code=2)
     assert "there is no file none.py" in results.read_text()
-    done = cli("check", str(tmp_path), "--gradescope", str(results))
-    assert done.returncode == 2
+    cli("check", str(tmp_path), "--gradescope", str(results), code=2)
     assert "no Python file in it has one of the functions" in results.read_text()
 
 
@@ -550,6 +545,7 @@ def test_one_file_for_gradescope(cli: Cli, tmp_path: Path) -> None:
     ],
 )
 def test_options_that_do_not_go_together(cli: Cli, arguments: list[str], says: str) -> None:
-    done = cli("check", *[str(ROOT / a) if a.startswith("exercises") else a for a in arguments])
-    assert done.returncode == 2
+    done = cli(
+        "check", *[str(ROOT / a) if a.startswith("exercises") else a for a in arguments], code=2
+    )
     assert says in done.stderr

@@ -20,7 +20,7 @@ from rich.cells import cell_len
 from statemachine.lessons import LESSONS
 from statemachine.models import models_dir
 
-from .conftest import ROOT, Cli, need_engine
+from .conftest import ROOT, Cli, need_engine, written
 
 QUICK = {
     "speed": ("--steps", "200"),
@@ -30,16 +30,14 @@ QUICK = {
 
 
 def _json(cli: Cli, *arguments: str) -> Any:
-    done = cli(*arguments, "--json")
-    assert done.returncode == 0, done.stderr
+    done = cli(*arguments, "--json", code=0)
     assert done.stderr == ""
     return json.loads(done.stdout, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
 
 
 @pytest.mark.parametrize("lesson", LESSONS)
 def test_every_lesson_runs_and_reads_well_piped(cli: Cli, lesson: str, backend: str) -> None:
-    done = cli("lesson", lesson, "--backend", backend, *QUICK.get(lesson, ()))
-    assert done.returncode == 0, done.stderr
+    done = cli("lesson", lesson, "--backend", backend, *QUICK.get(lesson, ()), code=0)
     assert done.stderr == ""
     lines = done.stdout.splitlines()
     assert len(lines) > 8
@@ -94,8 +92,7 @@ def test_forward_with_another_joint_and_no_movement(cli: Cli) -> None:
     found = _json(cli, "lesson", "forward", "--joint", "gripper", "--value", "0.5")["mujoco"]
     # The moving jaw does not carry the fingertip, so three readings are equal.
     assert found["equal"] == [[1, 2], [1, 3], [2, 3]]
-    page = cli("lesson", "forward", "--joint", "gripper")
-    assert page.returncode == 0
+    page = cli("lesson", "forward", "--joint", "gripper", code=0)
     assert "does not carry it" in page.stdout
 
 
@@ -180,8 +177,7 @@ def test_lessons_on_the_public_scenes(cli: Cli, menagerie: Path) -> None:
     inside = cli("lesson", "reset", MENAGERIE=str(menagerie / "robotstudio_so101"))
     assert "'pickup'" in inside.stdout
     for lesson in LESSONS:
-        done = cli("lesson", lesson, "--menagerie", str(menagerie), *QUICK.get(lesson, ()))
-        assert done.returncode == 0, done.stderr
+        cli("lesson", lesson, "--menagerie", str(menagerie), *QUICK.get(lesson, ()), code=0)
 
 
 def test_fingertip_certificate(cli: Cli, pinocchio: None) -> None:
@@ -199,8 +195,7 @@ def test_fingertip_certificate(cli: Cli, pinocchio: None) -> None:
 def test_fingertip_of_other_models_and_frames(cli: Cli, pinocchio: None) -> None:
     assert cli("fingertip", "--site", "baseframe").returncode == 0
     scene = ("fingertip", "--model", "so101/scene_box")
-    page = cli(*scene)
-    assert page.returncode == 0, page.stderr
+    page = cli(*scene, code=0)
     assert "included files read in: 2" in page.stdout
     assert "own reading" in page.stdout
     assert cli(*scene, "--witness", "so101").returncode == 0
@@ -234,8 +229,7 @@ def test_fingertip_against_another_arm(
     for old, new in edits:
         assert old in text
         text = text.replace(old, new)
-    file = tmp_path / "other.xml"
-    file.write_text(text)
+    file = written(tmp_path / "other.xml", text)
     page = cli("fingertip", "--witness", str(file))
     assert page.returncode == bool(said)
     assert all(part in page.stdout for part in said)
@@ -296,8 +290,7 @@ def test_alone_it_lists_the_lessons_in_order(cli: Cli) -> None:
 def test_every_mistake_is_one_clear_line(cli: Cli, arguments: tuple[str, ...], word: str) -> None:
     if arguments[0] == "fingertip":
         need_engine("pinocchio")
-    done = cli(*arguments)
-    assert done.returncode == 2
+    done = cli(*arguments, code=2)
     assert done.stdout == ""
     assert len(done.stderr.splitlines()) == 1, done.stderr
     assert word in done.stderr
@@ -308,10 +301,8 @@ def test_every_mistake_is_one_clear_line(cli: Cli, arguments: tuple[str, ...], w
     "content", ["", "<mujoco", "<mujoco><worldbody><geom/></worldbody></mujoco>"]
 )
 def test_malformed_models_are_one_clear_line(cli: Cli, tmp_path: Path, content: str) -> None:
-    file = tmp_path / "bad.xml"
-    file.write_text(content)
-    done = cli("lesson", "state", "--model", str(file))
-    assert done.returncode == 2
+    file = written(tmp_path / "bad.xml", content)
+    done = cli("lesson", "state", "--model", str(file), code=2)
     assert len(done.stderr.splitlines()) == 1, done.stderr
     assert "bad.xml" in done.stderr
 
@@ -327,8 +318,9 @@ def test_a_pipe_that_closes_early_is_no_error() -> None:
 
 
 def test_a_terminal_without_unicode(cli: Cli) -> None:
-    done = cli("lesson", "gravity", PYTHONUTF8="0", PYTHONIOENCODING="ascii:strict", LC_ALL="C")
-    assert done.returncode == 0, done.stderr
+    done = cli(
+        "lesson", "gravity", PYTHONUTF8="0", PYTHONIOENCODING="ascii:strict", LC_ALL="C", code=0
+    )
     assert "23.92" in done.stdout
 
 
@@ -364,8 +356,7 @@ def test_the_doctor_knows_every_package_of_an_extra(cli: Cli) -> None:
 def test_the_doctor_says_what_the_viewer_lacks(cli: Cli, tmp_path: Path) -> None:
     (tmp_path / "viser.py").write_text("raise ImportError('gone')\n")
     path = os.pathsep.join((str(tmp_path), str(ROOT)))
-    done = cli("doctor", "--json", PYTHONPATH=path)
-    assert done.returncode == 0  # the lessons need no viewer
+    done = cli("doctor", "--json", PYTHONPATH=path, code=0)
     (viewer,) = (f for f in json.loads(done.stdout)["findings"] if f["name"] == "viser")
     assert not viewer["works"]
     assert "pip install 'statemachine-sim[view]'" in viewer["found"]
@@ -378,8 +369,7 @@ def test_version(cli: Cli) -> None:
 
 
 def _model(folder: Path, body: str, rest: str = "") -> str:
-    file = folder / "robot.xml"
-    file.write_text(f"<mujoco><worldbody>{body}</worldbody>{rest}</mujoco>")
+    file = written(folder / "robot.xml", f"<mujoco><worldbody>{body}</worldbody>{rest}</mujoco>")
     return str(file)
 
 
@@ -392,8 +382,7 @@ PENDULUM = (
 
 def test_gravity_says_nothing_of_a_joint_that_still_moves(cli: Cli, tmp_path: Path) -> None:
     file = _model(tmp_path, PENDULUM.format(""))
-    page = cli("lesson", "gravity", "--model", file, "--joint", "j", "--seconds", "0.2")
-    assert page.returncode == 0, page.stderr
+    page = cli("lesson", "gravity", "--model", file, "--joint", "j", "--seconds", "0.2", code=0)
     assert "still moves" in page.stdout
     assert "✓" not in page.stdout
     assert "Nothing drives this robot" in " ".join(page.stdout.split())
@@ -402,8 +391,7 @@ def test_gravity_says_nothing_of_a_joint_that_still_moves(cli: Cli, tmp_path: Pa
 @pytest.mark.slow
 def test_gravity_at_the_moment_of_the_first_touch(cli: Cli) -> None:
     for seconds in ("0.005", "0.3", "0.535", "0.54", "1"):
-        done = cli("lesson", "gravity", "--seconds", seconds)
-        assert done.returncode == 0, done.stderr
+        cli("lesson", "gravity", "--seconds", seconds, code=0)
 
 
 def test_gravity_of_a_slide_and_of_an_equality(cli: Cli, tmp_path: Path) -> None:
@@ -428,13 +416,11 @@ def test_a_body_of_the_scene_is_not_taken_for_the_robot(cli: Cli) -> None:
 
 def test_hold_of_another_robot_reads_no_torque_as_an_angle(cli: Cli, tmp_path: Path) -> None:
     file = _model(tmp_path, PENDULUM.format(""), "<actuator><motor joint='j'/></actuator>")
-    done = cli("lesson", "hold", "--model", file)
-    assert done.returncode == 0, done.stderr
+    done = cli("lesson", "hold", "--model", file, code=0)
     said = " ".join(done.stdout.split())
     assert "A motor takes it as a force, and has no goal" in said
     assert "from its goal" not in said
-    done = cli("lesson", "hold", "--model", file, "--target", "0.1")
-    assert done.returncode == 0, done.stderr
+    done = cli("lesson", "hold", "--model", file, "--target", "0.1", code=0)
     assert "None of them is a position servo" in " ".join(done.stdout.split())
 
 
@@ -485,8 +471,7 @@ def test_output_that_cannot_be_written(command: str) -> None:
 def test_what_a_page_says_of_a_special_case(
     cli: Cli, arguments: tuple[str, ...], said: tuple[str, ...]
 ) -> None:
-    page = cli(*arguments)
-    assert page.returncode == 0, page.stderr
+    page = cli(*arguments, code=0)
     assert all(part in page.stdout for part in said)
     assert "never by arithmetic" not in page.stdout or "so101" not in arguments
 
@@ -499,10 +484,10 @@ def test_what_a_page_says_of_a_special_case(
         (None, ["mujoco", "pybullet"], ""),  # the arm's own URDF
     ],
 )
+@pytest.mark.usefixtures("bullet")
 def test_each_refusal_of_a_model_is_one_line(
     cli: Cli, tmp_path: Path, body: str | None, loads: list[str], says: str
 ) -> None:
-    need_engine("pybullet")
     file = str(models_dir() / "so101" / "so101.urdf") if body is None else _model(tmp_path, body)
     done = cli("lesson", "state", "--model", file, "--backend", "all", "--json")
     assert done.returncode == (0 if loads else 2)
@@ -512,8 +497,8 @@ def test_each_refusal_of_a_model_is_one_line(
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("bullet")
 def test_what_an_engine_warns_of_is_one_line_without_our_code(cli: Cli, tmp_path: Path) -> None:
-    need_engine("pybullet")
     body = "<geom type='plane' size='1 1 1' friction='.1'/><body pos='0 0 1'><joint name='j'/>"
     body += "<geom size='.1' friction='.1'/><geom pos='1 0 0' size='.1' friction='.9'/></body>"
     file = _model(tmp_path, body)

@@ -87,8 +87,7 @@ def test_a_model_whose_file_name_is_no_text_is_refused(cli: Cli, tmp_path: Path)
     with open(path, "w") as out:
         out.write("<mujoco/>")
     for command in (["lesson", "state"], ["fingertip"]):
-        done = cli(*command, "--model", os.fsdecode(path))
-        assert done.returncode == 2
+        done = cli(*command, "--model", os.fsdecode(path), code=2)
         assert "is not UTF-8" in done.stderr
         assert len(done.stderr.splitlines()) == 1
 

@@ -34,7 +34,7 @@ from statemachine.report import terminal
 from statemachine.runs import Trace, record, record_scenario, write
 from statemachine.runs.scenarios import SCENARIOS
 
-from .conftest import ROOT, Cli, need_engine, one_line
+from .conftest import ROOT, Cli, one_line, written
 
 
 def traced(name: str, **options: Any) -> Trace:
@@ -290,11 +290,11 @@ def test_traces_of_two_robots_share_nothing(hold: Trace) -> None:
 
 
 def test_joints_without_names_are_each_compared(tmp_path: Path) -> None:
-    file = tmp_path / "nameless.xml"
-    file.write_text(
+    file = written(
+        tmp_path / "nameless.xml",
         "<mujoco><worldbody><body><joint axis='0 1 0'/><geom size='.1'/><body pos='0 0 -1'>"
         "<joint axis='0 1 0'/><geom size='.1'/></body></body><body pos='3 0 0'><freejoint/>"
-        "<geom size='.1'/></body></worldbody></mujoco>"
+        "<geom size='.1'/></body></worldbody></mujoco>",
     )
     trace = record(sm.load(file), None, 0.2)
     qpos = trace.qpos.copy()
@@ -398,8 +398,8 @@ def test_one_trace_is_played_on_the_other_engine(tmp_path: Any) -> None:
     assert "was played on pybullet" in said[0]
 
 
+@pytest.mark.usefixtures("pinocchio")
 def test_a_third_party_is_asked_about_both(hold: Trace, box: Trace, tmp_path: Path) -> None:
-    need_engine("pinocchio")
     for trace in (hold, box):  # its scene includes the arm, which is what Pinocchio can read
         tip = trace.header.sites.index("gripperframe")
         position = trace["site_xpos"].copy()
@@ -473,8 +473,7 @@ def test_the_command(cli: Cli) -> None:
         assert text in done.stdout
     if has_witness():
         assert "a third party was asked where gripperframe is" in " ".join(done.stdout.split())
-    good = cli("compare", "droop", "--json")
-    assert good.returncode == 0
+    good = cli("compare", "droop", "--json", code=0)
     result = json.loads(good.stdout)
     found = result["comparison"]
     assert found["agrees"] is True
@@ -489,8 +488,7 @@ def has_witness() -> bool:
 
 
 def test_it_compares_an_engine_with_itself(cli: Cli) -> None:
-    done = cli("compare", "box", "--backends", "mujoco", "mujoco", "--seconds", "0.2")
-    assert done.returncode == 0, done.stdout
+    done = cli("compare", "box", "--backends", "mujoco", "mujoco", "--seconds", "0.2", code=0)
     assert "✓" in done.stdout
 
 

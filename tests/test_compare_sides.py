@@ -27,7 +27,7 @@ from statemachine.report import terminal
 from statemachine.runs import record, write
 from statemachine.runs.controllers import controller_from, function_scenario
 
-from .conftest import Cli, need_engine, one_line
+from .conftest import Cli, need_engine, one_line, written
 
 # Two hinges one after the other, each with a servo, and a tip; one link may be heavier.
 _ARM = """<mujoco><option timestep="0.002"/><worldbody>
@@ -146,12 +146,10 @@ def test_a_side_is_read_as_it_is_typed(files: Path) -> None:
 
 
 def test_a_file_whose_name_looks_like_more_is_a_file(files: Path) -> None:
-    odd = files / "a b@mujoco timestep=1.xml"
-    odd.write_text((files / "arm.xml").read_text())
+    odd = written(files / "a b@mujoco timestep=1.xml", (files / "arm.xml").read_text())
     (side,) = parse_sides([str(odd)])
     assert (side.file, side.engine, dict(side.options)) == (str(odd), "mujoco", {})
-    spaced = files / "my arm.xml"
-    spaced.write_text((files / "arm.xml").read_text())
+    spaced = written(files / "my arm.xml", (files / "arm.xml").read_text())
     (side,) = parse_sides([f"{spaced} timestep=0.001"])
     assert (side.file, dict(side.options)) == (str(spaced), {"timestep": 0.001})
 
@@ -540,8 +538,7 @@ def test_the_command_shows_both_loops(files: Path, cli: Cli) -> None:
     assert result["commands"] == "its own"
     assert result["open_loop"]["agreements"] != result["comparison"]["agreements"]
     assert result["comparison"]["one"]["short"] == "arm.xml"
-    same = cli("compare", "hold", "arm.xml", "arm.xml", "--seconds", "0.2")
-    assert same.returncode == 0
+    same = cli("compare", "hold", "arm.xml", "arm.xml", "--seconds", "0.2", code=0)
     assert "told the same at every moment" in " ".join(same.stdout.split())
 
 
@@ -559,11 +556,9 @@ def test_pages_and_pictures_name_the_sides(files: Path, cli: Cli) -> None:
             '<body name="ball" pos="1 0 1"><freejoint/><geom size=".1"/></body></worldbody>',
         )
     )
-    done = cli(*words, "--html", out)
-    assert done.returncode == 1, done.stderr
+    cli(*words, "--html", out, code=1)
     page = out.read_text()
     assert "Only more.xml has" in page
     assert "other bodies" not in page
-    done = cli(*words[:-1], "--plot", files / "a.svg")
-    assert done.returncode == 1, done.stderr
+    cli(*words[:-1], "--plot", files / "a.svg", code=1)
     assert "more.xml" in (files / "a.svg").read_text()

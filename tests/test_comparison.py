@@ -25,7 +25,7 @@ from statemachine.report.plot_panels import of_trace
 from statemachine.runs import Trace, record, record_scenario, shipped
 from statemachine.runs.scenarios import SCENARIOS
 
-from .conftest import lesson_result
+from .conftest import lesson_result, written
 
 
 @pytest.fixture(scope="module")
@@ -70,9 +70,7 @@ SCENE = """<mujoco><worldbody>
 
 
 def test_who_comes_first_and_what_has_no_name(tmp_path: Path) -> None:
-    path = tmp_path / "scene.xml"
-    path.write_text(SCENE)
-    names = ContactNames.of(sm.load(path))
+    names = ContactNames.of(sm.load(written(tmp_path / "scene.xml", SCENE)))
     floor, below, top, ball, other, _arm, hand = range(7)
     assert names.geoms(floor, hand) == names.geoms(hand, floor) == "hand on floor"
     assert names.geoms(ball, hand) == "hand on body 2 (ball)"
@@ -91,12 +89,12 @@ def test_pairs_of_two_models_are_called_alike() -> None:
 
 
 def test_what_the_world_is_made_of_is_told_apart(tmp_path: Path) -> None:
-    path = tmp_path / "corner.xml"
-    path.write_text(
+    path = written(
+        tmp_path / "corner.xml",
         '<mujoco><worldbody><geom name="floor" type="plane" size="1 1 .1"/>'
         '<geom name="wall" type="box" size=".1 1 1" pos="-.149 0 0"/>'
         '<body name="box" pos="0 0 .049"><freejoint/><geom type="box" size=".05 .05 .05"/></body>'
-        "</worldbody></mujoco>"
+        "</worldbody></mujoco>",
     )
     trace = record(sm.load(path), seconds=0.05)
     pairs = trace.contact_pairs

@@ -33,7 +33,7 @@ from statemachine.probes.conventions.answers import closest
 from statemachine.probes.conventions.frames import FIXED, ORDERS
 from statemachine.report import conventions as report
 
-from .conftest import ROOT, Cli, around, need_engine
+from .conftest import ROOT, Cli, around, need_engine, written
 
 DEPTH, ALPHABET = "depth first, children as listed", "depth first, children by alphabet"
 # What each engine answers, by part of the question; measured by others and by hand before.
@@ -565,8 +565,7 @@ def test_every_call_works(engine: str) -> None:
 def test_the_cells_of_an_engine_are_a_program(engine: str, tmp_path: Path) -> None:
     """As a reader would type them, with nothing of ours."""
     own = room(engine).phrases()
-    file = tmp_path / own.file[0]
-    file.write_text(own.file[1])
+    file = written(tmp_path / own.file[0], own.file[1])
     lines = [f"file = {str(file)!r}", *(own.cells[name].code for name in phrasebook.CONCEPTS)]
     done = subprocess.run(
         [sys.executable, "-c", "\n".join([*lines, "print(len(worlds))"])],
@@ -601,8 +600,7 @@ def test_a_cell_that_does_nothing_is_found_out(
 def test_the_page_reads_well_piped(cli: Cli, arguments: tuple[str, ...]) -> None:
     for name in ENGINES:
         need_engine(name)
-    done = cli("conventions", *arguments)
-    assert done.returncode == 0, done.stderr
+    done = cli("conventions", *arguments, code=0)
     assert done.stderr == ""
     lines = done.stdout.splitlines()
     assert max(map(cell_len, lines)) <= 80
@@ -623,8 +621,7 @@ def test_no_line_of_code_is_broken_on_the_page(cli: Cli, engine: str) -> None:
 
 
 def test_the_answers_as_json(cli: Cli, engine: str) -> None:
-    done = cli("conventions", "quaternion", "gravity", "--backend", engine, "--json")
-    assert done.returncode == 0, done.stderr
+    done = cli("conventions", "quaternion", "gravity", "--backend", engine, "--json", code=0)
     found = json.loads(done.stdout)
     assert list(found["versions"]) == [engine]
     assert [each["name"] for each in found["questions"]] == ["quaternion", "gravity"]
@@ -643,8 +640,7 @@ def test_the_answers_as_json(cli: Cli, engine: str) -> None:
     ],
 )
 def test_bad_input_is_one_line(cli: Cli, arguments: tuple[str, ...], words: str) -> None:
-    done = cli("conventions", *arguments)
-    assert done.returncode == 2
+    done = cli("conventions", *arguments, code=2)
     assert len(done.stderr.splitlines()) == 1
     assert words in done.stderr
     assert done.stdout == ""
@@ -705,8 +701,7 @@ def test_a_call_that_fails_is_the_exit_code() -> None:
 @pytest.mark.parametrize("what", ["--calls", "actuation"])
 def test_a_terminal_without_unicode(cli: Cli, what: str) -> None:
     plain = {"PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"}
-    done = cli("conventions", what, "--backend", "mujoco", **plain)
-    assert done.returncode == 0, done.stderr
+    done = cli("conventions", what, "--backend", "mujoco", **plain, code=0)
     assert done.stdout.isascii()
     assert done.stdout.count("?") == (0 if what == "--calls" else 1)  # that of the question
 

@@ -13,7 +13,7 @@ from statemachine.errors import EndedEarlyError
 from statemachine.report.convergence import page
 from statemachine.runs import Trace, record, write
 
-from .conftest import Cli, one_line
+from .conftest import Cli, one_line, written
 
 FALL = """<mujoco><option timestep="0.01" integrator="{integrator}">{flag}</option>
   <worldbody><body pos="0 0 {height}"><joint name="swing" axis="0 1 0" damping="0.02"/>
@@ -26,9 +26,7 @@ def found_of(folder: Path, *changes: dict[str, str], seconds: float = 1.0) -> Ti
     usual["touch"] = 'contype="0" conaffinity="0"'
     models = []
     for k, change in enumerate(changes):
-        file = folder / f"{k}.xml"
-        file.write_text(FALL.format(**{**usual, **change}))
-        models.append(sm.load(file))
+        models.append(sm.load(written(folder / f"{k}.xml", FALL.format(**{**usual, **change}))))
 
     def run(finer: int) -> tuple[Trace, Trace]:
         one, two = (record(model.replace(substeps=finer), None, seconds) for model in models)
@@ -95,8 +93,10 @@ def test_a_touch_parts_what_can_be_said(tmp_path: Path) -> None:
 
 
 def test_a_run_that_ends_early_is_no_limit(tmp_path: Path) -> None:
-    file = tmp_path / "ends.xml"
-    file.write_text(FALL.format(integrator="Euler", flag="", mass="0.1", height="1", touch=""))
+    file = written(
+        tmp_path / "ends.xml",
+        FALL.format(integrator="Euler", flag="", mass="0.1", height="1", touch=""),
+    )
     model = sm.load(file)
 
     def run(finer: int) -> tuple[Trace, Trace]:
@@ -112,18 +112,17 @@ def test_a_run_that_ends_early_is_no_limit(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_command_line_answers_both_questions(cli: Cli) -> None:
     asked = ("compare", "fall", "--seconds", "0.3")
-    done = cli(*asked, "--converge")
-    assert done.returncode == 0
+    done = cli(*asked, "--converge", code=0)
     assert "There is no gap beyond rounding, whatever the timestep" in " ".join(done.stdout.split())
     told = json.loads(cli(*asked, "--converge", "--json").stdout)
     assert told["vanishes"]
     assert {"name", "gaps", "limit", "verdict"} <= told["whole"][0].keys()
-    done = cli(*asked, "--one-step")
-    assert done.returncode == 0
+    done = cli(*asked, "--one-step", code=0)
     assert "both sides take the same step" in done.stdout
     # Two sides of one engine; the change is named.
-    heavy = cli("compare", "waves", "so101", "so101", "damping=1", "--seconds", "0.2", "--one-step")
-    assert heavy.returncode == 1
+    heavy = cli(
+        "compare", "waves", "so101", "so101", "damping=1", "--seconds", "0.2", "--one-step", code=1
+    )
     assert "part in the stage “passive”" in " ".join(heavy.stdout.split())
     told = json.loads(cli(*asked, "--one-step", "--json").stdout)
     assert told["first"] is None

@@ -18,7 +18,7 @@ from statemachine.errors import BadInputError, DivergedError, UnsupportedError
 from statemachine.interface.checks import HUGE
 from statemachine.report import compare as report
 
-from .conftest import need_engine
+from .conftest import need_engine, written
 
 ROTOR = """<mujoco><option timestep="{timestep}" integrator="implicitfast"/><worldbody>
   <body><joint name="rotor" axis="0 0 1"/><geom type="cylinder" size=".1 .01"/></body>
@@ -34,9 +34,7 @@ STUCK = """<mujoco><option integrator="implicitfast"/><worldbody>
 
 def loaded(folder: Path, text: str, **options: Any) -> sm.Model:
     need_engine("pybullet")
-    path = folder / "model.xml"
-    path.write_text(text)
-    return sm.load(path, backend="pybullet", **options)
+    return sm.load(written(folder / "model.xml", text), backend="pybullet", **options)
 
 
 def bound(model: sm.Model) -> np.ndarray:
@@ -168,11 +166,11 @@ def test_the_record_shows_the_bound(tmp_path: Path) -> None:
         model.replace(max_qvel=1e5)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_comparison_in_which_a_side_diverges_says_that(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Which side and when; the verdicts are of the time until then; nothing is explained."""
-    need_engine("pybullet")
     monkeypatch.setattr(pybullet_backend, "fastest", lambda raw: np.ones(raw.nv))
     assert main(["compare", "hold", "--why", "--json"]) == 1
     found = json.loads(capsys.readouterr().out)["comparison"]
@@ -185,14 +183,16 @@ def test_a_comparison_in_which_a_side_diverges_says_that(
     assert "explain" not in text
 
 
+@pytest.mark.usefixtures("bullet")
 def test_both_sides_may_diverge(tmp_path: Path) -> None:
     """A motor that pushes the faster, the faster its wheel turns."""
-    need_engine("pybullet")
-    path = tmp_path / "runaway.xml"
-    path.write_text("""<mujoco><option timestep="0.01"/><worldbody><body><joint name="wheel"
+    path = written(
+        tmp_path / "runaway.xml",
+        """<mujoco><option timestep="0.01"/><worldbody><body><joint name="wheel"
       axis="0 0 1"/><geom type="cylinder" size=".1 .02"/></body></worldbody><actuator>
       <general joint="wheel" gainprm="1" biastype="affine" biasprm=".1 0 2" ctrlrange="-1 1"/>
-      </actuator></mujoco>""")
+      </actuator></mujoco>""",
+    )
     (one, two), _ = sides_of(Request(("droop",), model=str(path)))
     found = compare_traces(one, two)
     assert found.one.ended

@@ -28,7 +28,7 @@ from statemachine.report.figures import svg
 from statemachine.report.notebook import Shown, _opening, build, station
 from statemachine.report.site import make_path
 
-from .conftest import ROOT, need_engine
+from .conftest import ROOT
 
 _NOTEBOOK = ROOT / "notebooks" / "path.ipynb"
 _PICTURES = [
@@ -145,8 +145,8 @@ def test_no_page_of_the_path_shows_its_answers_open(name: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("bullet")
 def test_the_documentation_builds_without_a_warning(tmp_path: Path) -> None:
-    need_engine("pybullet")
     source = tmp_path / "docs"
     made = shutil.ignore_patterns("_build", "path", "reference", "comparisons", "__pycache__")
     shutil.copytree(ROOT / "docs", source, ignore=made)

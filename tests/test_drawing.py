@@ -13,7 +13,7 @@ import statemachine as sm
 from statemachine import rotations
 from statemachine.drawing import Drawing, Part, Surface, _shapes, drawing_of
 
-from .conftest import need_engine
+from .conftest import written
 
 ALL = """
 <mujoco>
@@ -140,9 +140,7 @@ def test_welding_keeps_the_surface_and_drops_what_is_there_twice() -> None:
 
 @pytest.fixture(scope="module")
 def everything(tmp_path_factory: pytest.TempPathFactory) -> tuple[sm.Model, Drawing]:
-    file = tmp_path_factory.mktemp("all") / "all.xml"
-    file.write_text(ALL)
-    model = sm.load(file)
+    model = sm.load(written(tmp_path_factory.mktemp("all") / "all.xml", ALL))
     return model, drawing_of(model)
 
 
@@ -209,8 +207,8 @@ def test_the_whole_arm_is_there(name: str) -> None:
     assert sum(len(part.faces) for part in drawing.parts) < 10_000  # a page carries it
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_model_of_another_engine_has_the_same_drawing() -> None:
-    need_engine("pybullet")
     one = drawing_of(sm.load("so101/scene_box"))
     two = drawing_of(sm.load("so101/scene_box", backend="pybullet"))
     assert len(one.parts) == len(two.parts)
@@ -235,20 +233,20 @@ def test_the_eye_is_where_the_engines_camera_is() -> None:
 
 
 def test_what_only_touches_is_drawn_where_nothing_else_is(tmp_path: Path) -> None:
-    file = tmp_path / "m.xml"
-    file.write_text(
+    file = written(
+        tmp_path / "m.xml",
         "<mujoco><worldbody><geom type='plane' size='1 1 1'/><body><freejoint/>"
-        "<geom type='box' size='1 1 1' group='3'/></body></worldbody></mujoco>"
+        "<geom type='box' size='1 1 1' group='3'/></body></worldbody></mujoco>",
     )
     assert [part.kind for part in drawing_of(sm.load(file)).parts] == ["plane", "box"]
 
 
 def test_what_is_not_drawn_is_said(tmp_path: Path) -> None:
-    file = tmp_path / "m.xml"
-    file.write_text(
+    file = written(
+        tmp_path / "m.xml",
         "<mujoco><worldbody><geom type='sphere' size='1'/>"
         "<flexcomp name='f' type='grid' count='3 3 1' spacing='1 1 1' dim='2' "
         "mass='1' radius='.1' rigid='true'/>"
-        "</worldbody></mujoco>"
+        "</worldbody></mujoco>",
     )
     assert drawing_of(sm.load(file)).left_out == ("flex: 1",)

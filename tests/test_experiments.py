@@ -22,7 +22,7 @@ from statemachine.models import models_dir
 from statemachine.page import Verdict
 from statemachine.runs.provenance import provenance
 
-from .conftest import lesson_result, need_engine
+from .conftest import lesson_result, need_engine, opened, written
 
 
 def test_provenance_covers_included_files(tmp_path: Path) -> None:
@@ -56,8 +56,7 @@ def test_gravity_is_read_at_the_moment_of_the_end() -> None:
         assert found.servos_on.forces["actuator"] == data.qfrc_actuator[1]
         assert found.servos_on.qpos.tolist() == data.qpos.tolist()
     touch = found.servos_off.touches["gripper on floor (fixed_stud_1)"]
-    limp = model.replace(actuation=False)
-    with sm.make_data(limp) as data:
+    with opened(model.replace(actuation=False)) as (limp, data):
         while data.time < touch - 1e-9:
             sm.forward(limp, data)
             assert len(data.contacts) == 0
@@ -168,11 +167,11 @@ def test_forward_compares_bits() -> None:
 
 
 def test_state_of_every_type_of_joint(tmp_path: Path) -> None:
-    file = tmp_path / "m.xml"
-    file.write_text(
+    file = written(
+        tmp_path / "m.xml",
         "<mujoco><worldbody><body><freejoint name='f'/><geom size='1'/>"
         "<body><joint name='b' type='ball'/><geom size='1'/></body>"
-        "<body><joint name='s' type='slide'/><geom size='1'/></body></body></worldbody></mujoco>"
+        "<body><joint name='s' type='slide'/><geom size='1'/></body></body></worldbody></mujoco>",
     )
     joints = {joint.name: joint for joint in lesson_result("state", sm.load(file)).joints}
     assert (joints["b"].qpos_start, joints["b"].qpos_stop) == (7, 11)
@@ -230,8 +229,7 @@ class TestCertificate:
             ),
         }[change]
         assert old in text
-        file = tmp_path / "other.xml"
-        file.write_text(text.replace(old, new))
+        file = written(tmp_path / "other.xml", text.replace(old, new))
         found = fingertip.certify(sm.load("so101"), poses=5, witness=file)
         assert found.frames is not None
         assert not found.frames.same
@@ -241,8 +239,9 @@ class TestCertificate:
         text = (models_dir() / "so101" / "so101.xml").read_text()
         lines = text.splitlines()
         kept = [ln for ln in lines if "mesh" not in ln and 'joint name="wrist_roll"' not in ln]
-        file = tmp_path / "other.xml"
-        file.write_text("\n".join(ln for ln in kept if 'joint="wrist_roll"' not in ln))
+        file = written(
+            tmp_path / "other.xml", "\n".join(ln for ln in kept if 'joint="wrist_roll"' not in ln)
+        )
         with pytest.raises(BadInputError, match="wrist_roll"):
             fingertip.certify(sm.load("so101"), poses=5, witness=file)
 
@@ -265,9 +264,7 @@ class TestCertificate:
     )
 
     def test_without_a_name_every_body_at_an_end_has_a_certificate(self, tmp_path: Path) -> None:
-        file = tmp_path / "m.xml"
-        file.write_text(self.ENDS.format(""))
-        model = sm.load(file)
+        model = sm.load(written(tmp_path / "m.xml", self.ENDS.format("")))
         found = fingertip.certify(model, poses=50)
         assert found.agrees
         assert {tip.site for tip in found.tips} == {"b", "body 3"}  # not the table: it is still
@@ -280,8 +277,9 @@ class TestCertificate:
         alone = fingertip.certify(model, poses=50, site="a")
         assert [tip.site for tip in alone.tips] == ["a"]
         assert "no worse" not in repr(page({"mujoco": found}))
-        still = tmp_path / "still.xml"
-        still.write_text("<mujoco><worldbody><body name='b'/></worldbody></mujoco>")
+        still = written(
+            tmp_path / "still.xml", "<mujoco><worldbody><body name='b'/></worldbody></mujoco>"
+        )
         with pytest.raises(BadInputError, match="moved by a joint"):
             fingertip.certify(sm.load(still), poses=5)
         assert fingertip.certify(sm.load(still), poses=5, site="b").agrees
@@ -297,9 +295,9 @@ class TestCertificate:
             return fingertip.Pose(pos, mat)
 
         monkeypatch.setattr(fingertip, "_engine_poses", wrong)
-        file = tmp_path / "m.xml"
-        file.write_text(self.ENDS.format(""))
-        found = fingertip.certify(sm.load(file), poses=20)
+        found = fingertip.certify(
+            sm.load(written(tmp_path / "m.xml", self.ENDS.format(""))), poses=20
+        )
         assert not found.agrees
         assert found.site == "body 3"
         assert [tip.agrees for tip in found.tips] == [False, True]

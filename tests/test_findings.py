@@ -14,7 +14,7 @@ from statemachine import worlds
 from statemachine.backends import compiled, mujoco_backend
 from statemachine.errors import BadInputError, DivergedError
 
-from .conftest import need_engine
+from .conftest import opened
 
 
 @pytest.fixture
@@ -54,8 +54,7 @@ def test_automatic_reset_is_off_and_would_rewind_time() -> None:
 
 
 def test_a_divergence_is_raised_with_the_engines_defaults_too() -> None:
-    model = sm.load("so101", defaults="engine")
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101", defaults="engine")) as (model, data):
         data.qpos[0] = np.nan
         with pytest.raises(DivergedError):
             sm.step(model, data)
@@ -63,8 +62,7 @@ def test_a_divergence_is_raised_with_the_engines_defaults_too() -> None:
 
 def test_no_noise_and_no_log_file(capfd: pytest.CaptureFixture[str], tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
-    model = sm.load("so101")
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101")) as (model, data):
         data.qpos[0] = np.nan
         with pytest.raises(DivergedError):
             sm.step(model, data, 10)
@@ -90,8 +88,7 @@ def test_a_raw_flag_switches_the_servos_off() -> None:
 
 def test_without_the_floor_the_arm_goes_on_to_its_stop() -> None:
     """What catches the falling arm is the floor."""
-    model = sm.load("so101/scene").replace(actuation=False, contacts=False)
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101/scene").replace(actuation=False, contacts=False)) as (model, data):
         sm.step(model, data, 2000)
         assert np.degrees(data.qpos[1]) == pytest.approx(100, abs=0.5)
 
@@ -125,8 +122,8 @@ def test_an_infinite_ctrl_is_clamped_alike(
         assert data.ctrl[0] == huge
 
 
+@pytest.mark.usefixtures("bullet")
 def test_pybullet_as_it_comes_refuses_an_infinite_ctrl() -> None:
-    need_engine("pybullet")
     model = sm.load("so101", backend="pybullet", defaults="engine")
     note = model.capabilities.behaviours["position servo"].note
     assert "infinite ctrl is refused" in note

@@ -16,7 +16,7 @@ import pytest
 
 from statemachine.models import resolve
 
-from .conftest import need_engine
+from .conftest import need_engine, written
 
 BOX = (
     '<robot name="b"><link name="base"><inertial><origin xyz="0.1 0 0" rpy="0 0 0.3"/>'
@@ -55,8 +55,7 @@ def load(pb: Any, client: int, tmp_path: Path) -> Load:
     """Load a URDF text with the inertias that it states."""
 
     def run(text: str, fixed: bool = True, name: str = "x.urdf", **more: Any) -> int:
-        file = tmp_path / name
-        file.write_text(text)
+        file = written(tmp_path / name, text)
         return pb.loadURDF(
             str(file),
             useFixedBase=fixed,

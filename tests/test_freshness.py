@@ -29,7 +29,7 @@ from statemachine.probes.stale_rows import gaps, table, told
 from statemachine.report.as_json import plain
 from statemachine.rotations import matrix_from_quat
 
-from .conftest import ROOT, need_engine, started
+from .conftest import ROOT, opened, started, written
 
 TARGET = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
 BODY = """<mujoco><option timestep="0.005" integrator="{integrator}"/>
@@ -179,8 +179,10 @@ def test_the_lag_of_the_hold(backend: str) -> None:
 @pytest.mark.parametrize("nstep", [1, 7])
 @pytest.mark.parametrize("substeps", [1, 4])
 def test_a_step_is_found_by_going_back(backend: str, substeps: int, nstep: int) -> None:
-    model = sm.load("so101/scene_box", backend=backend).replace(substeps=substeps)
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101/scene_box", backend=backend).replace(substeps=substeps)) as (
+        model,
+        data,
+    ):
         data.ctrl[:] = TARGET
         sm.step(model, data, 10)
         sm.step(model, data, nstep)
@@ -236,10 +238,8 @@ def test_a_body_in_the_air(box: Model) -> None:
 @pytest.mark.parametrize("integrator", ["Euler", "RK4"])
 @pytest.mark.parametrize("centre", ["0 0 0", ".1 0 0"])
 def test_a_body_that_turns(backend: str, integrator: str, centre: str, tmp_path: Path) -> None:
-    path = tmp_path / "body.xml"
-    path.write_text(BODY.format(integrator=integrator, centre=centre))
-    model = sm.load(path, backend=backend)
-    with sm.make_data(model) as data:
+    path = written(tmp_path / "body.xml", BODY.format(integrator=integrator, centre=centre))
+    with opened(sm.load(path, backend=backend)) as (model, data):
         data.qvel[:] = (1, 2, 3, 4, 5, 6)
         sm.step(model, data, 7)
         found = sm.freshness(model, data)
@@ -263,12 +263,12 @@ def test_a_body_that_turns(backend: str, integrator: str, centre: str, tmp_path:
 @pytest.mark.parametrize("name", ["qacc", "qfrc_bias"])
 def test_a_vector_counts_by_its_length(tmp_path: Path, name: str) -> None:
     """As a position does; two joints without a name are not one vector."""
-    path = tmp_path / "body.xml"
-    path.write_text(
+    path = written(
+        tmp_path / "body.xml",
         "<mujoco><worldbody><body><freejoint name='f'/><geom size='.1'/></body>"
         "<body><joint name='b' type='ball'/><geom size='.1' pos='1 0 0'/></body>"
         "<body><joint/><joint axis='0 1 0'/><geom size='.1' pos='1 0 0'/></body>"
-        "<body><joint name='s' type='slide'/><geom size='.1'/></body></worldbody></mujoco>"
+        "<body><joint name='s' type='slide'/><geom size='.1'/></body></worldbody></mujoco>",
     )
     model = sm.load(path)
     units = ("m/s²", "rad/s²") if name == "qacc" else ("N", "N·m")
@@ -371,10 +371,9 @@ def test_what_cannot_be_asked_is_said(backend: str) -> None:
         sm.freshness(model, data)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_an_engine_that_does_not_tell_forces() -> None:
-    need_engine("pybullet")
-    model = sm.load("so101/scene", backend="pybullet", defaults="engine")
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101/scene", backend="pybullet", defaults="engine")) as (model, data):
         data.ctrl[:] = 0.3
         sm.step(model, data, 10)
         found = sm.freshness(model, data)
@@ -390,9 +389,9 @@ def test_an_engine_that_does_not_tell_forces() -> None:
         assert sm.freshness(model, data)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_memory_of_contacts_is_no_age() -> None:
     """PyBullet finds other points in a world that is set to a state than in one that ran."""
-    need_engine("pybullet")
     for name in ("mujoco", "pybullet"):
         model = sm.load("so101/scene_box", backend=name)
         with started(model) as data:
@@ -462,9 +461,7 @@ def test_a_figure_and_its_place_stay_on_one_line() -> None:
 
 def test_contacts_are_matched_by_what_touches() -> None:
     """One moves, one of its pair comes, another pair goes."""
-    model = sm.load("so101/scene_box")
-    with sm.make_data(model) as data:
-        sm.reset(model, data, keyframe=1)
+    with opened(sm.load("so101/scene_box"), keyframe=1) as (model, data):
         sm.forward(model, data)
         now = data.contacts
     assert len(now) == 4
@@ -495,8 +492,7 @@ def test_contacts_are_matched_by_what_touches() -> None:
 
 
 def test_a_forward_that_omits_the_forces() -> None:
-    model = sm.load("so101")
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101")) as (model, data):
         data.ctrl[:] = 0.3
         sm.step(model, data, 20)
         mujoco.mj_kinematics(model.raw, data.raw)  # a student's short cut past the interface
@@ -507,8 +503,7 @@ def test_a_forward_that_omits_the_forces() -> None:
 
 def test_a_step_that_claims_to_be_fresh() -> None:
     """A backend that recomputes after its step: of now by value, whatever a watch counted."""
-    model = sm.load("so101")
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101")) as (model, data):
         data.ctrl[:] = 0.3
         bare = data._advance
         object.__setattr__(
@@ -522,8 +517,7 @@ def test_a_step_that_claims_to_be_fresh() -> None:
 
 
 def test_a_forward_that_does_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = sm.load("so101")
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101")) as (model, data):
         data.ctrl[:] = 0.3
         sm.step(model, data, 20)
         old = MujocoData._recompute
@@ -536,8 +530,7 @@ def test_a_forward_that_does_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_what_is_written_past_the_interface_is_seen() -> None:
     """A force that only the engine's own object takes."""
-    model = sm.load("so101")
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101")) as (model, data):
         sm.forward(model, data)
         data.raw.qfrc_applied[1] = 0.1
         assert "qacc" in sm.freshness(model, data).stale
@@ -773,15 +766,14 @@ def test_rotations_are_compared_as_rotations() -> None:
 
 def test_a_model_without_names_sites_or_motors(tmp_path: Path) -> None:
     """A ball and a slide, and nothing that could be named."""
-    path = tmp_path / "plain.xml"
-    path.write_text(
+    path = written(
+        tmp_path / "plain.xml",
         '<mujoco><worldbody><body><joint type="ball" damping="1e-3"/>'
         '<geom size=".1" pos=".2 0 0" mass="1"/>'
         '<body pos=".4 0 0"><joint type="slide" axis="0 1 0"/><geom size=".05" mass="1"/>'
-        "</body></body></worldbody></mujoco>"
+        "</body></body></worldbody></mujoco>",
     )
-    model = sm.load(path)
-    with sm.make_data(model) as data:
+    with opened(sm.load(path)) as (model, data):
         assert "never computed" in str(sm.freshness(model, data))
         data.qvel[:] = (1, 2, 3, 0.5)
         sm.step(model, data, 30)

@@ -12,6 +12,8 @@ import pytest
 import statemachine as sm
 from statemachine.runs.commands import TARGET
 
+from .conftest import opened
+
 Golden = Callable[[str], np.ndarray]
 
 
@@ -24,8 +26,7 @@ def _angles(table: np.ndarray) -> np.ndarray:
 
 
 def _run(ctrl: tuple[float, ...], steps: int, *, actuation: bool = True) -> np.ndarray:
-    model = sm.load("so101/scene").replace(actuation=actuation)
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101/scene").replace(actuation=actuation)) as (model, data):
         data.ctrl = ctrl
         rows = [data.qpos.copy()]
         for _ in range(steps):

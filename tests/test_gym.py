@@ -29,7 +29,7 @@ from statemachine.gym.tasks import TASKS, HeldBox, Reach
 from statemachine.gym.vector import ArmVectorEnv
 from statemachine.rendering import renderer_here
 
-from .conftest import ROOT, need_engine
+from .conftest import ROOT
 
 IDS = [task.id for task in TASKS.values()]
 REACH, HELD_BOX = IDS
@@ -322,8 +322,8 @@ def test_no_command_within_the_ranges_leaves_the_space(task: str, backend: str) 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("task", IDS)
+@pytest.mark.usefixtures("pinocchio")
 def test_the_scripted_policy_comes_within_a_centimetre(task: str, backend: str) -> None:
-    need_engine("pinocchio")
     with closing(_make_vec(task, backend, 16)) as envs:
         scripted = play(envs, scripted_policy(envs.task), 100)
         chance = play(envs, random_policy(envs.task, 0), 100)

@@ -16,6 +16,8 @@ from statemachine.errors import BadInputError, ModelError, ModelFileError, Unkno
 from statemachine.rotations import matrix_from_quat
 from statemachine.runs.provenance import model_digest
 
+from .conftest import opened, written
+
 pytestmark = pytest.mark.usefixtures("pinocchio")
 
 BODY = '<inertial mass="1" pos="0.1 0 0" diaginertia="1 1 1"/>'
@@ -40,8 +42,7 @@ ZOO = f"""
 
 
 def _write(folder: Path, text: str, name: str = "robot.xml") -> Path:
-    path = folder / name
-    path.write_text(text)
+    path = written(folder / name, text)
     return path
 
 
@@ -100,8 +101,7 @@ def test_batch_is_the_single_pose_many_times() -> None:
 def test_a_body_and_a_joint_of_one_name_are_told_apart() -> None:
     kinematics = sm.Kinematics("so101")
     qpos = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
-    model = sm.load("so101")
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101")) as (model, data):
         data.qpos = qpos
         sm.forward(model, data)
         gap = kinematics.pose(qpos, "gripper", "body").pos - data.xpos[model.body_id("gripper")]

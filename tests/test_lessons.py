@@ -40,7 +40,7 @@ from statemachine.report import quiz
 from statemachine.runs.recorder import record_scenario
 from statemachine.runs.scenarios import SCENARIOS
 
-from .conftest import ROOT, Cli, lesson_result, need_engine
+from .conftest import ROOT, Cli, lesson_result, written
 
 _TIMED = {"time", "speed", "objects", "questions"}  # print wall times
 _QUICK = {
@@ -404,8 +404,7 @@ def test_a_model_without_actuators_has_no_commands_to_tell(cli: Cli, tmp_path: P
 
 
 def test_what_keyframe_0_of_the_public_scene_is(cli: Cli, menagerie: Path) -> None:
-    done = cli("lesson", "reset", "--menagerie", str(menagerie))
-    assert done.returncode == 0, done.stderr
+    done = cli("lesson", "reset", "--menagerie", str(menagerie), code=0)
     said = " ".join(done.stdout.split())
     not_held = "The box is not held: it has 4 contacts with what does not move, and none with the"
     assert not_held in said
@@ -417,8 +416,7 @@ _SLIDE = """<mujoco><option timestep="0.001"/><worldbody><body><joint name="s" t
 
 
 def test_a_slide_is_printed_in_millimetres_and_a_reset_tells_its_own_time(tmp_path: Path) -> None:
-    file = tmp_path / "slide.xml"
-    file.write_text(_SLIDE)
+    file = written(tmp_path / "slide.xml", _SLIDE)
     model = sm.load(file)
     options = {"joint": "s", "seconds": 0.5, "longer": 0}
     taken = take(LESSONS["gravity"], model, "mujoco", options, str(file))
@@ -449,17 +447,14 @@ def test_the_second_engine_is_named_after_what_follows_the_load() -> None:
     ["", "<body><freejoint/><geom size='.1'/></body>", "<body><joint/><geom size='.1'/></body>"],
 )
 def test_a_reset_of_a_model_that_lacks_something(cli: Cli, tmp_path: Path, body: str) -> None:
-    file = tmp_path / "small.xml"
-    file.write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    file = written(tmp_path / "small.xml", f"<mujoco><worldbody>{body}</worldbody></mujoco>")
     for lesson in ("reset", "objects", "state", "time"):
-        done = cli("lesson", lesson, "--model", str(file))
-        assert done.returncode == 0, done.stdout + done.stderr
+        cli("lesson", lesson, "--model", str(file), code=0)
 
 
 @pytest.mark.slow
 def test_calls_beside_a_lesson(cli: Cli, backend: str) -> None:
-    done = cli("lesson", "forward", "--backend", backend, "--calls")
-    assert done.returncode == 0, done.stderr
+    done = cli("lesson", "forward", "--backend", backend, "--calls", code=0)
     words = {"mujoco": "mj_forward", "pybullet": "getLinkStates"}
     assert words[backend] in done.stdout
     assert max(map(cell_len, done.stdout.splitlines())) <= 80
@@ -479,8 +474,7 @@ def test_our_keyframe_holds_the_box(backend: str) -> None:
 
 def test_real_time_is_the_loops_affair(cli: Cli) -> None:
     began = time.monotonic()
-    done = cli("lesson", "time", "--realtime", "--seconds", "0.8")
-    assert done.returncode == 0, done.stderr
+    done = cli("lesson", "time", "--realtime", "--seconds", "0.8", code=0)
     assert time.monotonic() - began >= 0.8
     assert "s simulated in" in done.stdout
     assert "the waiting is yours" in done.stdout
@@ -489,8 +483,7 @@ def test_real_time_is_the_loops_affair(cli: Cli) -> None:
 
 @pytest.mark.slow
 def test_the_whole_path_piped(cli: Cli) -> None:
-    done = cli("lesson")
-    assert done.returncode == 0, done.stderr
+    done = cli("lesson", code=0)
     assert done.stderr == ""
     numbers = re.findall(r"^(\d+) of 10: ", done.stdout, re.MULTILINE)
     assert numbers == [str(k) for k in range(1, 11)]
@@ -500,8 +493,8 @@ def test_the_whole_path_piped(cli: Cli) -> None:
     assert "exercises/step_loop.py" in done.stdout
 
 
+@pytest.mark.usefixtures("bullet")
 def test_options_may_stand_before_the_station(cli: Cli) -> None:
-    need_engine("pybullet")
     for words in (("--backend", "pybullet", "write"), ("write", "--backend", "pybullet")):
         assert "pybullet prints" in cli("lesson", *words).stdout
     both = cli("lesson", "--backend", "pybullet", "write", "--backend", "mujoco")
@@ -826,8 +819,7 @@ def test_two_worst_joints_are_named() -> None:
 def test_an_option_that_would_be_ignored_or_is_none_is_refused(
     cli: Cli, words: tuple[str, ...], said: str
 ) -> None:
-    done = cli("lesson", *words)
-    assert done.returncode == 2
+    done = cli("lesson", *words, code=2)
     assert not done.stdout
     assert said in done.stderr
 

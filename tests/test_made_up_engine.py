@@ -18,7 +18,7 @@ from statemachine import backends, engines
 from statemachine.cli import main
 from statemachine.installed import ENGINES
 
-from .conftest import ROOT, need_engine
+from .conftest import ROOT
 
 NAME = "hidden"
 ON = ("--backend", NAME)
@@ -137,8 +137,8 @@ def test_a_comparison_finds_that_it_is_the_same(capsys: Output, words: tuple[str
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("engine")
+@pytest.mark.usefixtures("bullet")
 def test_why_it_parts_from_another_engine(capsys: Output) -> None:
-    need_engine("pybullet")
     words = ("--backends", "pybullet", NAME, *SHORT, "--defaults", "engine", "--why")
     assert NAME in said(capsys, "compare", "hold", *words)
 

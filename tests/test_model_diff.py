@@ -26,7 +26,7 @@ from statemachine.report import model_diff
 from statemachine.report.as_json import dumps
 from statemachine.rotations import angle_between
 
-from .conftest import Cli, one_line
+from .conftest import Cli, one_line, written
 from .two_arms import mjcf, urdf
 
 Pair = Callable[..., tuple[Path, Path]]
@@ -170,8 +170,7 @@ def test_the_public_pair(pair: Pair, cli: Cli) -> None:
         },
         {"armature": 0.028, "kp": 998.22},
     )
-    done = cli("compare", "--models", str(one), str(two), "--json")
-    assert done.returncode == 1
+    done = cli("compare", "--models", str(one), str(two), "--json", code=1)
     assert done.stderr == ""
     found = json.loads(done.stdout, parse_constant=lambda name: pytest.fail(name))
     by = {(d["subject"], d["where"], d["figure"]): d for d in found["found"]["differences"]}
@@ -188,8 +187,7 @@ def test_the_public_pair(pair: Pair, cli: Cli) -> None:
     assert found["equal"] is False
     assert found["found"]["posed"]["distance"] < 1e-12  # where the joints are, they agree
     assert found["versions"].keys() >= {"statemachine", "mujoco", "numpy", "python"}
-    page = cli("compare", "--models", str(one), str(two))
-    assert page.returncode == 1
+    page = cli("compare", "--models", str(one), str(two), code=1)
     for text in ("19.9 mm", "90°", "2.841", "2.744", "10 N·m", "2.94 N·m", "not said"):
         assert text in page.stdout, text
     lines = page.stdout.splitlines()
@@ -265,8 +263,7 @@ def test_fixed_links_weigh_what_mujoco_makes_of_them(
             f'<joint name="j{k}" type="{kind}"><origin xyz="{at}" rpy="{turn}"/>'
             f'<parent link="{on}"/><child link="l{k}"/><axis xyz="0 1 0"/></joint>'
         )
-    path = tmp_path_factory.mktemp("urdf") / "r.urdf"
-    path.write_text("".join(texts) + "</robot>")
+    path = written(tmp_path_factory.mktemp("urdf") / "r.urdf", "".join(texts) + "</robot>")
     ours, theirs = (
         GroupTree(read(path)).groups[1].inertial,
         GroupTree(read(path, "mujoco")).groups[1].inertial,
@@ -297,8 +294,7 @@ def test_references_of_joints_and_several_on_one_body(tmp_path: Path) -> None:
       <joint name="s" type="slide" axis="0 1 0" ref="0.02"/>
       <joint name="z" axis="0 0 1" ref="-0.7" pos="0.05 0 0"/><geom size="0.1"/>
       <site name="tip" pos="0.3 0.2 0.1"/></body></worldbody></mujoco>"""
-    path = tmp_path / "many.xml"
-    path.write_text(text)
+    path = written(tmp_path / "many.xml", text)
     tree, model = GroupTree(read(path)), load(path)
     from statemachine import forward, make_data
 
@@ -501,8 +497,7 @@ def test_meshes_are_measured_and_missing_ones_are_said(tmp_path: Path) -> None:
     ],
 )
 def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, said: str) -> None:
-    path = tmp_path / "bad.urdf"
-    path.write_text(text)
+    path = written(tmp_path / "bad.urdf", text)
     with pytest.raises(ModelError, match=re.escape(said)) as caught:
         read(path)
     assert "\n" not in str(caught.value)
@@ -581,8 +576,7 @@ def test_split() -> None:
 
 @pytest.mark.slow
 def test_the_command(cli: Cli, tmp_path: Path) -> None:
-    same = cli("compare", "--models", "so101", "so101")
-    assert same.returncode == 0, same.stderr
+    same = cli("compare", "--models", "so101", "so101", code=0)
     assert "nothing differs that matters, to 6 digits" in same.stdout
     assert max(map(cell_len, same.stdout.splitlines())) <= 80
     assert cli("compare", "--models", "so101", "so101/scene_box", "--all").returncode == 1

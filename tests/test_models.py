@@ -13,7 +13,7 @@ import statemachine as sm
 from statemachine import backends, errors
 from statemachine.models import models_dir, resolve
 
-from .conftest import registered
+from .conftest import registered, written
 
 
 def test_names() -> None:
@@ -64,8 +64,7 @@ def test_a_folder_or_another_suffix_is_no_model(tmp_path: Path) -> None:
     folder.mkdir()
     with pytest.raises(errors.ModelFileError, match="folder"):
         resolve(folder)
-    text = tmp_path / "robot.txt"
-    text.write_text("hello")
+    text = written(tmp_path / "robot.txt", "hello")
     with pytest.raises(errors.ModelFileError, match=r"\.xml"):
         resolve(text)
 
@@ -77,8 +76,7 @@ def test_a_folder_or_another_suffix_is_no_model(tmp_path: Path) -> None:
      "<mujoco><asset><mesh file='gone.stl'/></asset></mujoco>"],
 )  # fmt: skip
 def test_malformed_files(tmp_path: Path, content: str, capfd: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / "bad.xml"
-    file.write_text(content)
+    file = written(tmp_path / "bad.xml", content)
     with pytest.raises(errors.ModelError) as caught:
         sm.load(file)
     assert str(file) in str(caught.value)
@@ -87,8 +85,10 @@ def test_malformed_files(tmp_path: Path, content: str, capfd: pytest.CaptureFixt
 
 
 def test_a_file_with_a_unicode_name_and_spaces(tmp_path: Path) -> None:
-    file = tmp_path / "Ärm № 1.xml"
-    file.write_text("<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>")
+    file = written(
+        tmp_path / "Ärm № 1.xml",
+        "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>",
+    )
     assert sm.load(file).nq == 1
 
 
@@ -121,10 +121,10 @@ def test_gains_and_ranges_are_the_servos(tmp_path: Path) -> None:
     assert np.allclose(model.actuator_kv, 2.731)
     assert np.allclose(model.actuator_forcerange, [-2.94, 2.94])
     assert model.actuator_jntid.tolist() == [0, 1, 2, 3, 4, 5]
-    file = tmp_path / "motor.xml"
-    file.write_text(
+    file = written(
+        tmp_path / "motor.xml",
         "<mujoco><worldbody><body><joint name='j'/><geom size='1'/></body></worldbody>"
-        "<actuator><motor joint='j'/><velocity joint='j' kv='2'/></actuator></mujoco>"
+        "<actuator><motor joint='j'/><velocity joint='j' kv='2'/></actuator></mujoco>",
     )
     model = sm.load(file)
     assert np.isnan(model.actuator_kp).all()
@@ -142,8 +142,7 @@ def test_backends_can_be_registered() -> None:
 
 def test_a_model_without_anything_steps(tmp_path: Path) -> None:
     """No joints, no actuators: empty arrays, not errors; and a read-only folder is enough."""
-    file = tmp_path / "empty.xml"
-    file.write_text("<mujoco/>")
+    file = written(tmp_path / "empty.xml", "<mujoco/>")
     tmp_path.chmod(stat.S_IRUSR | stat.S_IXUSR)
     try:
         model = sm.load(file)

@@ -18,7 +18,7 @@ import statemachine as sm
 from statemachine.backends import _mujoco_alarms
 from statemachine.errors import BadInputError, DivergedError, EngineWarning, StateMachineError
 
-from .conftest import ROOT
+from .conftest import ROOT, opened, written
 
 SLIDE = (
     "<mujoco><worldbody><body><joint type='slide'/><geom size='.1'/></body></worldbody></mujoco>"
@@ -40,10 +40,10 @@ def _handler() -> Iterator[None]:
 
 def _crowded(folder: Path) -> sm.Model:
     """A model that has not enough memory for its contacts, of which MuJoCo warns."""
-    file = folder / "crowded.xml"
-    file.write_text(
+    file = written(
+        folder / "crowded.xml",
         "<mujoco><size memory='300K'/><worldbody><geom type='plane' size='5 5 1'/>"
-        f"{BOXES}</worldbody></mujoco>"
+        f"{BOXES}</worldbody></mujoco>",
     )
     return sm.load(file)
 
@@ -127,8 +127,7 @@ assert mujoco.get_mju_user_warning() is print
 
 
 def test_handlers_that_are_saved_and_restored_pile_up_nothing() -> None:
-    model = sm.load("so101/scene")
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101/scene")) as (model, data):
         for _ in range(50):
             old = mujoco.get_mju_user_warning()
             mujoco.set_mju_user_warning(lambda text: None)
@@ -219,8 +218,7 @@ def test_forward_warns_too(tmp_path: Path) -> None:
 
 
 def test_a_data_that_raw_drove_to_nan_says_so_at_the_next_step() -> None:
-    model = sm.load("so101/scene")
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101/scene")) as (model, data):
         data.qpos[4] = np.nan
         mujoco.mj_step(model.raw, data.raw)
         data.qpos[:], data.qvel[:] = 0, 0
@@ -236,15 +234,14 @@ def test_the_first_entry_inside_a_bulk_step_is_named_where_it_is_known(
     foreign: bool, nstep: int, alone: bool, tmp_path: Path
 ) -> None:
     """The one that grows faster is bad first; with its text, or as the only one, it is known."""
-    file = tmp_path / "two.xml"
-    file.write_text(
+    file = written(
+        tmp_path / "two.xml",
         "<mujoco><option gravity='0 0 0'/><worldbody>"
         "<body><joint name='a' type='slide'/><geom size='.1' mass='1'/></body>"
         "<body pos='9 0 0'><joint name='b' type='slide' axis='1 0 0'/><geom size='.1' mass='1'/>"
-        "</body></worldbody></mujoco>"
+        "</body></worldbody></mujoco>",
     )
-    model = sm.load(file)
-    with sm.make_data(model) as data:
+    with opened(sm.load(file)) as (model, data):
         if foreign:
             mujoco.set_mju_user_warning(lambda text: None)
         data.qvel[:] = 9e9, 9.5e9

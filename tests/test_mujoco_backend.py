@@ -23,14 +23,13 @@ from statemachine.errors import (
     UnknownNameError,
 )
 
-from .conftest import ROOT, started
+from .conftest import ROOT, opened, started, written
 
 GEOM = "<geom size='0.1' mass='1'/>"
 
 
 def _load(folder: Path, body: str, rest: str = "", name: str = "m.xml") -> sm.Model:
-    file = folder / name
-    file.write_text(f"<mujoco><worldbody>{body}</worldbody>{rest}</mujoco>")
+    file = written(folder / name, f"<mujoco><worldbody>{body}</worldbody>{rest}</mujoco>")
     return sm.load(file)
 
 
@@ -63,8 +62,7 @@ def test_substeps_and_timestep_compose_in_any_order() -> None:
 
 
 def test_too_many_substeps_in_one_call_are_refused() -> None:
-    model = sm.load("so101").replace(substeps=1000)
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101").replace(substeps=1000)) as (model, data):
         with pytest.raises(BadInputError, match="too large"):
             sm.step(model, data, 2**31 - 1)
         assert data.time == 0.0
@@ -159,8 +157,7 @@ def test_a_zero_quaternion_of_a_ball_joint_is_refused(tmp_path: Path) -> None:
 
 
 def test_bad_entries_are_called_by_their_joint() -> None:
-    model = sm.load("so101/scene_box")
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101/scene_box")) as (model, data):
         for name, index, joint in (("qpos", 12, "box"), ("qvel", 6, "box"), ("qvel", 5, "gripper")):
             sm.reset(model, data)
             getattr(data, name)[index] = np.nan
@@ -171,8 +168,7 @@ def test_bad_entries_are_called_by_their_joint() -> None:
 
 
 def test_a_diverged_data_refuses_writes_but_tells_its_time() -> None:
-    model = sm.load("so101")
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101")) as (model, data):
         data.qvel[0] = np.nan
         with pytest.raises(DivergedError):
             sm.step(model, data)
@@ -225,8 +221,7 @@ def test_states_of_models_that_differ_in_names_only_are_told_apart(tmp_path: Pat
 
 
 def test_hidden_parts_of_a_state_must_be_numbers() -> None:
-    model = sm.load("so101")
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101")) as (model, data):
         data.raw.xfrc_applied[1, 0] = np.nan
         with pytest.raises(BadInputError, match="state"):
             sm.get_state(model, data)
@@ -295,8 +290,7 @@ except (KeyboardInterrupt, sm.errors.DivergedError) as error:
 
 
 def test_what_raw_shows_stays_writable() -> None:
-    model = sm.load("so101")
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101")) as (model, data):
         sm.forward(model, data)
         data.raw.qacc[:] = 0.0
         mujoco.mj_inverse(model.raw, data.raw)
@@ -305,8 +299,7 @@ def test_what_raw_shows_stays_writable() -> None:
 
 
 def test_nobody_is_not_taken_for_a_model() -> None:
-    model = sm.load("so101")
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101")) as (model, data):
         data.qvel[0] = np.nan
         with pytest.raises(DivergedError):
             sm.step(model, data)

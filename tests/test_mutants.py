@@ -25,7 +25,7 @@ from statemachine.grading.mutants.run import Examination, Failure, MutantTrial, 
 from statemachine.page import Table
 from statemachine.report import mutants as report
 
-from .conftest import ROOT, Cli
+from .conftest import ROOT, Cli, opened
 
 EXERCISE = ROOT / "exercises" / "test_arm.py"
 SOLUTION = ROOT / "teaching" / "solutions" / "test_arm.py"
@@ -138,8 +138,7 @@ def test_the_short_step_keeps_the_clock_right(
     backend: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     FAULTS["one-step-short"](monkeypatch)
-    model = sm.load("so101", backend=backend)
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101", backend=backend)) as (model, data):
         sm.step(model, data, 7)
         assert math.isclose(data.time, 7 * model.timestep)
 

@@ -17,7 +17,7 @@ import statemachine as sm
 from statemachine import worlds
 from statemachine.errors import BadInputError, EngineWarning, UnsupportedError
 
-from .conftest import need_engine
+from .conftest import written
 
 CART = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body name="cart">
 <joint name="rail" type="slide" axis="1 0 0"/><joint name="other" type="slide" axis="0 1 0"/>
@@ -28,9 +28,7 @@ MOTOR = '<motor name="motor" joint="other"/>'
 
 
 def loaded(tmp_path: Path, text: str, backend: str = "mujoco") -> Any:
-    path = tmp_path / "model.xml"
-    path.write_text(text)
-    return sm.load(path, backend=backend)
+    return sm.load(written(tmp_path / "model.xml", text), backend=backend)
 
 
 def cart(tmp_path: Path, actuators: str, backend: str = "mujoco") -> Any:
@@ -109,9 +107,9 @@ def test_load_takes_them_too(backend: str) -> None:
     assert (model.actuator_kp == 500).all()
 
 
+@pytest.mark.usefixtures("bullet")
 def test_pybullet_says_which_frictions_it_cannot_have() -> None:
     """It multiplies the frictions of two links; MuJoCo takes the larger."""
-    need_engine("pybullet")
     model = sm.load("so101/scene_box", backend="pybullet")
     with warnings.catch_warnings():
         warnings.simplefilter("error", EngineWarning)
@@ -158,8 +156,8 @@ def test_a_delay_of_the_file_is_kept(tmp_path: Path, backend: str, kept: int, la
     assert all(other for _, other in moved)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_an_interpolated_delay_is_refused_on_pybullet(tmp_path: Path) -> None:
-    need_engine("pybullet")
     with pytest.raises(UnsupportedError, match="interpolated latency"):
         loaded(tmp_path, DELAYED.format(kept=9, interp="linear"), "pybullet")
 
@@ -222,8 +220,8 @@ def test_states_with_other_latencies_are_foreign(backend: str) -> None:
             sm.set_state(late, other, state)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_pybullet_as_it_comes_has_none_of_them() -> None:
-    need_engine("pybullet")
     model = sm.load("so101", backend="pybullet", defaults="engine")
     for name in ("mass", "friction", "kp", "kv", "latency", "damping", "limits"):
         with pytest.raises(UnsupportedError, match="load the model without that to set it"):
@@ -234,8 +232,8 @@ def test_pybullet_as_it_comes_has_none_of_them() -> None:
     assert "not damping, mass, friction, kp, kv, latency, limits: with" in str(model.capabilities)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_energies_are_those_of_the_changed_mass() -> None:
-    need_engine("pybullet")
     from statemachine.runs.energy import energies
 
     found = []

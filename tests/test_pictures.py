@@ -34,7 +34,7 @@ from statemachine.report.plot_panels import of_comparison, of_trace
 from statemachine.runs import Trace, record, shipped, write
 from statemachine.runs.header import INPUTS
 
-from .conftest import ROOT, Cli, need_engine
+from .conftest import ROOT, Cli, need_engine, written
 from .rendering import rendering_environment, silhouettes
 
 pytestmark = pytest.mark.slow  # a browser or a renderer at work
@@ -116,10 +116,10 @@ def _ball() -> Path:
 
 @pytest.fixture(scope="module", autouse=True)
 def _a_ball(tmp_path_factory: pytest.TempPathFactory) -> None:
-    path = tmp_path_factory.mktemp("model") / "ball.xml"
-    path.write_text(
+    path = written(
+        tmp_path_factory.mktemp("model") / "ball.xml",
         "<mujoco><option gravity='0 0 0'/><worldbody><body name='ball' pos='0 0 1'><freejoint/>"
-        "<geom type='sphere' size='0.1' rgba='1 0.5 0 1'/></body></worldbody></mujoco>"
+        "<geom type='sphere' size='0.1' rgba='1 0.5 0 1'/></body></worldbody></mujoco>",
     )
     _BALLS["ball"] = path
 
@@ -250,8 +250,7 @@ def test_two_models_of_one_robot_are_drawn_in_one_picture(
     tmp_path: Path, mujoco_here: probe.Renderer
 ) -> None:
     """Each side with its own looks and its own file."""
-    wide = tmp_path / "wide.xml"
-    wide.write_text(_ball().read_text().replace("size='0.1'", "size='0.2'"))
+    wide = written(tmp_path / "wide.xml", _ball().read_text().replace("size='0.1'", "size='0.2'"))
     models = (sm.load(_ball()), sm.load(wide))
     one, two = (record(model, None, 0.02) for model in models)
     how: Any = {"size": SIZE, "timing": Timing(0.02, 50), "renderer": mujoco_here}
@@ -373,8 +372,8 @@ def _without_opengl(tmp_path: Path) -> dict[str, str]:
     return {"LD_LIBRARY_PATH": str(folder), "__EGL_VENDOR_LIBRARY_DIRS": str(folder), "DISPLAY": ""}
 
 
+@pytest.mark.usefixtures("bullet")
 def test_without_opengl_pybullet_draws_and_it_is_said(cli: Cli, tmp_path: Path) -> None:
-    need_engine("pybullet")
     image_of = pytest.importorskip("PIL.Image")
     done = cli(
         *("compare", "hold", "--seconds", "0.2", "--film", "a.webp", "--size", "320x240"),
@@ -389,8 +388,8 @@ def test_without_opengl_pybullet_draws_and_it_is_said(cli: Cli, tmp_path: Path) 
     done = cli(
         *("compare", "hold", "--film", "b.webp", "--renderer", "mujoco"),
         **_environment_of(tmp_path),
+        code=3,
     )
-    assert done.returncode == 3
     assert not done.stdout
     (line,) = done.stderr.splitlines()
     assert "no OpenGL" in line
@@ -449,8 +448,7 @@ def test_what_cannot_be_drawn_is_said_before_anything_runs(
     cli: Cli, tmp_path: Path, words: tuple[str, ...], says: str
 ) -> None:
     (tmp_path / "folder.svg").mkdir()
-    done = cli("compare", "hold", *words)
-    assert done.returncode == 2
+    done = cli("compare", "hold", *words, code=2)
     assert not done.stdout
     (line,) = done.stderr.splitlines()
     assert says in line
@@ -470,8 +468,7 @@ def test_an_extra_that_is_missing_is_named_before_anything_runs(
     hidden = tmp_path / "hidden"
     hidden.mkdir()
     (hidden / f"{module}.py").write_text(f"raise ModuleNotFoundError(name={module!r})\n")
-    done = cli("compare", "hold", *words, PYTHONPATH=f"{hidden}:{ROOT}")
-    assert done.returncode == 3
+    done = cli("compare", "hold", *words, PYTHONPATH=f"{hidden}:{ROOT}", code=3)
     assert not done.stdout
     (line,) = done.stderr.splitlines()
     assert extra in line
@@ -491,8 +488,8 @@ def test_compare_writes_what_it_is_asked_for(
     done = cli(
         *("compare", *files, "--json", "--plot", "a.svg", "--film", "a.webp", "--size", "320x240"),
         *("--fps", "10", "--renderer", "mujoco"),
+        code=1,
     )
-    assert done.returncode == 1  # they differ
     json.loads(done.stdout)
     plotted, filmed = done.stderr.splitlines()
     assert "a.svg: a figure" in plotted

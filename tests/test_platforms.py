@@ -22,7 +22,7 @@ from statemachine import installed
 from statemachine.errors import MissingEngineError
 from statemachine.installed import ENGINES, engine_version
 
-from .conftest import ROOT, Cli, need_engine
+from .conftest import ROOT, Cli
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 PINS = [line for line in (ROOT / "constraints.txt").read_text().splitlines() if line[:1] != "#"]
@@ -178,8 +178,7 @@ def without_pybullet(tmp_path: Path) -> dict[str, str]:
 
 
 def test_one_line_says_what_is_missing(cli: Cli, without_pybullet: dict[str, str]) -> None:
-    done = cli("lesson", "gravity", "--backend", "pybullet", **without_pybullet)
-    assert done.returncode == 3
+    done = cli("lesson", "gravity", "--backend", "pybullet", **without_pybullet, code=3)
     assert not done.stdout
     (line,) = done.stderr.splitlines()
     here = installed.wheel_here(ENGINES["pybullet"])
@@ -228,17 +227,16 @@ def test_what_to_install_depends_on_the_machine(
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("bullet")
 def test_two_distributions_at_once_are_an_error_that_says_what_to_type(
     cli: Cli, tmp_path: Path
 ) -> None:
-    need_engine("pybullet")
     both = tmp_path / "both"
     for name in ENGINES["pybullet"].distributions:
         (folder := both / f"{name.replace('-', '_')}-3.2.9.dist-info").mkdir(parents=True)
         (folder / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 3.2.9\n")
     path = {"PYTHONPATH": os.pathsep.join((str(both), str(ROOT)))}
-    done = cli("lesson", "gravity", "--backend", "pybullet", **path)
-    assert done.returncode == 3
+    done = cli("lesson", "gravity", "--backend", "pybullet", **path, code=3)
     (line,) = done.stderr.splitlines()
     assert "pybullet and pybullet-arm64 are both installed" in line
     assert "pip uninstall -y pybullet pybullet-arm64, then pip install pybullet" in line
@@ -269,8 +267,7 @@ def test_the_record_names_the_distribution(monkeypatch: pytest.MonkeyPatch) -> N
 def test_all_goes_on_with_the_engines_that_are_there(
     cli: Cli, without_pybullet: dict[str, str]
 ) -> None:
-    done = cli("lesson", "gravity", "--backend", "all", **without_pybullet)
-    assert done.returncode == 0
+    done = cli("lesson", "gravity", "--backend", "all", **without_pybullet, code=0)
     assert "23.92°" in done.stdout
     assert "Where they differ" not in done.stdout
     (line,) = done.stderr.splitlines()
@@ -281,19 +278,17 @@ def test_all_goes_on_with_the_engines_that_are_there(
 
 @pytest.mark.slow
 def test_the_doctor_calls_it_optional(cli: Cli, without_pybullet: dict[str, str]) -> None:
-    done = cli("doctor", "--json", **without_pybullet)
-    assert done.returncode == 0
+    done = cli("doctor", "--json", **without_pybullet, code=0)
     (finding,) = (f for f in json.loads(done.stdout)["findings"] if f["name"] == "pybullet")
     assert not finding["works"]
     assert re.search("pip install|no wheel", finding["found"])
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("bullet")
 def test_with_it_every_lesson_speaks_of_both(cli: Cli) -> None:
-    need_engine("pybullet")
     for lesson in ("state", "forward", "hold", "gravity"):
-        done = cli("lesson", lesson, "--backend", "all")
-        assert done.returncode == 0, done.stderr
+        done = cli("lesson", lesson, "--backend", "all", code=0)
         assert not done.stderr
         # Differences come last, but for what to do next.
         after = done.stdout.partition("Where they differ, and by how much")[2]

@@ -12,7 +12,7 @@ from statemachine.errors import BadInputError
 from statemachine.page import Question
 from statemachine.report.predictions import RecordedReader
 
-from .conftest import Cli
+from .conftest import Cli, written
 from .test_lessons import _at_a_terminal
 
 ONE = Question("how many?", ("1", "2"), 1, "counted")
@@ -51,16 +51,14 @@ def test_the_first_answer_counts_and_a_session_is_gone_on_with(
     "text", ["", "[]", '{"kind": "x"}', '{"kind": "statemachine predictions", "answers": [1]}']
 )
 def test_another_file_is_not_overwritten(tmp_path: Path, text: str) -> None:
-    file = tmp_path / "mine.json"
-    file.write_text(text)
+    file = written(tmp_path / "mine.json", text)
     with pytest.raises(BadInputError, match="no record of predictions"):
         RecordedReader(file)
     assert file.read_text() == text
 
 
 def test_nobody_there_to_answer(cli: Cli, tmp_path: Path) -> None:
-    done = cli("lesson", "state", "--record", str(tmp_path / "mine.json"))
-    assert done.returncode == 2
+    done = cli("lesson", "state", "--record", str(tmp_path / "mine.json"), code=2)
     assert "needs a terminal that asks" in done.stderr
     assert not (tmp_path / "mine.json").exists()
 

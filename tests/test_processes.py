@@ -11,11 +11,12 @@ import pytest
 
 import statemachine as sm
 
+from .conftest import opened
+
 
 def _continue(backend: str, pickled: bytes, steps: int) -> bytes:
     """The State after `steps` under a ctrl that swings, from a pickled State."""
-    model = sm.load("so101/scene_box", backend=backend)
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101/scene_box", backend=backend)) as (model, data):
         sm.set_state(model, data, pickle.loads(pickled))
         return pickle.dumps(_swing(model, data, steps))
 
@@ -29,9 +30,7 @@ def _swing(model: sm.Model, data: sm.Data, steps: int) -> sm.State:
 
 
 def _mid_contact(backend: str) -> tuple[sm.Model, sm.State]:
-    model = sm.load("so101/scene_box", backend=backend)
-    with sm.make_data(model) as data:
-        sm.reset(model, data, keyframe=0)
+    with opened(sm.load("so101/scene_box", backend=backend), keyframe=0) as (model, data):
         sm.step(model, data, 37)
         assert len(data.contacts) > 0
         return model, sm.get_state(model, data)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from .conftest import ROOT, need_engine
+from .conftest import ROOT
 
 _RUN = """
 import hashlib, json, sys
@@ -71,8 +71,8 @@ def _digests(**environment: str) -> dict[str, str]:
 
 @pytest.mark.slow
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the kernels are those of x86-64")
+@pytest.mark.usefixtures("bullet")
 def test_bits_do_not_depend_on_the_kernels_of_numpy() -> None:
-    need_engine("pybullet")
     here = _digests()
     others = [_digests(**environment) for environment in _PROCESSORS]
     if all(other["NumPy"] == here["NumPy"] for other in others):

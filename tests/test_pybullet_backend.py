@@ -32,7 +32,7 @@ from statemachine.errors import (
 from statemachine.interface import DERIVED
 from statemachine.rotations import matrix_from_quat
 
-from .conftest import ROOT, need_engine, started
+from .conftest import ROOT, need_engine, opened, started, written
 
 Golden = Callable[[str], np.ndarray]
 HOLD = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
@@ -52,8 +52,7 @@ def load(name: str | Path, **options: Any) -> sm.Model:
 
 
 def mjcf(folder: Path, inside: str, name: str = "m.xml") -> Path:
-    file = folder / name
-    file.write_text(f"<mujoco model='m'>{inside}</mujoco>")
+    file = written(folder / name, f"<mujoco model='m'>{inside}</mujoco>")
     return file
 
 
@@ -351,8 +350,10 @@ def test_two_free_bodies_are_two(tmp_path: Path) -> None:
         f"<geom size='{radius}' mass='{mass}'/></body>"
         for k, (radius, mass) in enumerate(((0.1, 1.0), (0.2, 3.0)))
     )
-    model = load(mjcf(tmp_path, _world(f"<geom type='plane' size='5 5 1'/>{balls}")))
-    with sm.make_data(model) as data:
+    with opened(load(mjcf(tmp_path, _world(f"<geom type='plane' size='5 5 1'/>{balls}")))) as (
+        model,
+        data,
+    ):
         free = [tree.body for tree in data.raw.trees if tree.free]
         masses = [pb.getDynamicsInfo(body, -1, data.raw.client)[0] for body in free]
         assert masses == [1.0, 3.0]
@@ -473,8 +474,7 @@ def test_a_spring_on_a_free_joint_is_refused(tmp_path: Path) -> None:
 
 def test_an_ellipsoid_that_touches_nothing_is_taken(tmp_path: Path) -> None:
     egg = '<geom type="ellipsoid" size="0.1 0.2 0.3" mass="1" contype="0" conaffinity="0"/>'
-    model = load(mjcf(tmp_path, _world(f"<body><joint/>{egg}</body>")))
-    with sm.make_data(model) as data:
+    with opened(load(mjcf(tmp_path, _world(f"<body><joint/>{egg}</body>")))) as (model, data):
         data.qvel[0] = 1.0
         sm.step(model, data, 10)
         assert data.qpos[0] == pytest.approx(10 * model.timestep)  # nothing brakes it
@@ -591,8 +591,7 @@ print(ends[1][:2])
 @pytest.mark.parametrize("text", ["", "<mujoco>", "no XML at all"])
 def test_a_file_that_nobody_reads_is_an_error_of_ours(text: str, tmp_path: Path) -> None:
     for suffix in ("xml", "urdf"):
-        file = tmp_path / f"bad.{suffix}"
-        file.write_text(text)
+        written(tmp_path / f"bad.{suffix}", text)
         code = f"""
 import statemachine as sm
 try:

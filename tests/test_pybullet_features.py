@@ -12,7 +12,7 @@ import pytest
 import statemachine as sm
 from statemachine.errors import UnsupportedError
 
-from .conftest import need_engine
+from .conftest import need_engine, written
 
 ARM = """<mujoco><option {option}/><worldbody>{more}
   <body pos="0 0 2"><joint name="a" axis="0 1 0"/>
@@ -68,8 +68,7 @@ def both(folder: Path, changes: dict[str, str], **options: Any) -> tuple[sm.Mode
     need_engine("pybullet")
     given = dict.fromkeys(("more", "geom", "joint", "actuator"), "")
     given |= {"option": 'integrator="implicitfast"'} | changes
-    path = folder / "model.xml"
-    path.write_text(ARM.format(**given | {"more": FLOOR + given["more"]}))
+    path = written(folder / "model.xml", ARM.format(**given | {"more": FLOOR + given["more"]}))
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         two = sm.load(path, backend="pybullet", **options)

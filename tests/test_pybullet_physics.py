@@ -11,7 +11,7 @@ import pytest
 import statemachine as sm
 from statemachine.errors import EngineWarning, UnsupportedError
 
-from .conftest import need_engine, started
+from .conftest import need_engine, started, written
 
 IMPLICIT = '<option timestep="0.002" integrator="implicitfast"/>'
 FLOOR = '<geom name="floor" type="plane" size="1 1 .1"/>'
@@ -24,8 +24,9 @@ def _engine() -> None:
 
 def both(folder: Path, body: str, option: str = IMPLICIT, rest: str = "") -> list[sm.Model]:
     """The model on MuJoCo and on PyBullet."""
-    file = folder / "m.xml"
-    file.write_text(f"<mujoco>{option}<worldbody>{body}</worldbody>{rest}</mujoco>")
+    file = written(
+        folder / "m.xml", f"<mujoco>{option}<worldbody>{body}</worldbody>{rest}</mujoco>"
+    )
     return [sm.load(file, backend=backend) for backend in ("mujoco", "pybullet")]
 
 

@@ -18,7 +18,7 @@ from statemachine.lessons import STATIONS
 from statemachine.lessons.questions import _ASKED
 from statemachine.probes.conventions import QUESTIONS
 
-from .conftest import ROOT, Cli, need_engine
+from .conftest import ROOT, Cli, need_engine, opened, written
 
 PAGES = {
     path.relative_to(ROOT).as_posix(): path.read_text("utf-8")
@@ -84,10 +84,10 @@ def test_command(cli: Cli, command: str, request: pytest.FixtureRequest, tmp_pat
         folder = request.getfixturevalue("menagerie")
         words = [str(folder) if word == "path/to/menagerie" else word for word in words]
     if "path/to/robot.xml" in words:
-        file = tmp_path / "robot.xml"
-        file.write_text(
+        file = written(
+            tmp_path / "robot.xml",
             "<mujoco><worldbody><body name='a'><inertial mass='1' pos='0 0 0' diaginertia='1 1 1'/>"
-            "<joint name='j'/><site name='tip' pos='1 0 0'/></body></worldbody></mujoco>"
+            "<joint name='j'/><site name='tip' pos='1 0 0'/></body></worldbody></mujoco>",
         )
         words = [str(file) if word == "path/to/robot.xml" else word for word in words]
     if "submissions" in words:
@@ -250,9 +250,7 @@ def test_numbers_of_the_models_readme() -> None:
     for value in ("0.028", "0.052", "998.22", "2.731", "2.94", "2.841", "2.744"):
         assert value in text
     assert model.dof_armature[0] == 0.028
-    box = sm.load("so101/scene_box")
-    with sm.make_data(box) as data:
-        sm.reset(box, data, keyframe=0)
+    with opened(sm.load("so101/scene_box"), keyframe=0) as (box, data):
         sm.forward(box, data)
         geom = box.geom_id("box")
         corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])

@@ -101,8 +101,8 @@ def test_a_lesson(copy: Copy) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("bullet")
 def test_a_quantity(copy: Copy) -> None:
-    need_engine("pybullet")
     copy.follow("Add a compared quantity")
     text = copy.run("compare", "hold", "--seconds", "0.5", code=1)
     assert "rad/s" in text
@@ -118,8 +118,8 @@ def test_a_quantity(copy: Copy) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("bullet")
 def test_a_convention(copy: Copy) -> None:
-    need_engine("pybullet")
     copy.follow("Add a convention")
     found = copy.run("conventions", "precision")
     assert "How precisely does the engine keep a position?" in found

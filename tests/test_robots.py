@@ -35,7 +35,7 @@ from statemachine.runs import record_scenario
 from statemachine.runs.provenance import model_files
 from statemachine.runs.scenarios import scenario
 
-from .conftest import ROOT, Cli, need_engine
+from .conftest import ROOT, Cli, need_engine, written
 
 GOOD = """<mujoco><option timestep='0.002'/><worldbody>
 <body name='arm' pos='0 0 1'><joint name='j' axis='0 1 0' damping='0.1'/>
@@ -143,8 +143,10 @@ def test_a_run_starts_where_the_experiments_start(tmp_path: Path) -> None:
     need_engine("mujoco")
     for names, start in ((("up", "home"), 1), (("up",), None)):
         keys = "".join(f"<key name='{name}' qpos='0.1 0.2'/>" for name in names)
-        file = tmp_path / "robot.xml"
-        file.write_text(GOOD.replace("</mujoco>", f"<keyframe>{keys}</keyframe></mujoco>"))
+        file = written(
+            tmp_path / "robot.xml",
+            GOOD.replace("</mujoco>", f"<keyframe>{keys}</keyframe></mujoco>"),
+        )
         model = load(file)
         assert gaps.keyframe_of(model) == start
         trace = record_scenario(scenario("hold"), model, seconds=0.02)
@@ -169,8 +171,8 @@ def _empty(folder: Path) -> Path:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("bullet")
 def test_a_table_of_all_that_can_go_wrong(folder: Path, sabotage: Path, tmp_path: Path) -> None:
-    need_engine("pybullet")
     for name in ("crash", "hang", "memory"):
         (folder / f"{name}.xml").write_text(GOOD)
     table = tmp_path / "table.json"
@@ -335,8 +337,7 @@ def test_a_page_of_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.slow
 def test_the_command(cli: Cli, folder: Path) -> None:
-    done = cli("robots", str(folder), "--quick", "--json", "--jobs", "2")
-    assert done.returncode == 0, done.stderr
+    done = cli("robots", str(folder), "--quick", "--json", "--jobs", "2", code=0)
     told = json.loads(done.stdout)
     assert {"default", "models", "parts", "made_with", "wrong"} == set(told)
     row = told["models"][0]
@@ -350,8 +351,7 @@ def test_the_command(cli: Cli, folder: Path) -> None:
         (["--seconds", "0"], "seconds must be"),
         (["--seed", "-1"], "seed must not"),
     ):
-        done = cli("robots", str(folder / "good.xml"), *words)
-        assert done.returncode == 2
+        done = cli("robots", str(folder / "good.xml"), *words, code=2)
         assert text in done.stderr
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from statemachine.silence import silence
 
-from .conftest import ROOT, need_engine
+from .conftest import ROOT
 
 pytestmark = pytest.mark.skipif(
     sys.platform not in ("linux", "darwin"), reason="C's streams can be exchanged in its library"
@@ -81,9 +81,9 @@ def test_what_another_thread_prints_is_not_caught(capfd: pytest.CaptureFixture[s
     assert capfd.readouterr() == ("one\n", "two\n")
 
 
+@pytest.mark.usefixtures("bullet")
 def test_nothing_is_lost_while_worlds_are_made() -> None:
     """A thread prints two hundred numbered lines while the engine loads and is quiet."""
-    need_engine("pybullet")
     code = """
 import os, threading, time
 import statemachine as sm
@@ -142,9 +142,9 @@ assert status == 0, status
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+@pytest.mark.usefixtures("bullet")
 def test_a_fork_while_a_world_is_used_does_not_hang() -> None:
     """The worlds that the Data of one Model share are behind a lock, too."""
-    need_engine("pybullet")
     code = """
 import os, threading
 import statemachine as sm

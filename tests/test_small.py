@@ -16,7 +16,7 @@ from statemachine import errors, rotations
 from statemachine.interface.checks import as_vector
 from statemachine.report.as_json import dumps
 
-from .conftest import ROOT
+from .conftest import ROOT, opened
 
 CORE = (
     "errors.py", "rotations.py", "interface", "installed.py", "models.py", "witness",
@@ -83,8 +83,7 @@ def test_as_vector_takes_what_is_finite_and_nothing_else(values: list[float]) ->
 
 
 def test_a_state_reads_as_what_it_holds(backend: str) -> None:
-    model = sm.load("so101", backend=backend)
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101", backend=backend)) as (model, data):
         data.qpos[1] = 0.5
         data.time = 3.0
         state = sm.get_state(model, data)

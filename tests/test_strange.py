@@ -13,7 +13,7 @@ import pytest
 import statemachine as sm
 from statemachine.errors import EngineWarning, ModelError, StateMachineError
 
-from .conftest import in_its_own_python, need_engine
+from .conftest import in_its_own_python, opened, written
 
 _BODY = (
     '<body name="arm"{body}><joint name="lift"{joint}/><geom name="part" size="0.1"{geom}/></body>'
@@ -82,8 +82,7 @@ UNUSUAL = [
 @pytest.mark.filterwarnings("ignore::statemachine.errors.EngineWarning")
 @pytest.mark.parametrize("named", STRANGE)
 def test_a_strange_number_is_refused_by_name(named: str, backend: str, tmp_path: Path) -> None:
-    file = tmp_path / "m.xml"
-    file.write_text(STRANGE[named])
+    file = written(tmp_path / "m.xml", STRANGE[named])
     with pytest.raises(ModelError, match=rf"m\.xml.*{named}") as caught:
         sm.load(file, backend=backend)
     assert "\n" not in str(caught.value)
@@ -102,8 +101,7 @@ def test_a_name_that_is_not_utf_8_is_refused(name: str, backend: str, tmp_path: 
 def test_a_negative_number_that_engines_take_is_told(
     named: str, backend: str, tmp_path: Path
 ) -> None:
-    file = tmp_path / "m.xml"
-    file.write_text(NEGATIVE[named])
+    file = written(tmp_path / "m.xml", NEGATIVE[named])
     with pytest.warns(EngineWarning, match=rf"m\.xml: {named} is negative$") as caught:
         sm.load(file, backend=backend)
     assert caught[0].filename == __file__
@@ -111,10 +109,7 @@ def test_a_negative_number_that_engines_take_is_told(
 
 @pytest.mark.parametrize("text", UNUSUAL)
 def test_an_unusual_number_is_taken(text: str, backend: str, tmp_path: Path) -> None:
-    file = tmp_path / "m.xml"
-    file.write_text(text)
-    model = sm.load(file, backend=backend)
-    with sm.make_data(model) as data:
+    with opened(sm.load(written(tmp_path / "m.xml", text), backend=backend)) as (model, data):
         sm.step(model, data, 20)
         assert np.isfinite(data.qpos).all()
 
@@ -164,8 +159,8 @@ for each in caught:
     assert [path.name for path in tmp_path.iterdir()] == ["m.xml"]
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_load_gives_back_the_handler_of_others(tmp_path: Path) -> None:
-    need_engine("pybullet")
     file, heard = tmp_path / "m.xml", []
     file.write_text(_model(geom=' mass="nan"'))
     handler, before = heard.append, mujoco.get_mju_user_warning()

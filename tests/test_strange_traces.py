@@ -27,7 +27,7 @@ from statemachine.runs import Trace, model_file, read, record, write
 from statemachine.runs.scenarios import SCENARIOS
 from statemachine.runs.whole import check_place, replace_file
 
-from .conftest import Cli, need_engine
+from .conftest import Cli, written
 from .test_trace_files import npz
 
 
@@ -145,11 +145,11 @@ def test_bodies_in_another_order_are_the_same_bodies(box: Trace) -> None:
 
 
 def test_bodies_without_names_are_told_apart(tmp_path: Path) -> None:
-    path = tmp_path / "two.xml"
-    path.write_text(
+    path = written(
+        tmp_path / "two.xml",
         '<mujoco><worldbody><geom type="plane" size="1 1 .1"/>'
         '<body pos="0 0 .05"><freejoint/><geom size=".05"/></body>'
-        '<body pos="1 0 .05"><freejoint/><geom size=".05"/></body></worldbody></mujoco>'
+        '<body pos="1 0 .05"><freejoint/><geom size=".05"/></body></worldbody></mujoco>',
     )
     trace = record(sm.load(path), seconds=0.2)
     assert set(trace.touches()) == {"body 1 on world", "body 2 on world"}
@@ -250,8 +250,7 @@ def test_options_of_a_run_are_refused_with_traces(box: Trace, tmp_path: Path, cl
         ("waves", "--seed=-1"),
         ("waves", "--why", "--seed=-1"),
     ):
-        ran = cli("compare", *words)
-        assert ran.returncode == 2, words
+        ran = cli("compare", *words, code=2)
         assert len(ran.stderr.splitlines()) == 1, ran.stderr
 
 
@@ -281,8 +280,7 @@ def test_the_model_of_a_trace_is_looked_for_by_its_digest(
     assert witness(trace, trace) is None
     (robots / "one.xml").unlink()
     write(trace, elsewhere / "swing.npz")
-    ran = cli("trace", "play", "elsewhere/swing.npz", "-o", "played.npz")
-    assert ran.returncode == 0
+    ran = cli("trace", "play", "elsewhere/swing.npz", "-o", "played.npz", code=0)
     assert "is not the file that the trace was recorded with" in ran.stderr
     again = read(tmp_path / "played.npz").header
     assert again.provenance.model_sha256 != trace.header.provenance.model_sha256
@@ -303,11 +301,12 @@ def test_a_controller_gives_real_numbers() -> None:
         record(sm.load("so101"), lambda _time, data: np.zeros(len(data.ctrl)) * 1j, 0.1)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_why_of_what_cannot_move_is_one_line(tmp_path: Path, cli: Cli) -> None:
-    need_engine("pybullet")
     (tmp_path / "empty.xml").write_text("<mujoco/>")
-    ran = cli("compare", "waves", "--why", "--model", tmp_path / "empty.xml", "--seconds", "0.1")
-    assert ran.returncode == 2
+    ran = cli(
+        "compare", "waves", "--why", "--model", tmp_path / "empty.xml", "--seconds", "0.1", code=2
+    )
     assert "nothing in it can move" in ran.stderr
 
 
@@ -357,8 +356,9 @@ def test_a_picture_of_what_is_no_number(box: Trace, tmp_path: Path, cli: Cli) ->
     pytest.importorskip("matplotlib")
     one = write(box, tmp_path / "one.npz")
     two = write(changed(box, site_xpos=with_nan(box["site_xpos"], 3)), tmp_path / "two.npz")
-    ran = cli("compare", one, two, "--plot", tmp_path / "p.svg", "--html", tmp_path / "p.html")
-    assert ran.returncode == 1, ran.stderr
+    ran = cli(
+        "compare", one, two, "--plot", tmp_path / "p.svg", "--html", tmp_path / "p.html", code=1
+    )
     assert "Traceback" not in ran.stderr
     assert (tmp_path / "p.svg").is_file()
     assert (tmp_path / "p.html").is_file()

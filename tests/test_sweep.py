@@ -40,7 +40,7 @@ from statemachine.sweep.folder import locked, settle_manifest
 from statemachine.sweep.rows import KEY, MEASURED, RowWriter, counted, remove_failed
 from statemachine.sweep.worker import differing, run_batch
 
-from .conftest import ROOT, in_its_own_python, need_engine
+from .conftest import ROOT, in_its_own_python, need_engine, written
 
 pytest.importorskip("pyarrow")
 pytest.importorskip("joblib")
@@ -80,8 +80,7 @@ def mended(model, data, gain=1.0):
 @pytest.fixture
 def policy(tmp_path: Path) -> str:
     """A file of functions."""
-    file = tmp_path / "policy.py"
-    file.write_text(POLICY)
+    file = written(tmp_path / "policy.py", POLICY)
     return str(file)
 
 
@@ -273,8 +272,8 @@ def test_a_cell_is_the_run_of_a_trace(backend: str) -> None:
     assert row["touch"]
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_seed_draws_the_same_start_everywhere() -> None:
-    need_engine("pybullet")
     sweep = Sweep("hold", backends=("mujoco", "pybullet"), seeds=3, seconds=0.005, moments=1)
     rows = {(row["backend"], row["seed"]): np.array(row["qpos"]) for row in in_process(sweep)}
     one, two = rows["mujoco", 1], rows["pybullet", 1]
@@ -294,8 +293,8 @@ def test_a_start_a_place_and_a_parameter(policy: str) -> None:
     assert rows[0]["qpos"] != rows[1]["qpos"]
 
 
+@pytest.mark.usefixtures("bullet")
 def test_a_cell_that_fails_is_a_row(policy: str) -> None:
-    need_engine("pybullet")
     both = Sweep("hold", ("integrator=euler",), ("mujoco", "pybullet"), seconds=0.05)
     rows = {row["backend"]: row for row in in_process(both)}
     assert rows["mujoco"]["status"] == "done"
@@ -527,8 +526,8 @@ def test_a_full_disk_is_one_line_and_nothing_is_half_written(tmp_path: Path) -> 
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("bullet")
 def test_jobs_do_not_change_results(tmp_path: Path) -> None:
-    need_engine("pybullet")
     sweep = Sweep("hold", ("timestep=0.005,0.01", "damping=1x,2x"), seeds=2, seconds=0.1)
     serial = sorted(in_process(sweep), key=lambda row: row["cell"])
     tables = []

@@ -38,7 +38,7 @@ from statemachine.runs import (
 from statemachine.runs.controllers import controller_from
 from statemachine.runs.scenarios import SCENARIOS
 
-from .conftest import ROOT, Cli, need_engine
+from .conftest import ROOT, Cli, need_engine, opened, written
 
 INPUTS = ("time", "qpos", "qvel", "ctrl")
 
@@ -63,8 +63,7 @@ def box() -> Trace:
 
 def test_the_rows_are_those_of_a_bare_loop(backend: str) -> None:
     trace = traced("hold", backend)
-    model = sm.load("so101/scene", backend=backend)
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101/scene", backend=backend)) as (model, data):
         for k in range(101):
             data.ctrl[:] = (0.0, -0.6, 1.2, 0.5, 0.0, 0.6)
             assert trace.time[k] == data.time
@@ -90,9 +89,7 @@ def test_derived_columns_are_of_the_state_of_their_row(backend: str, substeps: i
 
 
 def test_contacts_are_those_of_the_step(box: Trace) -> None:
-    model = sm.load("so101/scene_box")
-    with sm.make_data(model) as data:
-        sm.reset(model, data, "held")
+    with opened(sm.load("so101/scene_box"), keyframe="held") as (model, data):
         for row in range(30):
             data.ctrl[:] = box.ctrl[row]
             sm.step(model, data)
@@ -123,11 +120,11 @@ def test_a_short_run_is_the_beginning_of_a_long_one(
 
 
 def test_energies_of_a_pendulum_are_those_on_paper(tmp_path: Path) -> None:
-    file = tmp_path / "pendulum.xml"
-    file.write_text(
+    file = written(
+        tmp_path / "pendulum.xml",
         "<mujoco><option timestep='0.001'/><worldbody><body><joint name='j' axis='0 1 0' "
         "armature='0.3' damping='0'/><inertial pos='0 0 -0.5' mass='2' diaginertia='0.1 0.1 0.1'/>"
-        "</body></worldbody></mujoco>"
+        "</body></worldbody></mujoco>",
     )
     model = sm.load(file)
     trace = record(model, None, 0.5, qpos=[1.0], qvel=[0.7])
@@ -138,8 +135,8 @@ def test_energies_of_a_pendulum_are_those_on_paper(tmp_path: Path) -> None:
     assert trace.header.energy_by.startswith("mujoco ")
 
 
+@pytest.mark.usefixtures("bullet")
 def test_energies_of_both_engines_are_measured_by_one_yardstick() -> None:
-    need_engine("pybullet")
     one, two = traced("droop"), traced("droop", "pybullet")
     assert one["energy"][0].tolist() == two["energy"][0].tolist()
     raw = sm.load("so101/scene", backend="pybullet", defaults="engine")
@@ -157,8 +154,8 @@ def test_energies_of_both_engines_are_measured_by_one_yardstick() -> None:
     assert there[0] == pytest.approx(one["energy"][0, 1] * 1.62 / 9.81, rel=1e-12)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_an_engine_that_does_not_tell_leaves_nan() -> None:
-    need_engine("pybullet")
     raw = sm.load("so101/scene", backend="pybullet", defaults="engine")
     trace = record_scenario(SCENARIOS["hold"], raw, seconds=0.05, defaults="engine")
     assert np.isnan(trace["qfrc_contact"]).all()
@@ -280,9 +277,9 @@ def test_the_seed_makes_the_waves() -> None:
 
 
 def test_a_scenario_without_actuators_is_refused(tmp_path: Path) -> None:
-    file = tmp_path / "bare.xml"
-    file.write_text(
-        "<mujoco><worldbody><body><joint/><geom size='.1'/></body></worldbody></mujoco>"
+    file = written(
+        tmp_path / "bare.xml",
+        "<mujoco><worldbody><body><joint/><geom size='.1'/></body></worldbody></mujoco>",
     )
     with pytest.raises(BadInputError, match="no actuators"):
         record_scenario(SCENARIOS["hold"], sm.load(file))
@@ -447,11 +444,11 @@ def test_each_scenario_was_recorded_with_both_defaults() -> None:
         for name in shipped_names()
     ],
 )
+@pytest.mark.usefixtures("bullet")
 def test_a_recorded_trace_is_what_the_engine_does_here(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On any processor, Python and distribution of PyBullet: recorded with its own, on 3.11."""
-    need_engine("pybullet")
     if (sys.platform, platform.machine()) != ("linux", "x86_64"):
         pytest.skip("recorded on Linux x86-64: another compiler gives other bits")
     monkeypatch.syspath_prepend(ROOT / "models" / "so101")
@@ -490,12 +487,10 @@ def test_the_command_records_plays_shows_and_exports(cli: Cli, tmp_path: Path) -
 def test_the_command_draws(cli: Cli, tmp_path: Path) -> None:
     write(traced("hold", seconds=0.2), tmp_path / "hold.npz")
     pytest.importorskip("matplotlib")
-    done = cli("trace", "plot", "hold.npz")
-    assert done.returncode == 0, done.stderr
+    cli("trace", "plot", "hold.npz", code=0)
     assert "mujoco" in (tmp_path / "hold.svg").read_text()
     need_engine("pybullet")  # its software renderer, where there is no OpenGL
-    done = cli("trace", "film", "hold.npz", "-o", "f.webp", "--size", "400x320")
-    assert done.returncode == 0, done.stderr
+    cli("trace", "film", "hold.npz", "-o", "f.webp", "--size", "400x320", code=0)
     with pytest.importorskip("PIL.Image").open(tmp_path / "f.webp") as film:
         assert getattr(film, "n_frames", 1) == 6
 
@@ -543,7 +538,6 @@ def test_mistakes_are_one_line(
 
 
 def test_a_controller_of_ones_own(tmp_path: Path) -> None:
-    file = tmp_path / "c.py"
-    file.write_text(CONTROLLERS)
+    file = written(tmp_path / "c.py", CONTROLLERS)
     trace = record(sm.load("so101"), controller_from(f"{file}:controller"), 0.05)
     assert (trace.ctrl == 0.1).all()

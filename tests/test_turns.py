@@ -23,7 +23,7 @@ from statemachine.errors import (
     ReadOnlyError,
 )
 
-from .conftest import ROOT, in_its_own_python, need_engine, registered
+from .conftest import ROOT, in_its_own_python, need_engine, opened, registered, written
 
 Use = Callable[[sm.Model, sm.Data], object]
 USES: dict[str, Use] = {
@@ -277,8 +277,7 @@ def test_an_interrupted_verb_completes_or_undoes_or_refuses(verb: str) -> None:
 
 
 def test_a_state_that_is_refused_leaves_the_data_as_it_was() -> None:
-    model = sm.load("so101")
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101")) as (model, data):
         sm.step(model, data, 3)
         before = sm.get_state(model, data)
 
@@ -293,8 +292,7 @@ def test_a_state_that_is_refused_leaves_the_data_as_it_was() -> None:
 
 
 def test_inputs_that_were_made_read_only_are_found_before_anything_moves(backend: str) -> None:
-    model = sm.load("so101/scene", backend=backend)
-    with sm.make_data(model) as data:
+    with opened(sm.load("so101/scene", backend=backend)) as (model, data):
         state = sm.get_state(model, data)
         for name in ("qpos", "qvel", "ctrl"):
             getattr(data, name).setflags(write=False)
@@ -316,13 +314,12 @@ def test_an_engine_that_gives_up_in_forward_is_an_error_of_ours(tmp_path: Any) -
         "<geom type='box' size='.06 .06 .06'/></body>"
         for k in range(30)
     )
-    file = tmp_path / "small.xml"
-    file.write_text(
+    file = written(
+        tmp_path / "small.xml",
         "<mujoco><size memory='100K'/><worldbody><geom type='plane' size='5 5 1'/>"
-        f"{boxes}</worldbody></mujoco>"
+        f"{boxes}</worldbody></mujoco>",
     )
-    model = sm.load(file)
-    with sm.make_data(model) as data:
+    with opened(sm.load(file)) as (model, data):
         with pytest.raises(EngineError, match="gave up"):
             sm.forward(model, data)
         with pytest.raises(DivergedError, match="gave up"):

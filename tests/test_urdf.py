@@ -23,7 +23,7 @@ from statemachine.errors import UnsupportedError
 from statemachine.models import models_dir
 from statemachine.rotations import matrix_from_quat, wxyz_from_xyzw
 
-from .conftest import ROOT, need_engine
+from .conftest import ROOT, written
 
 INERTIAL = '<inertial mass="0.3" pos="0.1 0.02 0.03" quat="0.6 0.1 -0.4 0.3" diaginertia="3 4 2"/>'
 # Anchored and slanted joints, a slide, a fixed body, every shape, a site called as a body.
@@ -53,9 +53,7 @@ ZOO = f"""
 
 
 def _zoo(folder: Path) -> Any:
-    file = folder / "zoo.xml"
-    file.write_text(ZOO)
-    return sm.load(file)
+    return sm.load(written(folder / "zoo.xml", ZOO))
 
 
 def _poses(model: sm.Model, seed: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
@@ -144,15 +142,14 @@ def test_the_arm_by_pinocchio(pinocchio: None) -> None:
     assert _by_pinocchio(sm.load("so101"), models_dir() / "so101" / "so101.urdf") < 1e-12
 
 
+@pytest.mark.usefixtures("bullet")
 def test_the_arm_by_pybullet() -> None:
-    need_engine("pybullet")
     assert _by_pybullet(sm.load("so101"), models_dir() / "so101" / "so101.urdf") < 1e-12
 
 
 def test_every_kind_of_joint(tmp_path: Path, pinocchio: None) -> None:
     model = _zoo(tmp_path)
-    file = tmp_path / "zoo.urdf"
-    file.write_text(urdf.write(model.raw, 1))
+    file = written(tmp_path / "zoo.urdf", urdf.write(model.raw, 1))
     assert _by_pinocchio(model, file) < 1e-12
 
 
@@ -161,8 +158,7 @@ def test_masses_and_inertias_survive(tmp_path: Path, pinocchio: None) -> None:
     import pinocchio as pin
 
     model = _zoo(tmp_path)
-    file = tmp_path / "zoo.urdf"
-    file.write_text(urdf.write(model.raw, 1))
+    file = written(tmp_path / "zoo.urdf", urdf.write(model.raw, 1))
     built = pin.buildModelFromUrdf(str(file))
     order = [list(built.names).index(name) - 1 for name in model.joint_names]
     # Gravity as the root sees it.
@@ -217,7 +213,6 @@ def test_solids_of_a_capsule(tmp_path: Path) -> None:
     ],
 )
 def test_what_urdf_cannot_say_is_refused(tmp_path: Path, body: str, word: str) -> None:
-    file = tmp_path / "x.xml"
-    file.write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    file = written(tmp_path / "x.xml", f"<mujoco><worldbody>{body}</worldbody></mujoco>")
     with pytest.raises(UnsupportedError, match=word):
         scope.check(Plan(sm.load(file).raw), "pybullet")

@@ -26,7 +26,7 @@ from statemachine.report.as_json import dumps
 from statemachine.runs import record_scenario
 from statemachine.runs.scenarios import Scenario, scenario
 
-from .conftest import ROOT, Cli, need_engine, one_line, registered
+from .conftest import ROOT, Cli, need_engine, one_line, registered, written
 
 HOLD = replace(scenario("hold"), seconds=0.6)  # long enough to touch the floor
 FALL = replace(scenario("fall"), seconds=5.0)  # and to meet a limit
@@ -356,8 +356,7 @@ def test_as_it_comes_is_what_a_user_of_pybullet_gets(tmp_path: Path) -> None:
 
     fresh, found = dialled()
     ours = path_of(found.build({}, {}), HOLD)
-    file = tmp_path / "arm.urdf"
-    file.write_text(fresh.raw["base"])
+    file = written(tmp_path / "arm.urdf", fresh.raw["base"])
     client = pb.connect(pb.DIRECT)
     try:
         arm = pb.loadURDF(str(file), useFixedBase=True, physicsClientId=client)
@@ -679,8 +678,7 @@ def test_two_engines_as_they_come_differ_by_what_was_set() -> None:
 @pytest.mark.usefixtures("bullet")
 @pytest.mark.slow
 def test_the_command(cli: Cli) -> None:
-    done = cli("compare", "hold", "--why", "--seconds", "0.5")
-    assert done.returncode == 0, done.stderr
+    done = cli("compare", "hold", "--why", "--seconds", "0.5", code=0)
     assert not done.stderr
     assert "contact" in done.stdout
     assert all(len(line) <= 80 for line in done.stdout.splitlines())

@@ -31,7 +31,7 @@ from statemachine.errors import (
 )
 from statemachine.interface.worlds import WRITABLE
 
-from .conftest import SHARED, in_its_own_python, need_engine
+from .conftest import SHARED, in_its_own_python, need_engine, written
 
 N = 4
 # Activation, mocap, an equality, a tendon, a ball joint, two substeps of a free body.
@@ -483,9 +483,7 @@ def mujoco_() -> None:
 
 @pytest.fixture
 def rich(mujoco_: None, tmp_path: Path) -> sm.Model:
-    path = tmp_path / "rich.xml"
-    path.write_text(RICH)
-    return sm.load(path)
+    return sm.load(written(tmp_path / "rich.xml", RICH))
 
 
 @pytest.mark.parametrize("substeps", [1, 2])

@@ -43,7 +43,7 @@ from statemachine.worlds import (
 )
 
 from . import faulty_world as faulty
-from .conftest import ROOT, lives, need_engine, registered
+from .conftest import ROOT, lives, registered
 from .test_worlds import follow
 
 linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks at /proc")
@@ -95,9 +95,9 @@ def test_the_bits_are_those_of_single_data(model: sm.Model, workers: int) -> Non
         follow(model, worlds)
 
 
+@pytest.mark.usefixtures("bullet")
 def test_what_is_not_written_keeps_what_the_engine_remembers() -> None:
     """A write places the world anew, which drops the contact caches: the bits tell."""
-    need_engine("pybullet")
     model = sm.load("so101/scene_box", backend="pybullet")
     with make_worlds(model, 2, workers=1, derived=()) as worlds, sm.make_data(model) as data:
         sm.reset(model, data, keyframe=0)
@@ -309,10 +309,10 @@ def test_worlds_that_do_not_fit_are_refused_in_one_line(
 
 
 @linux
+@pytest.mark.usefixtures("bullet")
 def test_memory_is_measured_and_no_process_is_left_by_a_refusal(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    need_engine("pybullet")
     model = sm.load("so101", backend="pybullet")
     monkeypatch.setattr(interface_worlds, "free_memory", lambda: 200 << 20)
     started: list[int] = []

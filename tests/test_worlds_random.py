@@ -14,7 +14,7 @@ from statemachine.errors import BadInputError, EngineError, UnknownNameError
 from statemachine.interface import worlds as interface_worlds
 from statemachine.worlds import LogUniform, Uniform, draw, make_worlds
 
-from .conftest import ROOT
+from .conftest import ROOT, opened, written
 
 FIELDS = ("qpos", "qvel", "ctrl", "time")
 FACTS = (
@@ -74,9 +74,9 @@ def test_a_world_is_the_data_of_a_replaced_model(box: Any, name: str) -> None:
         worlds.step(many, 50)
         worlds.forward(many)
         for i in range(N):
-            model = box.replace(**{key: values[i] for key, values in options.items()})
-            with sm.make_data(model) as data:
-                sm.reset(model, data, keyframe=0)
+            with opened(
+                box.replace(**{key: values[i] for key, values in options.items()}), keyframe=0
+            ) as (model, data):
                 data.ctrl += push[i]
                 sm.step(model, data, 50)
                 sm.forward(model, data)
@@ -100,9 +100,9 @@ def test_every_backend_has_worlds_that_differ(backend: str) -> None:
         many.ctrl += 0.1
         worlds.step(many, 20)
         for i in range(2):
-            one = model.replace(**{name: values[i] for name, values in options.items()})
-            with sm.make_data(one) as data:
-                sm.reset(one, data, keyframe=0)
+            with opened(
+                model.replace(**{name: values[i] for name, values in options.items()}), keyframe=0
+            ) as (one, data):
                 data.ctrl += 0.1
                 sm.step(one, data, 20)
                 np.testing.assert_array_equal(many.qpos[i], data.qpos)
@@ -128,10 +128,10 @@ def test_no_world_has_a_compiled_model_of_its_own(box: Any) -> None:
 
 
 def test_a_model_without_actuators(tmp_path: Any) -> None:
-    path = tmp_path / "ball.xml"
-    path.write_text(
+    path = written(
+        tmp_path / "ball.xml",
         "<mujoco><option><flag gravity='disable'/></option><worldbody><body><freejoint/>"
-        "<geom size='.1'/></body></worldbody></mujoco>"
+        "<geom size='.1'/></body></worldbody></mujoco>",
     )
     model = sm.load(path)
     gravity = [[0, 0, -9.81], [0, 0, -1.62]]
