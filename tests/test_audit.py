@@ -24,10 +24,12 @@ from statemachine.backends import mujoco_backend
 from statemachine.backends.mujoco_backend import MujocoData
 from statemachine.cli import main
 from statemachine.engines.auditing import Driver, ReferenceRun
-from statemachine.engines.futures import Coordinates, FutureGap, gap
+from statemachine.engines.futures import FutureGap, gap
 from statemachine.engines.mujoco.audit import MujocoDriver
 from statemachine.errors import BadInputError, EngineWarning
 from statemachine.installed import require
+from statemachine.interface import JointType
+from statemachine.measures import JointPlaces
 from statemachine.probes import audit
 from statemachine.probes.audit import drivers_of, elsewhere, trials
 from statemachine.probes.audit.conclusions import conclude
@@ -42,7 +44,8 @@ SCENE = "so101/scene_box"
 
 # Gaps, against closed forms.
 
-HINGE, FREE = Coordinates((0,), (), ()), Coordinates((), (0, 1, 2), (3,))
+HINGE = JointPlaces.of([JointType.HINGE], [0])
+FREE = JointPlaces.of([JointType.FREE], [0])
 
 
 def test_what_is_compared_are_bytes() -> None:

@@ -13,7 +13,8 @@ import numpy as np
 
 from ..errors import DivergedError
 from ..interface import Array, Model
-from .futures import Coordinates, FutureGap, coordinates_of, gap, worst
+from ..measures import JointPlaces
+from .futures import FutureGap, gap, worst
 
 Layer = Literal["engine", "interface"]
 
@@ -189,9 +190,9 @@ class Driver(ABC):
     # A machine is taken to have qpos, qvel, ctrl and time, as an MjData and a Data have.
 
     @cached_property
-    def coordinates(self) -> Coordinates:
+    def coordinates(self) -> JointPlaces:
         """What the numbers are that `read` gives."""
-        return coordinates_of(self.model)
+        return JointPlaces.of(self.model.jnt_type, self.model.jnt_qposadr)
 
     @abstractmethod
     def fresh(self, point: SavePoint) -> Machine:

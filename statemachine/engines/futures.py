@@ -2,47 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..interface import Array, Ints, JointType, Model
-
-
-@dataclass(frozen=True)
-class Coordinates:
-    """What the numbers are that are read after a step.
-
-    Attributes:
-        angles: Where hinges are; lengths: where slides and coordinates of free bodies are.
-        quats: Where quaternions start, in any order of their components.
-    """
-
-    angles: tuple[int, ...]
-    lengths: tuple[int, ...]
-    quats: tuple[int, ...]
-
-    @property
-    def width(self) -> int:
-        """How many numbers are positions; velocities follow."""
-        return len(self.angles) + len(self.lengths) + 4 * len(self.quats)
-
-
-def coordinates_of(model: Model) -> Coordinates:
-    """The coordinates of qpos."""
-    angles, lengths, quats = [], [], []
-    for kind, start in zip(model.jnt_type.tolist(), model.jnt_qposadr.tolist(), strict=True):
-        if kind == JointType.HINGE:
-            angles.append(start)
-        elif kind == JointType.SLIDE:
-            lengths.append(start)
-        elif kind == JointType.BALL:
-            quats.append(start)
-        else:
-            lengths += range(start, start + 3)
-            quats.append(start + 3)
-    return Coordinates(tuple(angles), tuple(lengths), tuple(quats))
+from ..interface import Array, Ints
+from ..measures import JointPlaces, farthest, largest_or_inf, turns
 
 
 @dataclass(frozen=True)
@@ -73,15 +38,13 @@ class FutureGap:
         return max(self.angle, self.length)
 
 
-def gap(
-    one: Array, other: Array, coordinates: Coordinates, counts: Ints | None = None
-) -> FutureGap:
+def gap(one: Array, other: Array, places: JointPlaces, counts: Ints | None = None) -> FutureGap:
     """The gap between two futures.
 
     Args:
         one: Positions and velocities, (n, k).
         other: The same of the other future.
-        coordinates: What the numbers are.
+        places: What the numbers of a row are; velocities follow.
         counts: (n,) how many steps each row comes after, if not 0, 1, 2, …
     """
     rows = np.arange(len(one)) if counts is None else counts
@@ -92,15 +55,16 @@ def gap(
     steps = int(rows[-1])
     if not differs.any():
         return FutureGap(steps, None, 0.0, 0.0)
-    off = np.abs(one - other)
-    angles = [float(off[:, coordinates.angles].max(initial=0.0))]
-    for start in coordinates.quats:
-        a, b = one[:, start : start + 4], other[:, start : start + 4]
-        # q and -q are one rotation.
-        chord = np.minimum(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
-        angles.append(float(4 * np.arcsin(np.minimum(chord / 2, 1.0)).max()))
-    length = float(off[:, coordinates.lengths].max(initial=0.0))
-    return FutureGap(steps, int(rows[np.argmax(differs)]), _worst(angles), _worst([length]))
+    moved = [np.concatenate((places.slides, places.positions)), places.hinges]
+    length, angle = (farthest(one[:, chosen], other[:, chosen]) for chosen in moved)
+    quats = places.quats[:, None] + np.arange(4)
+    turned = turns(one[:, quats], other[:, quats])
+    return FutureGap(
+        steps,
+        int(rows[np.argmax(differs)]),
+        max(largest_or_inf(angle), largest_or_inf(turned)),
+        largest_or_inf(length),
+    )
 
 
 def worst(gaps: list[FutureGap]) -> FutureGap:
@@ -109,11 +73,6 @@ def worst(gaps: list[FutureGap]) -> FutureGap:
     return FutureGap(
         gaps[0].steps,
         min(firsts, default=None),
-        _worst([each.angle for each in gaps]),
-        _worst([each.length for each in gaps]),
+        max(each.angle for each in gaps),
+        max(each.length for each in gaps),
     )
-
-
-def _worst(values: list[float]) -> float:
-    """The largest; infinite if one is not a number, as of a run that diverged."""
-    return max(math.inf if math.isnan(value) else value for value in values)

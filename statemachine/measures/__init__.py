@@ -11,6 +11,7 @@ from .gap import (
     farthest,
     joint_gap,
     largest,
+    largest_or_inf,
     turns,
 )
 from .moments import SAME, Common, at_moments, common_moments, nearest
@@ -42,6 +43,7 @@ __all__ = [
     "farthest",
     "joint_gap",
     "largest",
+    "largest_or_inf",
     "nearest",
     "parse_tolerances",
     "same_pairs",

@@ -109,6 +109,16 @@ class JointPlaces:
         """Where all quaternions start: those of ball joints, then those of free bodies."""
         return np.concatenate([self.balls, self.free + 3])
 
+    @property
+    def positions(self) -> Ints:
+        """Where the coordinates of free bodies are."""
+        return (self.free[:, None] + np.arange(3)).ravel()
+
+    @property
+    def width(self) -> int:
+        """How many numbers there are."""
+        return len(self.hinges) + len(self.slides) + 4 * len(self.balls) + 7 * len(self.free)
+
 
 def joint_gap(
     names: Sequence[str], types: Sequence[int] | Ints, addresses: Sequence[int] | Ints,
@@ -136,6 +146,11 @@ def largest(sizes: Array) -> tuple[float, int]:
     """The largest of some sizes (n,), and its place; what is no number is larger than all."""
     place = int(np.argmax(sizes))  # the first NaN, if there is one
     return float(sizes[place]), place
+
+
+def largest_or_inf(sizes: Array) -> float:
+    """The largest of some sizes; infinite if one is no number, as of a run that diverged."""
+    return float(np.where(np.isnan(sizes), np.inf, sizes).max(initial=0.0))
 
 
 def distances(one: Array, two: Array) -> Array:

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..engines.futures import Coordinates, gap
 from ..errors import StateMachineError
-from ..interface import Array, JointType, Model, make_data, reset
+from ..interface import Array, Model, make_data, reset
+from ..measures import JointPlaces, farthest, largest_or_inf, turns
 from ..runs.commands import start_keyframe
 from ..runs.drive import Controller, drive
 from .records import TOLERANCE, RunGap
@@ -101,20 +101,22 @@ def _gap(one: Model, other: Model, orders: Array) -> RunGap:
     (first, ended), (second, also_ended) = run(one, orders), run(other, orders)
     rows = min(len(first), len(second))
     a, b = first[:rows, : one.nq], second[:rows, : one.nq]
-    hinges, slides, balls, frees = (
-        one.jnt_qposadr[one.jnt_type == int(kind)].tolist()
-        for kind in (JointType.HINGE, JointType.SLIDE, JointType.BALL, JointType.FREE)
-    )
-    positions = tuple(start + k for start in frees for k in range(3))
-    parts = {
-        "hinge": Coordinates(tuple(hinges), (), ()),
-        "slide": Coordinates((), tuple(slides), ()),
-        "position": Coordinates((), positions, ()),
-        "turn": Coordinates((), (), (*balls, *(start + 3 for start in frees))),
+    places = JointPlaces.of(one.jnt_type, one.jnt_qposadr)
+    apart = {
+        name: farthest(a[:, chosen], b[:, chosen])
+        for name, chosen in (
+            ("hinge", places.hinges),
+            ("slide", places.slides),
+            ("position", places.positions),
+        )
+        if len(chosen)
     }
+    if len(places.quats):
+        quats = places.quats[:, None] + np.arange(4)
+        apart["turn"] = turns(a[:, quats], b[:, quats])
     return RunGap(
         steps=rows - 1,
-        **{name: gap(a, b, part).size for name, part in parts.items() if part.width},
+        **{name: largest_or_inf(sizes) for name, sizes in apart.items()},
         moved=float(np.abs(a - a[0]).max(initial=0.0)),
         fastest=float(np.abs(second[:rows, one.nq :]).max(initial=0.0)),
         ended=ended or also_ended,

@@ -17,6 +17,7 @@ import numpy as np
 
 from ...backends._bullet_client import pb
 from ...interface import Array, JointType, Model, make_data
+from ...measures import JointPlaces
 from ..auditing import (
     Disturbance,
     Driver,
@@ -27,7 +28,6 @@ from ..auditing import (
     SaveMethod,
     SavePoint,
 )
-from ..futures import Coordinates
 from .world import aim, read_into, saved_in_a_file, saved_in_memory, servos_of
 
 _RETARGET = 0.2  # what a target is changed by, to see whether a restore brings it back [rad or m]
@@ -149,25 +149,16 @@ class PybulletDriver(Driver):
         return f"joint limits are {limits.support} ({limits.note})"
 
     @cached_property
-    def coordinates(self) -> Coordinates:
+    def coordinates(self) -> JointPlaces:
         """Joints, tree by tree; then position and quaternion of each free base."""
-        model = self.model
-        slides = set(model.jnt_dofadr[model.jnt_type == int(JointType.SLIDE)].tolist())
-        angles: list[int] = []
-        lengths: list[int] = []
-        quats = []
-        at = 0
-        with make_data(model) as data:
+        with make_data(self.model) as data:
             machine = Client(data)
-            for tree in machine.world.trees:
-                for dof in tree.dofs.tolist() if tree.joints else ():
-                    (lengths if dof in slides else angles).append(at)
-                    at += 1
-            for _ in bases(machine):
-                lengths += range(at, at + 3)
-                quats.append(at + 3)
-                at += 7
-        return Coordinates(tuple(angles), tuple(lengths), tuple(quats))
+            trees = [tree.dofs for tree in machine.world.trees if tree.joints]
+            joints = np.concatenate([*trees, np.zeros(0, int)])
+            free = len(joints) + 7 * np.arange(len(list(bases(machine))))
+        types = dict(zip(self.model.jnt_dofadr.tolist(), self.model.jnt_type.tolist(), strict=True))
+        kinds = [types[dof] for dof in joints.tolist()] + [int(JointType.FREE)] * len(free)
+        return JointPlaces.of(kinds, [*range(len(joints)), *free.tolist()])
 
     def fresh(self, point: SavePoint) -> Client:
         return Client(make_data(point.model))
