@@ -25,6 +25,7 @@ T = TypeVar("T")
 
 _PAYS = 0.1  # [s] of work that a fork takes over; for less it costs more than it saves
 _LEAST, _LONGEST = 20.0, 50.0  # [s] without a result, or so many times what one takes
+_NONE = "this system has no forks"
 _MANY = 1000  # whose numbers fit into a pipe
 
 
@@ -92,7 +93,8 @@ def _shared(
     limit: float,
 ) -> None:
     """Fill in what forks return, which take one number after the other from a pipe."""
-    assert sys.platform != "win32"  # which has none: see `forks_for`
+    if sys.platform == "win32":
+        raise OSError(_NONE)
     waiting, put = os.pipe()
     os.write(put, b"".join(number.to_bytes(4, "little") for number in numbers))
     os.close(put)
@@ -138,7 +140,8 @@ def _shared(
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
     """A Ctrl-C comes only afterwards; in a fork never, since this process answers it for all."""
-    assert sys.platform != "win32"  # which has none: see `forks_for`
+    if sys.platform == "win32":
+        raise OSError(_NONE)
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -153,7 +156,8 @@ def _fork(
     results: Connection[Any, Any],
 ) -> int:
     """Begin a fork; in it nothing is shown, and this does not return."""
-    assert sys.platform != "win32"  # which has none: see `forks_for`
+    if sys.platform == "win32":
+        raise OSError(_NONE)
     with warnings.catch_warnings():
         # Python counts threads of libraries, too: that of OpenBLAS is made for forks.
         warnings.simplefilter("ignore", DeprecationWarning)
