@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol, cast
 
-from ..errors import BadInputError, MissingEngineError, unknown_name
+from ..errors import BadInputError, MissingEngineError, check_name
 from ..installed import DEFAULT, ENGINES, raise_if_interrupted, require
 from ..interface import Model
 from ..models import resolve
@@ -134,8 +134,7 @@ def load(
         ModelError: The engine cannot read the file, or it is a binary model of others.
     """
     entry = _find(backend)
-    if not isinstance(defaults, str) or defaults not in ("model", "engine"):
-        raise unknown_name("defaults", defaults, ("model", "engine"))
+    check_name("defaults", defaults, ("model", "engine"))
     path = resolve(model, menagerie)
     if trust_binary and is_binary(path):
         read_binary(path, trust=True)  # the loader knows its bytes then
@@ -170,8 +169,7 @@ def _find(name: str) -> Backend:
     known = isinstance(name, str) and name in _BACKENDS
     if not known:
         _discover()
-    if not isinstance(name, str) or name not in _BACKENDS:
-        raise unknown_name("backend", name, _BACKENDS)
+    check_name("backend", name, _BACKENDS)
     return _BACKENDS[name]
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ..backends import backend_names, load
-from ..errors import BadInputError, StateMachineError, shown, unknown_name
+from ..errors import BadInputError, StateMachineError, check_name, shown, unknown_name
 from ..installed import DEFAULT, PAIR
 from ..interface import OPTIONS, Model
 from ..measures.text import listed
@@ -123,8 +123,7 @@ def _side(word: str, menagerie: str | None) -> Side:
     if sign and before and _ENGINE.fullmatch(after) and not Path(word).exists():
         file = before
         engine, colon, defaults = after.partition(":")
-        if engine not in backend_names():
-            raise unknown_name("engine", engine, backend_names())
+        check_name("engine", engine, backend_names())
         if colon and defaults != "engine":
             raise unknown_name(f"way to load a file on {engine}", defaults, ("engine",))
     elif not Path(word).exists():
@@ -162,8 +161,7 @@ def _refuse_mistyped(word: str) -> None:
 
 def _option(text: str) -> tuple[str, Any]:
     name, _, given = text.partition("=")
-    if name not in OPTIONS:
-        raise unknown_name("option", name, OPTIONS)
+    check_name("option", name, OPTIONS)
     if not given:
         raise BadInputError(f"{name}= has no value")
     if given.lower() in _SWITCHES:

@@ -9,13 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..backends import backend_names, load
-from ..errors import (
-    BadInputError,
-    MissingEngineError,
-    StateMachineError,
-    TraceError,
-    unknown_name,
-)
+from ..errors import BadInputError, MissingEngineError, StateMachineError, TraceError, check_name
 from ..installed import DEFAULT
 from ..interface import Model
 from ..measures import common_moments
@@ -253,8 +247,7 @@ def sides_of(
         raise BadInputError(f"{what!r} is no trace: a trace ends in .npz or .parquet")
     scenario(what)
     for name in request.backends:
-        if name not in backend_names():
-            raise unknown_name("backend", name, backend_names())
+        check_name("backend", name, backend_names())
     said: list[str] = []
     traces = [
         _run(request, name, said, part_of(progress, 0.5 * k, 0.5))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import unknown_name
+from ..errors import check_name, unknown_name
 from ..interface import Array
 from ..rotations import HERE, Placement
 from .records import Robot
@@ -262,8 +262,7 @@ def frame_names(
     found: dict[str, str] = {}
     for name, other in (given or {}).items():
         for tree, each in ((one, name), (two, other)):
-            if each not in tree.frames:
-                raise unknown_name(f"frame in {tree.robot.name}", each, tree.frames)
+            check_name(f"frame in {tree.robot.name}", each, tree.frames)
         found[name] = other
     rest = [name for name in two.frames if name not in found.values()]
     plain = {_plain(name): name for name in reversed(rest)}

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInputError, UnsupportedError, shown, unknown_name
+from ..errors import BadInputError, UnsupportedError, check_name, shown, unknown_name
 from .checks import as_count, as_numbers, as_scalar, as_switch, as_vector
 from .records import Array, JointType
 
@@ -167,8 +167,7 @@ def as_option(name: str, value: Any, integrators: Sequence[str]) -> Any:
     if name == "substeps":
         return as_count(value, name)
     if name == "integrator":
-        if not isinstance(value, str) or value not in integrators:
-            raise unknown_name("integrator", value, integrators)
+        check_name("integrator", value, integrators)
         return value
     seconds = as_scalar(value, name)
     if seconds <= 0:

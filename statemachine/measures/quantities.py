@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import BadInputError, unknown_name
+from ..errors import BadInputError, check_name
 from ..interface import Array
 from .text import milliseconds, rounded
 
@@ -155,8 +155,7 @@ def parse_tolerances(words: Iterable[str]) -> dict[str, float]:
     for word in words:
         kind, _, text = word.partition("=")
         kind = kind.replace("-", " ")
-        if kind not in QUANTITIES:
-            raise unknown_name("kind of quantity", kind, QUANTITIES)
+        check_name("kind of quantity", kind, QUANTITIES)
         value, unit = amount(text)
         if unit != QUANTITIES[kind].unit or np.isnan(value):
             units = [suffix for suffix, _, of in _SUFFIXES if of == QUANTITIES[kind].unit]

@@ -18,7 +18,7 @@ from typing import Any
 
 from ..engines import room, rooms_with
 from ..engines.call_watch import CallWatch, WatchedObject
-from ..errors import BadInputError, StateMachineError, unknown_name
+from ..errors import BadInputError, StateMachineError, check_name
 from ..installed import engine_version, require
 from ..interface import Model
 
@@ -257,8 +257,7 @@ def record(code: str, engine: str) -> CallRecording:
         Exception: Whatever else the code raised; a StateMachineError ends the run instead,
             and is in the recording.
     """
-    if engine not in recorded_engines():
-        raise unknown_name("engine whose calls can be recorded", engine, recorded_engines())
+    check_name("engine whose calls can be recorded", engine, recorded_engines())
     require(engine)
     watch = room(engine).call_watch()
     watches = [watch, *(room(helper).call_watch() for helper in watch.words.helpers)]

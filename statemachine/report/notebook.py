@@ -12,7 +12,7 @@ from itertools import takewhile, zip_longest
 from typing import Any
 
 from ..backends import load
-from ..errors import BadInputError, unknown_name
+from ..errors import BadInputError, check_name
 from ..installed import DEFAULT
 from ..lessons import LESSONS, module
 from ..lessons.pictures import with_picture
@@ -94,13 +94,11 @@ def station(name: str, backend: str = DEFAULT, prediction: str = "", **options: 
         MissingEngineError: The engine is not installed here.
         BadInputError: A prediction is no letter of its question.
     """
-    if name not in LESSONS:
-        raise unknown_name("lesson", name, LESSONS)
+    check_name("lesson", name, LESSONS)
     lesson = LESSONS[name]
     known = [option.key for option in lesson.options]
     for key in options:
-        if key not in known:
-            raise unknown_name("option", key, known)
+        check_name("option", key, known)
     page = _page(lesson, backend, options)
     letters = "".join(prediction.lower().split())
     questions = [block for block in page.blocks if isinstance(block, Question)]

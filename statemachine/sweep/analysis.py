@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import BadInputError, unknown_name
+from ..errors import BadInputError, check_name, unknown_name
 from ..interface import Array
 from ..measures.text import listed
 from ..runs.drive import Progress, part_of, silent
@@ -141,8 +141,7 @@ def sweep_report(
     sides = _sides(manifest["design"]["backends"], backends)
     labels = [vary.label for vary in design.factors]
     for name in fit:
-        if name not in labels:
-            raise unknown_name("parameter", name, labels)
+        check_name("parameter", name, labels)
     facts = facts_of(manifest, design.factors, sides, menagerie)
     seeds, moments = manifest["design"]["seeds"], manifest["request"]["moments"]
     data = sweep_data(read_cells(folder), design, sides, seeds, moments, facts.hinges)
@@ -193,8 +192,7 @@ def sweep_report(
 def _sides(there: Sequence[str], asked: Sequence[str]) -> tuple[str, str]:
     """The two engines that are compared."""
     for name in asked:
-        if name not in there:
-            raise unknown_name("backend of this sweep", name, there)
+        check_name("backend of this sweep", name, there)
     chosen = list(dict.fromkeys(asked or there[:2]))
     if len(chosen) != 2:
         raise BadInputError(

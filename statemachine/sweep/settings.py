@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..compare.perturbed import Uncertainty, direction, turn
-from ..errors import BadInputError, StateMachineError, unknown_name
+from ..errors import BadInputError, StateMachineError, check_name
 from ..interface import Array, JointType, Model
 from ..interface.checks import index_of
 from ..runs.robot import scalar_joint
@@ -73,8 +73,7 @@ def _place(model: Model, vary: Vary, owner: str, length: int) -> int:
         return scalar_joint(model, vary.place)[1]
     if owner:
         return index_of(owner, vary.place, getattr(model, f"{owner}_names"))
-    if vary.place not in _AXES:
-        raise unknown_name("axis", vary.place, _AXES)
+    check_name("axis", vary.place, _AXES)
     return _AXES.index(vary.place)
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from ...engines import room, room_names
 from ...engines.measured import Absent, Measurement
-from ...errors import unknown_name
+from ...errors import check_name
 from ...installed import ENGINES, engine_version, require
 from . import frames, memory, motion
 from .answers import NO_ANSWER, UNDECIDED, Answers, Convention, EngineAnswer, EngineQuestion
@@ -128,8 +128,7 @@ def probe(
 def check_questions(questions: Iterable[str]) -> None:
     """Raise UnknownNameError for a question that there is not."""
     for name in questions:
-        if name not in QUESTIONS:
-            raise unknown_name("question", name, QUESTIONS)
+        check_name("question", name, QUESTIONS)
 
 
 def check_engine(name: str) -> None:
