@@ -1,4 +1,4 @@
-"""What a cell of a sweep costs, and how many tasks joblib and Dask hand out: `docs/scale.md`.
+"""What a cell of a sweep costs, and how many tasks loky and Dask hand out: `docs/scale.md`.
 
     python -m benchmarks.sweep_cost
 
@@ -15,6 +15,9 @@ import tempfile
 import time
 import tracemalloc
 import warnings
+from collections import deque
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -85,15 +88,15 @@ def steps_alone(backend: str) -> float:
         return time.process_time() - began
 
 
-def rate(**how: object) -> float:
-    """Empty tasks a second through joblib."""
-    with joblib.parallel_config(**how):  # type: ignore[arg-type]
-        given: Any = {"return_as": "generator_unordered", "batch_size": 1}
-        parallel = joblib.Parallel(**given)
-        list(parallel(joblib.delayed(empty)(k) for k in range(50)))
-        began = time.perf_counter()
-        list(parallel(joblib.delayed(empty)(k) for k in range(TASKS)))
-        return TASKS / (time.perf_counter() - began)
+def rate(submit: Callable[..., Any], workers: int) -> float:
+    """Empty tasks a second, with twice as many in the air as there are workers."""
+    [future.result() for future in [submit(empty, k) for k in range(50)]]  # all workers are there
+    waiting = deque(submit(empty, k) for k in range(2 * workers))
+    began = time.perf_counter()
+    for k in range(TASKS):
+        waiting.popleft().result()
+        waiting.append(submit(empty, k))
+    return TASKS / (time.perf_counter() - began)
 
 
 def main() -> None:
@@ -119,12 +122,10 @@ def main() -> None:
                 )
     _, kept = cells("hold", "mujoco", ("damping=0.5x,2x",), ROWS // 2)
     for moments in (20, 1):
-        chosen = kept
-        if moments == 1:
-            chosen = [
-                {**row, **{name: row[name][-1:] for name in row if name.startswith("sample_")}}
-                for row in kept
-            ]
+        chosen = [
+            {**row, **{name: row[name][-moments:] for name in row if name.startswith("sample_")}}
+            for row in kept
+        ]
         size, wrote, read = bytes_of([dict(row) for row in chosen], moments)
         print(
             f"{moments} moments: {size:.0f} bytes a row in a file of {len(chosen)}, "
@@ -133,10 +134,12 @@ def main() -> None:
     took, size = ids()
     print(f"{took * 1e6:.1f} µs to name a cell, {size:.0f} bytes to remember it")
     jobs = os.cpu_count() or 1
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        print(f"loky, {jobs} processes: {rate(backend='loky', n_jobs=jobs):.0f} tasks/s")
+    with warnings.catch_warnings(action="ignore"):
         import distributed
+        from joblib.externals.loky import ProcessPoolExecutor
+
+        with ProcessPoolExecutor(max_workers=jobs) as pool:
+            print(f"loky, {jobs} processes: {rate(pool.submit, jobs):.0f} tasks/s")
 
         with (
             distributed.LocalCluster(
@@ -144,7 +147,8 @@ def main() -> None:
             ) as cluster,
             distributed.Client(cluster) as client,
         ):
-            print(f"dask, {jobs} workers: {rate(backend='dask', client=client):.0f} tasks/s")
+            dask = partial(client.submit, pure=False)
+            print(f"dask, {jobs} workers: {rate(dask, jobs):.0f} tasks/s")
 
 
 if __name__ == "__main__":
