@@ -118,6 +118,19 @@ def test_memory_is_limited() -> None:
 
 
 @LINUX
+def test_what_ends_while_it_is_looked_at_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    glob = Path.glob
+
+    def gone(self: Path, pattern: str) -> object:
+        if pattern == "task/*":
+            raise FileNotFoundError(self / "task")
+        return glob(self, pattern)
+
+    monkeypatch.setattr(Path, "glob", gone)
+    assert _python("import time; time.sleep(0.5)", asleep=5.0).returncode == 0
+
+
+@LINUX
 def test_what_is_left_in_the_session_is_ended() -> None:
     done = _python(
         "import subprocess, sys\n"

@@ -241,13 +241,14 @@ class _Waiting:
         if self._asleep_most == math.inf or (now := time.monotonic()) < self._looked + _LOOK:
             return
         self._looked = now  # if we were late ourselves, most of that is not known
-        with suppress(OSError):
+        fields: list[list[bytes]] = []
+        with suppress(OSError):  # any of them may end meanwhile
             self._inside = self._inside or [
                 entry
                 for entry in _relatives(self._process.pid, self._token)
                 if _LAUNCHER.encode() not in (entry / "cmdline").read_bytes()
             ]
-        fields = [_fields(task) for entry in self._inside for task in entry.glob("task/*")]
+            fields = [_fields(task) for entry in self._inside for task in entry.glob("task/*")]
         self.asleep += _LOOK * (bool(fields) and not any(each[0] in b"RD" for each in fields))
 
     def ask_where(self) -> None:
