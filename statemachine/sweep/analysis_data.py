@@ -199,8 +199,8 @@ def vectors(name: str, runs: Runs) -> Array:
 def length(name: str, difference: Array) -> Array:
     """The gap (…) that a difference (…, m, d) is: the largest of the moments."""
     if RUN_QUANTITIES[name].kind == "tip":
-        return largest(np.linalg.norm(difference, axis=-1))
-    return largest(largest(np.abs(difference)))
+        return largest_known(np.linalg.norm(difference, axis=-1))
+    return largest_known(largest_known(np.abs(difference)))
 
 
 def gap_between(name: str, one: Runs, two: Runs) -> Array:
@@ -217,7 +217,7 @@ def gap_between(name: str, one: Runs, two: Runs) -> Array:
     return np.where(never == 2, 0.0 * until, np.where(never == 1, until, gap))
 
 
-def largest(values: Array) -> Array:
+def largest_known(values: Array) -> Array:
     """Over the last axis, of what is a number; NaN where nothing is."""
     return np.fmax.reduce(values, axis=-1, initial=np.nan)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..interface import Array, Ints
 from ..measures import COUNT, QUANTITIES
-from .analysis_data import RUN_QUANTITIES, SweepData, largest, median
+from .analysis_data import RUN_QUANTITIES, SweepData, largest_known, median
 from .analysis_indices import Sensitivity
 from .analysis_runs import ModelFacts
 from .factors import Value, Vary
@@ -114,7 +114,7 @@ def agreement_of(
     """
     quantity, gap = RUN_QUANTITIES[name], data.gaps[name]
     tolerance, reason = _tolerance(data, quantity.kind, facts, given or {})
-    centre, most = median(gap), largest(gap)
+    centre, most = median(gap), largest_known(gap)
     known, within = np.isfinite(gap), gap <= tolerance[:, None]
     floors = [None] * len(gap) if width is None else width.tolist()
     # The first of these that is true of a setting.
@@ -135,7 +135,7 @@ def agreement_of(
         QuantityAgreement(
             name, quantity.says, QUANTITIES[quantity.kind].unit, float(np.nanmax(tolerance)),
             reason, {verdict: counts[verdict] for verdict in VERDICTS if counts[verdict]},
-            float(median(centre)), float(largest(most)),
+            float(median(centre)), float(largest_known(most)),
         ),
         tuple(settings),
     )  # fmt: skip
@@ -155,7 +155,7 @@ def _tolerance(
         far = float(np.nanmax(np.linalg.norm(data.runs["tip"] - facts.foot, axis=-1)))
         reason = f"what {count}, moves it, {far:.2f} m from the foot"
         return COUNT * far * everywhere, reason
-    longest = largest(np.concatenate(data.runs["timestep"], axis=1)) * (1 + 1e-9)
+    longest = largest_known(np.concatenate(data.runs["timestep"], axis=1)) * (1 + 1e-9)
     return longest, "one timestep: an engine looks at contacts once in a step"
 
 
